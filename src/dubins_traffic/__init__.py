@@ -1,0 +1,1 @@
+"""The benchmark "Traffic network of Dubins cars"."""

@@ -1,0 +1,201 @@
+"""Values that cross rooms every tick: poses, commands, observations, the state of a batch, frames.
+
+Small values are named tuples, since thousands of them are made per second of wall clock; arrays over a batch have
+the shape (trials B, cars N), float64, C order. Car 0 of every trial is the ego.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.body import Body
+from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+
+EGO = 0
+NONE = -1
+
+
+class Pose(NamedTuple):
+    """Position in metres and heading as a unit vector, world frame."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+
+    @property
+    def theta(self) -> float:
+        """Heading in radians, counter-clockwise from the x axis, in (-pi, pi]."""
+        return math.atan2(self.s, self.c)
+
+
+class Twist(NamedTuple):
+    """Speed along the heading in m/s and yaw rate in rad/s."""
+
+    speed: float
+    yaw_rate: float
+
+
+class Command(NamedTuple):
+    """What a driver asks for during one tick: speed in m/s and yaw rate in rad/s."""
+
+    speed: float
+    yaw_rate: float
+
+
+class Propositions(NamedTuple):
+    """The discrete state of one car at one frame (RULES, *Propositions*).
+
+    `segment` is the nearest segment; `at` the intersection whose disc holds the centre and `crosses` the one whose
+    disc the body meets (-1: none); `lane` the lane state, 2 * segment + direction (-1: none); `bits` a union of
+    the flags in `dubins_traffic.spec.propositions`.
+    """
+
+    segment: int
+    at: int
+    crosses: int
+    lane: int
+    bits: int
+
+
+class SensedCar(NamedTuple):
+    """Another car as a driver sees it."""
+
+    name: str
+    index: int
+    pose: Pose
+    twist: Twist
+    body: Body
+    propositions: Propositions
+
+
+class Observation(NamedTuple):
+    """What a driver knows at the beginning of a tick.
+
+    `time` is tick / rate, seconds. `others` are the cars within the sensing radius, by index. `scan` holds laser
+    ranges in metres, (rays,) from right to left, or None. `pose` may be noisy if the instance says so.
+    """
+
+    tick: int
+    time: float
+    pose: Pose
+    twist: Twist
+    propositions: Propositions
+    others: tuple[SensedCar, ...]
+    scan: Floats | None
+
+
+class State(NamedTuple):
+    """State of a batch after a tick. All arrays (B, N) float64, but `count` (B,) int64: cars in each trial.
+
+    `speed` and `yaw_rate` are those in force when the frame was reached: 0 for a car that a contact had fixed.
+    """
+
+    x: Floats
+    y: Floats
+    c: Floats
+    s: Floats
+    speed: Floats
+    yaw_rate: Floats
+    count: Ints
+
+    @staticmethod
+    def zeros(trials: int, cars: int) -> State:
+        """Return a state of standing cars at the origin."""
+        x, y, s, speed, yaw_rate = (np.zeros((trials, cars)) for _ in range(5))
+        return State(x, y, np.ones((trials, cars)), s, speed, yaw_rate, np.full(trials, cars, dtype=np.int64))
+
+
+class Labels(NamedTuple):
+    """Propositions of a batch: int64 arrays (B, N) as in `Propositions`, and flags `bits` (B, N) uint32."""
+
+    segment: Ints
+    at: Ints
+    crosses: Ints
+    lane: Ints
+    bits: Bits
+
+    @staticmethod
+    def zeros(trials: int, cars: int) -> Labels:
+        """Return labels of which nothing holds."""
+        segment = np.zeros((trials, cars), dtype=np.int64)
+        at, crosses, lane = (np.full((trials, cars), NONE, dtype=np.int64) for _ in range(3))
+        return Labels(segment, at, crosses, lane, np.zeros((trials, cars), dtype=np.uint32))
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two bodies touched: `car` and `other`, at `time` seconds, during the tick that ends in frame `tick`.
+
+    `other` is a car's index, or -1 - k for obstacle k. (x, y) is the point of contact and (nx, ny) the unit normal
+    from `car` toward `other`. `closing` are the speeds of the two touching points toward each other (m/s, positive:
+    toward), `moved` whether each moved or, being a rectangle, turned in that tick before the contact.
+    `at_fault` is filled in by the labeller: whether `car`, and whether `other`, is at fault.
+    """
+
+    tick: int
+    time: float
+    car: int
+    other: int
+    x: float
+    y: float
+    nx: float
+    ny: float
+    closing: tuple[float, float]
+    moved: tuple[bool, bool]
+    at_fault: tuple[bool, bool] = (False, False)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something named that happened at one instant of a trial and is neither a frame nor a contact."""
+
+    tick: int
+    kind: str
+    car: int = NONE
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """A block of consecutive frames of one trial, with all contacts and events of their ticks.
+
+    Frame f of the block is frame ``first + f`` of the trial, at time ``(first + f) / rate``. Arrays are (F, N).
+    `command_speed` and `command_yaw_rate` are the clipped commands held during the tick that ended in the frame
+    (0 in frame 0). The integer arrays are those of `Labels`.
+    """
+
+    first: int
+    rate: float
+    x: Floats
+    y: Floats
+    c: Floats
+    s: Floats
+    speed: Floats
+    yaw_rate: Floats
+    command_speed: Floats
+    command_yaw_rate: Floats
+    segment: Ints
+    at: Ints
+    crosses: Ints
+    lane: Ints
+    bits: Bits
+    contacts: tuple[Contact, ...] = field(default=())
+    events: tuple[Event, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return int(self.x.shape[0])
+
+    @property
+    def time(self) -> Floats:
+        """Times of the frames, seconds, (F,)."""
+        return (self.first + np.arange(len(self))) / self.rate
+
+    @property
+    def theta(self) -> Floats:
+        """Headings in radians, (F, N)."""
+        return np.arctan2(self.s, self.c)

@@ -1,0 +1,98 @@
+"""Errors that users of the package may meet; all share one base class."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_ABSENT: Final = object()
+
+
+class DubinsTrafficError(Exception):
+    """Base class of every error raised on purpose by this package."""
+
+
+class InputError(DubinsTrafficError):
+    """Something the user gave is wrong.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, in a few words.
+    file : str, optional
+        The file (or ``-``, or a name such as ``--seed``) in which it stands.
+    field : str, optional
+        Path of the field inside the document, such as ``rnd.segments[3]``.
+    value : object, optional
+        The offending value.
+    expected : str, optional
+        What would have been right.
+
+    Examples
+    --------
+    >>> str(InputError("not a length", file="a.json", field="length", value=-1, expected="a number > 0"))
+    'a.json: length: not a length: got -1; expected a number > 0'
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | None = None,
+        field: str | None = None,
+        value: object = _ABSENT,
+        expected: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = file
+        self.field = field
+        self.value = value
+        self.expected = expected
+        super().__init__(problem)
+
+    def within(self, *, file: str | None = None, field: str | None = None) -> InputError:
+        """Return the same error placed in `file` and below the field `field`."""
+        path = self.field
+        if field:
+            joint = "" if path is None or path.startswith("[") else "."
+            path = field if path is None else f"{field}{joint}{path}"
+        return InputError(
+            self.problem,
+            file=self.file or file,
+            field=path,
+            value=self.value,
+            expected=self.expected,
+        )
+
+    def __str__(self) -> str:
+        parts = [part for part in (self.file, self.field, self.problem) if part]
+        text = ": ".join(parts)
+        if self.value is not _ABSENT:
+            text += f": got {_short(self.value)}"
+        if self.expected:
+            text += f"; expected {self.expected}"
+        return text
+
+
+class RecordError(InputError):
+    """A record can't be read: truncated before its header, not a record, or of an unknown version."""
+
+
+class ControllerError(DubinsTrafficError):
+    """A controller raised, answered nonsense or was too late; `reason` is one of the named ends of a trial."""
+
+    def __init__(self, reason: str, detail: str) -> None:
+        self.reason = reason
+        self.detail = detail
+        super().__init__(f"{reason}: {detail}")
+
+
+class MissingExtraError(DubinsTrafficError):
+    """A feature needs an optional extra of the package that is not installed."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        super().__init__(f"{feature} needs the extra '{extra}': install dubins-traffic[{extra}]")
+
+
+def _short(value: object, limit: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,69 @@
+"""The compiler's settings, and where compiled kernels are kept.
+
+Numba's cache looks at the file of the compiled function only, not at the files of the functions it calls. The
+cache folder is therefore named by a hash of all sources that hold kernels and of the versions of the compiler.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import llvmlite
+import numba
+import numpy as np
+from platformdirs import user_cache_path
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def sources() -> list[Path]:
+    """Return the source files of the package that hold kernels, in order."""
+    files = sorted(PACKAGE.rglob("*.py"))
+    return [file for file in files if file.parent.name == "kernels" or b"@jit" in file.read_bytes()]
+
+
+def fingerprint() -> str:
+    """Return a hash of all kernel sources and of the versions that compile them."""
+    digest = hashlib.sha256()
+    for part in (sys.version, numba.__version__, llvmlite.__version__, np.__version__):
+        digest.update(part.encode())
+    for file in sources():
+        digest.update(str(file.relative_to(PACKAGE)).encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_folder() -> Path:
+    """Return a folder for compiled kernels that can be written: the user's cache, else a temporary one."""
+    root = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(root) if root else user_cache_path("dubins-traffic") / "kernels"
+    folder = base / fingerprint()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / fingerprint()
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def jit(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` on first use, without fast-math and without exceptions on division.
+
+    The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is.
+    """
+    numba.config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
+    compiler = cast(Any, numba.njit)(cache=True, error_model="numpy", nogil=True)
+    return cast(Callable[P, R], compiler(function))

@@ -1,0 +1,56 @@
+"""Random numbers inside kernels: functions of (seed, trial, car, tick, draw) and of nothing else.
+
+`draw` numbers the purposes within one car and tick; each room that draws keeps its own range of them
+(agents 0-99, controllers 100-199, disturbances 200-299).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.philox import philox4x32 as _plain_philox
+
+philox4x32 = jit(_plain_philox)
+
+LOW = np.uint64(0xFFFFFFFF)
+HALF = np.uint64(32)
+UP = np.uint64(21)
+DOWN = np.uint64(11)
+GRID = 2.0**-53
+
+
+@jit
+def block(seed: Any, trial: int, car: int, tick: int, draw: int) -> tuple[Any, Any, Any, Any]:
+    """Return four random 32-bit words, as uint64; `seed` is a uint64."""
+    return philox4x32(
+        np.uint64(trial), np.uint64(car), np.uint64(tick), np.uint64(draw), seed & LOW, seed >> HALF
+    )
+
+
+@jit
+def uniform(seed: Any, trial: int, car: int, tick: int, draw: int) -> float:
+    """Return a float in [0, 1), on a grid of 2**-53."""
+    a, b, _, _ = block(seed, trial, car, tick, draw)
+    return np.float64((a << UP) | (b >> DOWN)) * GRID
+
+
+@jit
+def below(seed: Any, trial: int, car: int, tick: int, draw: int, bound: int) -> int:
+    """Return an integer in [0, bound); bound <= 2**16, so that the bias is below 2**-16 per value."""
+    a, _, _, _ = block(seed, trial, car, tick, draw)
+    return np.int64((a * np.uint64(bound)) >> HALF)
+
+
+@jit
+def bell(seed: Any, trial: int, car: int, tick: int, draw: int) -> float:
+    """Return a number of mean 0 and variance 1, close to normal and bounded by 6: the sum of twelve uniform
+    32-bit fractions less 6 (Irwin-Hall). Uses the draws `draw`, `draw` + 1 and `draw` + 2.
+    """
+    total = 0.0
+    for k in range(3):
+        a, b, c, d = block(seed, trial, car, tick, draw + k)
+        total += (np.float64(a) + np.float64(b)) + (np.float64(c) + np.float64(d))
+    return (total + 6.0) * 2.0**-32 - 6.0

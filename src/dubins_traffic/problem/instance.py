@@ -1,0 +1,113 @@
+"""A problem: what a controller is told. An instance: a problem plus what it is not told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from dubins_traffic.cars.body import Car, Obstacle
+from dubins_traffic.cars.state import Pose
+
+if TYPE_CHECKING:
+    from dubins_traffic.roads.network import RoadNetwork
+
+
+@dataclass(frozen=True, slots=True)
+class Laser:
+    """A laser scanner on a car's centre: `rays` over [angle_min, angle_max] radians, ranges in metres.
+
+    The defaults are the layout of 2016, whose scanner ran at 10 Hz.
+    """
+
+    rays: int = 300
+    angle_min: float = -2.0
+    angle_max: float = 2.0
+    range_min: float = 0.08
+    range_max: float = 5.0
+    rate: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbances:
+    """Seeded disturbances of the ego.
+
+    `position_noise` (m) and `heading_noise` (rad) are standard deviations of the observed pose; a command takes
+    effect `command_delay` ticks late (the car stands before the first); with probability `command_loss` a command
+    is lost and the last one in force stays.
+    """
+
+    position_noise: float = 0.0
+    heading_noise: float = 0.0
+    command_delay: int = 0
+    command_loss: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class EAgent:
+    """An e-agent: `kind` is our name for its type (`wander`), `type` the name in the document (`wander/wander`)."""
+
+    kind: str
+    name: str
+    type: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What a controller is told before a trial.
+
+    `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
+    `rules` holds the parameters of RULES by name, empty where the rules are not to be judged.
+    """
+
+    network: RoadNetwork
+    goals: tuple[tuple[int, int], ...]
+    intersection_radius: float
+    car: Car
+    rate: float
+    sensing_radius: float
+    laser: Laser | None
+    obstacles: tuple[Obstacle, ...]
+    e_agents: tuple[str, ...]
+    rules: Mapping[str, Any]
+
+    @property
+    def goal_vertices(self) -> tuple[int, ...]:
+        """Numbers of the goals' intersections."""
+        return tuple(self.network.vertex(goal) for goal in self.goals)
+
+    @property
+    def period(self) -> float:
+        """Seconds of a tick, T = 1 / rate."""
+        return 1.0 / self.rate
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One instance: everything that, with a controller, decides a trial.
+
+    `starts` holds one pose per car, the ego first, then `e_agents` in order. `duration` is in seconds. All random
+    numbers of the trial follow from (`seed`, `trial`).
+    """
+
+    problem: Problem
+    starts: tuple[Pose, ...]
+    duration: float
+    e_agents: tuple[EAgent, ...]
+    seed: int
+    trial: int
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    end_on_collision: bool = False
+    simulator: str = "embedded"
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def ticks(self) -> int:
+        """Number of ticks K = round(duration * rate); the trial has K + 1 frames."""
+        return round(self.duration * self.problem.rate)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cars, `ego` first."""
+        return ("ego", *(agent.name for agent in self.e_agents))
