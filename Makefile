@@ -1,0 +1,48 @@
+# Everything here creates .venv and installs what it needs by itself; a second run is quick.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+BIN := .venv/bin
+WORKERS ?= 2
+SETUP := pyproject.toml constraints.txt scripts/setup.sh
+
+.PHONY: help setup demo test check format bench clean
+
+help: ## show this text
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 10
+
+setup: .venv/.installed-dev ## install the package and everything that developers need into .venv
+
+demo: .venv/.installed-plot ## three trials with two controllers, scored, drawn and replayed in demo-output/
+	@$(BIN)/python examples/compare.py demo demo-output --controllers lanes simple --trials 3
+
+test: .venv/.installed-dev ## all checks, then all tests
+	@scripts/system-packages.sh
+	@$(MAKE) --no-print-directory check
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+
+check: .venv/.installed-dev ## format, lint, types and layers
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: .venv/.installed-dev ## format the sources and mend what the linter can
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: .venv/.installed-dev ## speed, as ratios to named peers and limits measured in the same run
+	@$(BIN)/python -m benchmarks
+
+clean: ## remove .venv, the demo's output and everything that tools leave behind
+	rm -rf .venv demo-output out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +
+	rm -rf src/dubins_traffic.egg-info
+
+.venv/.installed-plot: $(SETUP)
+	@scripts/setup.sh plot
+
+.venv/.installed-dev: $(SETUP)
+	@scripts/setup.sh dev
