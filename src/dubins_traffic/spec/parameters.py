@@ -1,0 +1,73 @@
+"""The parameters of the rules of the road, with their defaults (RULES.md, values in <>)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Parameters(NamedTuple):
+    """Parameters of the rules by name; metres, seconds, metres per second.
+
+    A problem that asks for the rules carries all of them in `Problem.rules`.
+    """
+
+    crossing_degree: int = 3
+    """Least degree of a vertex that is a crossing."""
+    segment_slack: float = 0.5
+    """Least length of a segment beyond 2 (R + rho)."""
+    sensing_slack: float = 0.5
+    """The sensing radius is at least 2 (R + rho + this)."""
+    still_speed: float = 0.05
+    """still(d): the centre lies within still_speed * d of where it was d ago."""
+    turn_back: float = 0.3
+    """A lane state flips when progress has fallen this far below its maximum."""
+    left_set: float = 0.05
+    """left rises when the body reaches farther left of the centre line than this."""
+    left_release: float = 0.0
+    """left falls when the body's largest lateral coordinate is below this."""
+    approach_distance: float = 0.5
+    """approach: the body is at most this far from the disc."""
+    stop_time: float = 0.5
+    """stopped: approach and still throughout this time."""
+    queue_distance: float = 0.5
+    """stopped is lost farther than this from the disc."""
+    group_time: float = 0.1
+    """Tickets at most this much later than a group's first belong to the group."""
+    forfeit_time: float = 3.0
+    """Who is first at a clear crossing this long and does not enter gets a new ticket."""
+    stand_time: float = 1.0
+    """stands: still for this time."""
+    excuse_distance: float = 1.0
+    """A car this close behind one excused by the queue is excused as well."""
+    blocked_ahead: float = 1.5
+    """blocked: something that stands at most this far ahead."""
+    blocked_gap: float = 0.1
+    """blocked: less than the body's width and this much is left free of the right lane."""
+    overtaking_behind: float = 0.8
+    """overtaking ends when nothing that blocks lies between this far behind ..."""
+    overtaking_ahead: float = 1.5
+    """... and this far ahead."""
+    left_time: float = 10.0
+    """Rule 2: left ends within this time."""
+    enter_time: float = 10.0
+    """E3: who is first at a clear crossing enters within this time."""
+    tickets: int = 1
+    """E3: most new tickets in one wait."""
+    exit_gap: float = 0.8
+    """E4: an exit is free if nobody is within this distance in the lane."""
+    exit_time: float = 5.0
+    """E4: a disc with a free exit is left within this time."""
+    way_distance: float = 1.5
+    """E5: the way is free if nothing that stands is within this distance."""
+    rest_time: float = 60.0
+    """E5: with a free way nobody stands longer than this."""
+    goal_time: float = 60.0
+    """E6: every goal is free again within this time."""
+    exceptions: int = 0
+    """Most breaches of E1 per car within exception_time."""
+    exception_time: float = 60.0
+    """Window over which the exceptions are counted."""
+    witness_time: float = 10.0
+    """A verdict says whether the culprit was within the sensing radius in this last time."""
+    gap_rounds: float = 10.0
+    """satisfied: no gap between visits of a goal over this many free-flow rounds."""
