@@ -15,9 +15,7 @@ PART1 = 1.5707963267341256
 PART2 = 6.077100506303966e-11
 PART3 = 2.0222662487959506e-21
 
-S3, S5, S7, S9, S11, S13, S15, S17 = (
-    (-1.0) ** k / factorial(2 * k + 1) for k in range(1, 9)
-)
+S3, S5, S7, S9, S11, S13, S15, S17 = ((-1.0) ** k / factorial(2 * k + 1) for k in range(1, 9))
 C2, C4, C6, C8, C10, C12, C14, C16, C18 = ((-1.0) ** k / factorial(2 * k) for k in range(1, 10))
 
 

@@ -1,0 +1,321 @@
+"""Clip and move: one tick of a batch, with contacts over the whole interval in order of time.
+
+Loops over trials and cars; the element functions are in `kernels.trig` and `kernels.boxes`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.near import candidates
+from dubins_traffic.cars.state import State
+from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.trig import advance
+
+PARTED = 0.01
+"""Two bodies that touched count as touching until they are this far apart, metres."""
+PARTNERS = 12
+VACANT = -(2**62)
+CONTACT_FIELDS = 12
+
+
+class Workspace(NamedTuple):
+    """What `step` needs beside the state, allocated once.
+
+    `partner` (B, N, PARTNERS): whom a car touches since their contact, VACANT where nobody; held by the lower
+    index, obstacle k as -1 - k. `touching` (B,): number of such pairs. `pair` (P, 2) and `when` (P,): candidate
+    pairs of one trial and their instants of contact. `until` (N,): when each car was fixed. `head`, `link` and
+    `cell`: buckets of the neighbour search. `contact` (C, CONTACT_FIELDS): trial, car, other, time in the tick,
+    point, normal, closing speeds, moved flags. `found` (1,): number of contacts.
+    """
+
+    partner: Ints
+    touching: Ints
+    pair: Ints
+    when: Floats
+    until: Floats
+    head: Ints
+    link: Ints
+    cell: Ints
+    contact: Floats
+    found: Ints
+
+
+def workspace(trials: int, cars: int) -> Workspace:
+    """Return a workspace for a batch of `trials` x `cars`."""
+    buckets = 64
+    while buckets < 2 * cars:
+        buckets *= 2
+    pairs = max(64, 8 * cars)
+    return Workspace(
+        partner=np.full((trials, cars, PARTNERS), VACANT, dtype=np.int64),
+        touching=np.zeros(trials, dtype=np.int64),
+        pair=np.zeros((pairs, 2), dtype=np.int64),
+        when=np.zeros(pairs),
+        until=np.zeros(cars),
+        head=np.zeros(buckets, dtype=np.int64),
+        link=np.zeros(cars, dtype=np.int64),
+        cell=np.zeros((cars, 2), dtype=np.int64),
+        contact=np.zeros((max(1024, 2 * cars), CONTACT_FIELDS)),
+        found=np.zeros(1, dtype=np.int64),
+    )
+
+
+@jit
+def clip(
+    speed: float, yaw: float, low: float, high: float, most: float, radius: float
+) -> tuple[float, float]:
+    """Return the nearest admissible speed, then the nearest yaw rate admissible at that speed."""
+    speed = min(max(speed, low), high)
+    if radius > 0.0:
+        most = min(most, abs(speed) / radius)
+    return speed, min(max(yaw, -most), most)
+
+
+@jit
+def step(
+    state: State,
+    commands: Floats,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    dt: float,
+    work: Workspace,
+    first: int,
+) -> int:
+    """Clip the commands in place and move trials `first`... for one tick of `dt` seconds.
+
+    Returns the number of trials B when all have moved, or the trial before which it stopped because the buffer of
+    contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
+    """
+    work.found[0] = 0
+    trials = state.count.shape[0]
+    for b in range(first, trials):
+        n = state.count[b]
+        if work.found[0] + n > work.contact.shape[0]:
+            return b
+        fastest = 0.0
+        for i in range(n):
+            speed, yaw = clip(
+                commands[b, i, 0], commands[b, i, 1],
+                cars.speed_low[b], cars.speed_high[b], cars.yaw_rate[b], cars.turning_radius[b],
+            )  # fmt: skip
+            commands[b, i, 0] = speed
+            commands[b, i, 1] = yaw
+            fastest = max(fastest, abs(speed))
+        reach = cars.reach[b]
+        far = reach + fastest * dt + 1e-8
+        pairs = candidates(state, b, 2.0 * far, obstacles, far, work.pair, work.head, work.link, work.cell)
+        if pairs > work.pair.shape[0]:
+            return -1 - b
+        if pairs > 0:
+            resolve(state, commands, cars, obstacles, dt, work, b, pairs)
+        else:
+            for i in range(n):
+                _move(state, b, i, commands[b, i, 0], commands[b, i, 1], dt, dt)
+        if work.touching[b] > 0:
+            part(state, cars, obstacles, work, b)
+    return trials
+
+
+@jit
+def _move(state: State, b: int, i: int, speed: float, yaw: float, until: float, dt: float) -> None:
+    x, y, c, s = advance(
+        state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], speed, yaw, min(until, dt)
+    )
+    state.x[b, i] = x
+    state.y[b, i] = y
+    state.c[b, i] = c
+    state.s[b, i] = s
+    state.speed[b, i] = speed if until >= dt else 0.0
+    state.yaw_rate[b, i] = yaw if until >= dt else 0.0
+
+
+@jit
+def _meet(
+    state: State,
+    commands: Floats,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    until: Floats,
+    b: int,
+    i: int,
+    j: int,
+    begin: float,
+    dt: float,
+) -> float:
+    """Return when car i meets j, a car or obstacle part -1 - p, after `begin`; NEVER if not in this tick."""
+    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
+    x, y, c, s = state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i]
+    u, w = commands[b, i, 0], commands[b, i, 1]
+    if j < 0:
+        p = obstacles.part[-1 - j]
+        return box_contact(
+            x, y, c, s, u, w, until[i], a, h, r,
+            p[0], p[1], p[2], p[3], 0.0, 0.0, 0.0, p[4], p[5], p[6], begin, dt,
+        )  # fmt: skip
+    if a + h == 0.0:
+        return disc_contact(
+            x, y, c, s, u, w, until[i],
+            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], commands[b, j, 0], commands[b, j, 1],
+            until[j], 2.0 * r, begin, dt,
+        )  # fmt: skip
+    return box_contact(
+        x, y, c, s, u, w, until[i], a, h, r,
+        state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], commands[b, j, 0], commands[b, j, 1],
+        until[j], a, h, r, begin, dt,
+    )  # fmt: skip
+
+
+@jit
+def resolve(
+    state: State,
+    commands: Floats,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    dt: float,
+    work: Workspace,
+    b: int,
+    pairs: int,
+) -> None:
+    """Move trial b with its candidate pairs: fix both cars at the earliest contact, search on, then move all."""
+    until = work.until
+    for i in range(state.count[b]):
+        until[i] = NEVER
+    for k in range(pairs):
+        work.when[k] = _meet(
+            state, commands, cars, obstacles, until, b, work.pair[k, 0], work.pair[k, 1], 0.0, dt
+        )
+    while True:
+        first = -1
+        for k in range(pairs):
+            if work.when[k] < NEVER and (first < 0 or _before(work, k, first)):
+                first = k
+        if first < 0:
+            break
+        now = work.when[first]
+        i = work.pair[first, 0]
+        j = work.pair[first, 1]
+        _note(state, commands, cars, obstacles, work, b, i, j, now)
+        until[i] = min(until[i], now)
+        if j >= 0:
+            until[j] = min(until[j], now)
+        for k in range(pairs):
+            m = work.pair[k, 0]
+            o = work.pair[k, 1]
+            if m == i or o == i or (j >= 0 and (m == j or o == j)):
+                fixed = until[m] <= now and (o < 0 or until[o] <= now)
+                work.when[k] = NEVER
+                if not fixed:
+                    work.when[k] = _meet(state, commands, cars, obstacles, until, b, m, o, now, dt)
+    for i in range(state.count[b]):
+        _move(state, b, i, commands[b, i, 0], commands[b, i, 1], until[i], dt)
+
+
+@jit
+def _before(work: Workspace, k: int, m: int) -> bool:
+    if work.when[k] != work.when[m]:
+        return work.when[k] < work.when[m]
+    if work.pair[k, 0] != work.pair[m, 0]:
+        return work.pair[k, 0] < work.pair[m, 0]
+    return work.pair[k, 1] < work.pair[m, 1]
+
+
+@jit
+def _pose(
+    state: State, commands: Floats, until: Floats, b: int, i: int, now: float
+) -> tuple[float, float, float, float]:
+    return advance(
+        state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i],
+        commands[b, i, 0], commands[b, i, 1], min(now, until[i]),
+    )  # fmt: skip
+
+
+@jit
+def _moved(cars: CarTable, b: int, speed: float, yaw: float) -> float:
+    turned = yaw != 0.0 and cars.half_length[b] > 0.0
+    return 1.0 if speed != 0.0 or turned else 0.0
+
+
+@jit
+def _note(
+    state: State,
+    commands: Floats,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    work: Workspace,
+    b: int,
+    i: int,
+    j: int,
+    now: float,
+) -> None:
+    """Write down the contact of car i with j (a car, or obstacle part -1 - p), unless they touched already."""
+    other = j if j >= 0 else -1 - obstacles.owner[-1 - j]
+    free = -1
+    for k in range(PARTNERS):
+        if work.partner[b, i, k] == other:
+            return
+        if free < 0 and work.partner[b, i, k] == VACANT:
+            free = k
+    if free >= 0:
+        work.partner[b, i, free] = other
+        work.touching[b] += 1
+    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
+    x0, y0, c0, s0 = _pose(state, commands, work.until, b, i, now)
+    v0, w0 = (commands[b, i, 0], commands[b, i, 1]) if now < work.until[i] else (0.0, 0.0)
+    if j >= 0:
+        x1, y1, c1, s1 = _pose(state, commands, work.until, b, j, now)
+        v1, w1 = (commands[b, j, 0], commands[b, j, 1]) if now < work.until[j] else (0.0, 0.0)
+        _, nx, ny, px, py = separation(x0, y0, c0, s0, a, h, r, x1, y1, c1, s1, a, h, r)
+        moved = _moved(cars, b, commands[b, j, 0], commands[b, j, 1])
+    else:
+        p = obstacles.part[-1 - j]
+        x1, y1, c1, s1, v1, w1, moved = p[0], p[1], p[2], p[3], 0.0, 0.0, 0.0
+        _, nx, ny, px, py = separation(x0, y0, c0, s0, a, h, r, x1, y1, c1, s1, p[4], p[5], p[6])
+    row = work.contact[work.found[0]]
+    row[0], row[1], row[2], row[3] = b, i, other, now
+    row[4], row[5], row[6], row[7] = px, py, nx, ny
+    turn0 = w0 if a > 0.0 else 0.0
+    turn1 = w1 if a > 0.0 else 0.0
+    row[8] = nx * (v0 * c0 - turn0 * (py - y0)) + ny * (v0 * s0 + turn0 * (px - x0))
+    row[9] = -(nx * (v1 * c1 - turn1 * (py - y1)) + ny * (v1 * s1 + turn1 * (px - x1)))
+    row[10] = _moved(cars, b, commands[b, i, 0], commands[b, i, 1])
+    row[11] = moved
+    work.found[0] += 1
+
+
+@jit
+def part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
+    """Forget the pairs of trial b that are PARTED or more apart."""
+    for i in range(state.count[b]):
+        for k in range(PARTNERS):
+            other = work.partner[b, i, k]
+            if other == VACANT:
+                continue
+            if gap(state, cars, obstacles, b, i, other) >= PARTED:
+                work.partner[b, i, k] = VACANT
+                work.touching[b] -= 1
+
+
+@jit
+def gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int, other: int) -> float:
+    """Return the gap, metres, between car i and `other`, a car or obstacle -1 - k."""
+    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
+    x, y, c, s = state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i]
+    if other >= 0:
+        best, _, _, _, _ = separation(
+            x, y, c, s, a, h, r,
+            state.x[b, other], state.y[b, other], state.c[b, other], state.s[b, other], a, h, r,
+        )  # fmt: skip
+        return best
+    best = NEVER
+    for k in range(obstacles.off[b], obstacles.off[b + 1]):
+        if obstacles.owner[k] == -1 - other:
+            p = obstacles.part[k]
+            distance, _, _, _, _ = separation(x, y, c, s, a, h, r, p[0], p[1], p[2], p[3], p[4], p[5], p[6])
+            best = min(best, distance)
+    return best

@@ -1,0 +1,185 @@
+"""What a car perceives: the cars within a radius, with seeded noise, and a laser scan."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.boxes import NEVER
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.random import bell
+from dubins_traffic.kernels.trig import sincos
+
+POSITION_DRAW = 200
+HEADING_DRAW = 206
+SEEN_FIELDS = 12
+
+
+@jit
+def neighbours(state: State, labels: Labels, b: int, viewer: int, radius: float, seen: Floats) -> int:
+    """Write the viewer and then the other cars within `radius` of it, by index, into `seen`; return the number.
+
+    A row of `seen` (N, SEEN_FIELDS) is: index, x, y, cos, sin, speed, yaw rate, segment, at, crosses, lane, bits.
+    """
+    limit = radius * radius
+    x = state.x[b, viewer]
+    y = state.y[b, viewer]
+    _view(state, labels, b, viewer, seen[0])
+    count = 1
+    for n in range(state.count[b]):
+        dx = state.x[b, n] - x
+        dy = state.y[b, n] - y
+        if n != viewer and dx * dx + dy * dy <= limit:
+            _view(state, labels, b, n, seen[count])
+            count += 1
+    return count
+
+
+@jit
+def _view(state: State, labels: Labels, b: int, n: int, row: Floats) -> None:
+    row[0] = n
+    row[1] = state.x[b, n]
+    row[2] = state.y[b, n]
+    row[3] = state.c[b, n]
+    row[4] = state.s[b, n]
+    row[5] = state.speed[b, n]
+    row[6] = state.yaw_rate[b, n]
+    row[7] = labels.segment[b, n]
+    row[8] = labels.at[b, n]
+    row[9] = labels.crosses[b, n]
+    row[10] = labels.lane[b, n]
+    row[11] = labels.bits[b, n]
+
+
+@jit
+def blur(seen: Floats, count: int, seed: Any, trial: int, tick: int, position: float, heading: float) -> None:
+    """Add noise to the poses in `seen`: standard deviations `position` (m, each axis) and `heading` (rad)."""
+    for k in range(count):
+        row = seen[k]
+        car = int(row[0])
+        row[1] += position * bell(seed, trial, car, tick, POSITION_DRAW)
+        row[2] += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
+        c, s = sincos(heading * bell(seed, trial, car, tick, HEADING_DRAW))
+        row[3], row[4] = row[3] * c - row[4] * s, row[4] * c + row[3] * s
+
+
+@jit
+def ray_box(
+    px: float,
+    py: float,
+    ex: float,
+    ey: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    a: float,
+    b: float,
+    r: float,
+) -> float:
+    """Return how far the ray from (px, py) along the unit vector (ex, ey) goes to a rounded box, or NEVER.
+
+    A rounded box is the union of two crossed boxes and four discs at the corners. 0 if the ray begins inside.
+    """  # fmt: skip
+    dx = px - x
+    dy = py - y
+    u = dx * c + dy * s
+    v = dy * c - dx * s
+    eu = ex * c + ey * s
+    ev = ey * c - ex * s
+    best = NEVER
+    if a + b > 0.0:
+        best = min(_ray_slab(u, v, eu, ev, a + r, b), _ray_slab(u, v, eu, ev, a, b + r))
+    if r > 0.0:
+        for k in range(4):
+            cu = a if k < 2 else -a
+            cv = b if k % 2 == 0 else -b
+            best = min(best, _ray_disc(u - cu, v - cv, eu, ev, r))
+    return best
+
+
+@jit
+def _ray_disc(u: float, v: float, eu: float, ev: float, r: float) -> float:
+    along = u * eu + v * ev
+    outside = u * u + v * v - r * r
+    if outside <= 0.0:
+        return 0.0
+    square = along * along - outside
+    if along >= 0.0 or square < 0.0:
+        return NEVER
+    return -along - sqrt(square)
+
+
+@jit
+def _ray_slab(u: float, v: float, eu: float, ev: float, a: float, b: float) -> float:
+    near = 0.0
+    far = NEVER
+    for k in range(2):
+        p, e, h = (u, eu, a) if k == 0 else (v, ev, b)
+        if abs(e) < 1e-12:
+            if abs(p) > h:
+                return NEVER
+        else:
+            t0 = (-h - p) / e
+            t1 = (h - p) / e
+            near = max(near, min(t0, t1))
+            far = min(far, max(t0, t1))
+    return near if near <= far else NEVER
+
+
+@jit
+def scan(
+    state: State,
+    b: int,
+    viewer: int,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    rays: Floats,
+    shortest: float,
+    longest: float,
+    ranges: Floats,
+) -> None:
+    """Write the laser ranges of car `viewer` in metres into `ranges` (R,).
+
+    `rays` (R, 2) are unit vectors in the car's frame. As REP 117 of ROS says, a ray that meets nothing within
+    `longest` reads +inf, and one that meets something nearer than `shortest` reads -inf.
+    """  # fmt: skip
+    x, y = state.x[b, viewer], state.y[b, viewer]
+    c, s = state.c[b, viewer], state.s[b, viewer]
+    count = rays.shape[0]
+    for k in range(count):
+        ranges[k] = NEVER
+    far = longest + cars.reach[b]
+    for n in range(state.count[b]):
+        dx = state.x[b, n] - x
+        dy = state.y[b, n] - y
+        if n != viewer and dx * dx + dy * dy < far * far:
+            for k in range(count):
+                ex = rays[k, 0] * c - rays[k, 1] * s
+                ey = rays[k, 0] * s + rays[k, 1] * c
+                hit = ray_box(
+                    x, y, ex, ey, state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n],
+                    cars.half_length[b], cars.half_width[b], cars.rounding[b],
+                )  # fmt: skip
+                ranges[k] = min(ranges[k], hit)
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        dx = row[0] - x
+        dy = row[1] - y
+        far = longest + row[7]
+        if dx * dx + dy * dy < far * far:
+            for k in range(count):
+                ex = rays[k, 0] * c - rays[k, 1] * s
+                ey = rays[k, 0] * s + rays[k, 1] * c
+                hit = ray_box(x, y, ex, ey, row[0], row[1], row[2], row[3], row[4], row[5], row[6])
+                ranges[k] = min(ranges[k], hit)
+    for k in range(count):
+        if ranges[k] > longest:
+            ranges[k] = np.inf
+        elif ranges[k] < shortest:
+            ranges[k] = -np.inf

@@ -1,0 +1,92 @@
+"""The embedded simulator: exact arcs, exact contacts, batches; the reference of the conformance suite."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.cars.motion import Workspace, step, workspace
+from dubins_traffic.cars.state import Contact, State
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.protocols import Capabilities
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+
+class Embedded:
+    """Moves every car on the exact arc of its command and finds every contact of the interval in order of time.
+
+    The order of events is that of `docs/semantics.md`; the method is in `kernels.boxes` and `cars.motion`.
+    """
+
+    capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
+
+    def reset(self, instances: Sequence[Instance]) -> State:
+        """Place the cars of a batch of instances, which share one control rate."""
+        rates = {instance.problem.rate for instance in instances}
+        if len(rates) != 1:
+            raise InputError(
+                "a batch has one control rate", field="rate", value=sorted(rates), expected="one"
+            )
+        self._rate = rates.pop()
+        self._cars = pack_cars([instance.problem.car for instance in instances])
+        self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
+        counts = [len(instance.starts) for instance in instances]
+        state = State.zeros(len(instances), max(counts))
+        for b, instance in enumerate(instances):
+            state.count[b] = counts[b]
+            for n, pose in enumerate(instance.starts):
+                state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n] = pose
+        self.state = state
+        self._work = workspace(len(instances), max(counts))
+        self._none: list[tuple[Contact, ...]] = [()] * len(instances)
+        self._tick = 0
+        return state
+
+    def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
+        """Clip `commands` (B, N, 2) in place, move for one tick and return the contacts of each trial."""
+        trials = len(self._none)
+        contacts: list[tuple[Contact, ...]] = self._none
+        self._tick += 1
+        done = 0
+        while done < trials:
+            reached = step(
+                self.state, commands, self._cars, self._obstacles, 1.0 / self._rate, self._work, done
+            )
+            if self._work.found[0]:
+                contacts = self._collect(contacts)
+            done = -1 - reached if reached < 0 else reached
+            if reached < 0:
+                self._work = _enlarged(self._work)
+        return contacts
+
+    def close(self) -> None:
+        """Nothing is held outside memory."""
+
+    def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
+        contacts = list(contacts)
+        for row in self._work.contact[: self._work.found[0]].tolist():
+            contact = Contact(
+                tick=self._tick,
+                time=(self._tick - 1) / self._rate + row[3],
+                car=int(row[1]),
+                other=int(row[2]),
+                x=row[4],
+                y=row[5],
+                nx=row[6],
+                ny=row[7],
+                closing=(row[8], row[9]),
+                moved=(row[10] != 0, row[11] != 0),
+            )
+            contacts[int(row[0])] += (contact,)
+        return contacts
+
+
+def _enlarged(work: Workspace) -> Workspace:
+    pairs = 4 * len(work.when)
+    return work._replace(pair=np.zeros((pairs, 2), dtype=np.int64), when=np.zeros(pairs))

@@ -1,0 +1,40 @@
+"""Disturbances of the ego's commands: delay and loss, seeded."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.kernels.random import uniform
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+LOSS_DRAW = 250
+
+
+class CommandLine:
+    """The way of a command from the controller to the car.
+
+    First a command may be lost, then what arrives is delayed. In place of a lost command the one that arrived
+    before it arrives again; before any has arrived the car stands.
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        disturbances = instance.disturbances
+        self._loss = disturbances.command_loss
+        self._seed = np.uint64(instance.seed)
+        self._trial = instance.trial
+        self._under_way = deque([(0.0, 0.0)] * disturbances.command_delay)
+        self._latest = (0.0, 0.0)
+        self.clear = self._loss == 0.0 and not self._under_way
+
+    def carry(self, tick: int, command: tuple[float, float]) -> tuple[float, float]:
+        """Return the command in force in this tick."""
+        if self._loss == 0.0 or uniform(self._seed, self._trial, EGO, tick, LOSS_DRAW) >= self._loss:
+            self._latest = command
+        self._under_way.append(self._latest)
+        return self._under_way.popleft()

@@ -1,0 +1,155 @@
+"""One trial, tick by tick. Knows no concrete simulator, agent, controller, metric or file format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Contact, Event, Observation
+from dubins_traffic.errors import ControllerError, DubinsTrafficError
+from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink
+from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.trial.buffer import FrameBuffer
+from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.trial.senses import Senses
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+
+class Trial:
+    """A trial that is stepped by its user: sense, decide, clip, move, label, push (`docs/semantics.md`).
+
+    Parameters
+    ----------
+    instance : Instance
+        What is run; with the commands it decides every byte of the frames.
+    simulator : Simulator
+        Moves the cars.
+    agents : sequence of Driver
+        Drive the e-agents.
+    sinks : sequence of Sink
+        Receive instance, frames, contacts, events and ending.
+
+    Examples
+    --------
+    >>> trial = Trial(instance, simulator=simulator, agents=agents)     # doctest: +SKIP
+    >>> while trial.ending is None:                                     # doctest: +SKIP
+    ...     trial.step((0.5, 0.0))
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        *,
+        simulator: Simulator,
+        agents: Sequence[Driver] = (),
+        sinks: Sequence[Sink] = (),
+    ) -> None:
+        self.instance = instance
+        self.ending: Ending | None = None
+        self._simulator = simulator
+        self._agents = tuple(agents)
+        self._state = simulator.reset([instance])
+        self._commands = np.zeros((1, len(instance.starts), 2))
+        self._ticks = instance.ticks
+        self._line = CommandLine(instance)
+        self._labeller = Labeller([instance])
+        self._labels = self._labeller.reset(self._state)
+        for agent in self._agents:
+            agent.reset([instance], self._state)
+        self._senses = Senses(instance)
+        self._buffer = FrameBuffer(instance, sinks)
+        self._buffer.push(self._state, self._labels, self._commands, (), ())
+        self._tick = 0
+        self._observation: Observation | None = None
+
+    @property
+    def tick(self) -> int:
+        """Number of the present frame."""
+        return self._tick
+
+    @property
+    def observation(self) -> Observation:
+        """What the ego knows in the present frame."""
+        if self._observation is None:
+            self._observation = self._senses.observe(self._tick, self._state, self._labels)
+        return self._observation
+
+    def step(self, command: tuple[float, float]) -> Observation:
+        """Hold `command` (speed m/s, yaw rate rad/s) for one tick and return the next observation.
+
+        Raises
+        ------
+        ControllerError
+            If the command is not two finite numbers; the trial has then ended as a controller fault.
+        DubinsTrafficError
+            If the trial has ended before.
+        """
+        self.advance(command)
+        return self.observation
+
+    def advance(self, command: tuple[float, float]) -> Sequence[Contact]:
+        """Do as `step` but don't observe; return the contacts of the tick."""
+        if self.ending is not None:
+            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): make a new one")
+        speed, yaw = self._checked(command)
+        if not self._line.clear:
+            speed, yaw = self._line.carry(self._tick, (speed, yaw))
+        commands = self._commands
+        for agent in self._agents:
+            agent.decide(self._tick, self._state, self._labels, commands)
+        commands[0, EGO, 0] = speed
+        commands[0, EGO, 1] = yaw
+        if not np.isfinite(commands).all():
+            return self._agent_fault()
+        contacts = self._simulator.step(commands)
+        self._tick += 1
+        self._observation = None
+        contacts = self._labeller.update(self._tick, self._state, contacts)[0]
+        self._buffer.push(self._state, self._labels, commands, contacts, ())
+        if self._tick >= self._ticks:
+            self.end(End.DURATION)
+        elif contacts and self.instance.end_on_collision:
+            self._end_on_collision(contacts)
+        return contacts
+
+    def end(self, end: End, detail: str = "") -> Ending:
+        """End the trial for the reason `end` unless it has ended; return its ending."""
+        if self.ending is None:
+            if end is not End.DURATION:
+                self._buffer.note(Event(self._tick, end.value, EGO, detail))
+            self.ending = Ending(end, self._tick, detail)
+            self._buffer.end(self.ending)
+        return self.ending
+
+    def _checked(self, command: object) -> tuple[float, float]:
+        try:
+            speed, yaw = command  # type: ignore[misc]  # what is no pair is refused just below
+            speed, yaw = float(speed), float(yaw)
+        except (TypeError, ValueError) as error:
+            detail = f"a command is two numbers (speed, yaw rate): got {command!r:.80}"
+            self.end(End.CONTROLLER_FAULT, detail)
+            raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
+        if not (math.isfinite(speed) and math.isfinite(yaw)):
+            detail = f"a command is two finite numbers: got ({speed}, {yaw}) at tick {self._tick}"
+            self.end(End.CONTROLLER_FAULT, detail)
+            raise ControllerError(End.CONTROLLER_FAULT.value, detail)
+        return speed, yaw
+
+    def _agent_fault(self) -> Sequence[Contact]:
+        n = int(np.argwhere(~np.isfinite(self._commands[0]).all(axis=1))[0, 0])
+        self.end(End.AGENT_FAULT, f"{self.instance.names[n]} asked for a command that is not finite")
+        return ()
+
+    def _end_on_collision(self, contacts: Sequence[Contact]) -> None:
+        for contact in contacts:
+            if EGO in (contact.car, contact.other):
+                names = self.instance.names
+                other = contact.other if contact.car == EGO else contact.car
+                name = names[other] if other >= 0 else f"obstacle {-1 - other}"
+                self.end(End.COLLISION, f"with {name} at {contact.time:.3f} s")
+                return
