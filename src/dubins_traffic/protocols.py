@@ -7,34 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
-from dubins_traffic.cars.state import Command, Contact, Frames, Labels, Observation, State
+from dubins_traffic.cars.state import Command, Contact, Labels, Observation, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.record.sink import End, Ending, Sink
 
-
-class End(StrEnum):
-    """Why a trial ended."""
-
-    DURATION = "duration"
-    COLLISION = "collision"
-    GAVE_UP = "gave_up"
-    CONTROLLER_FAULT = "controller_fault"
-    AGENT_FAULT = "agent_fault"
-    DEADLINE = "deadline"
-    INTERRUPTED = "interrupted"
-    RESET = "reset"
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """The named end of a trial, after `ticks` ticks, and a line of detail for people."""
-
-    end: End
-    ticks: int
-    detail: str = ""
+__all__ = ["Capabilities", "Closes", "Controller", "Driver", "End", "Ending", "Simulator", "Sink"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,20 +77,4 @@ class Closes(Protocol):
 
     def close(self) -> None:
         """Free what is held."""
-        ...
-
-
-class Sink(Protocol):
-    """Receives a trial, in order, in blocks of at most one simulated second."""
-
-    def begin(self, instance: Instance) -> None:
-        """A trial begins."""
-        ...
-
-    def frames(self, frames: Frames) -> None:
-        """The next block of frames, with their contacts and events."""
-        ...
-
-    def end(self, ending: Ending) -> None:
-        """The trial is over; nothing follows."""
         ...

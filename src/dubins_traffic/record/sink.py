@@ -1,0 +1,51 @@
+"""What a trial pushes its frames into, and how a trial ends: what a record and its writer must know.
+
+`dubins_traffic.protocols` offers these names beside the other seams; take them from there in the rooms above it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.problem.instance import Instance
+
+
+class End(StrEnum):
+    """Why a trial ended."""
+
+    DURATION = "duration"
+    COLLISION = "collision"
+    GAVE_UP = "gave_up"
+    CONTROLLER_FAULT = "controller_fault"
+    AGENT_FAULT = "agent_fault"
+    DEADLINE = "deadline"
+    INTERRUPTED = "interrupted"
+    RESET = "reset"
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """The named end of a trial, after `ticks` ticks, and a line of detail for people."""
+
+    end: End
+    ticks: int
+    detail: str = ""
+
+
+class Sink(Protocol):
+    """Receives a trial, in order, in blocks of at most one simulated second."""
+
+    def begin(self, instance: Instance) -> None:
+        """A trial begins."""
+        ...
+
+    def frames(self, frames: Frames) -> None:
+        """The next block of frames, with their contacts and events."""
+        ...
+
+    def end(self, ending: Ending) -> None:
+        """The trial is over; nothing follows."""
+        ...
