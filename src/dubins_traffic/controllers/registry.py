@@ -1,0 +1,139 @@
+"""Ego controllers by name: those that come with the package, and a user's own."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.protocols import Controller
+
+_BUILT_IN = {
+    "lanes": ("dubins_traffic.controllers.lanes", "Lanes"),
+    "simple": ("dubins_traffic.controllers.simple", "Simple"),
+}
+_DESCRIPTIONS = {
+    "lanes": "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
+    "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
+}
+_OPTION = "--controller"
+_EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
+
+
+def names() -> Mapping[str, str]:
+    """Return the built-in controllers: name to one line of description."""
+    return dict(_DESCRIPTIONS)
+
+
+def load(spec: str) -> Controller:
+    """Return a new controller.
+
+    Parameters
+    ----------
+    spec : str
+        A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
+        directory; a file may import its neighbours.
+
+    Raises
+    ------
+    InputError
+        If there is no such name, module, file or class, if the code raises while it is loaded or constructed, or
+        if the object lacks a method of `dubins_traffic.protocols.Controller`.
+    """
+    if spec in _BUILT_IN:
+        module, name = _BUILT_IN[spec]
+        return cast(Controller, getattr(importlib.import_module(module), name)())
+    place, colon, name = spec.rpartition(":")
+    if not (colon and place and name.isidentifier()):
+        raise _refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))
+    module = _load_file(place, spec) if place.endswith(".py") else _load_module(place, spec)
+    maker = getattr(module, name, None)
+    if maker is None:
+        raise _refuse(f"no class {name} in {place}", spec, _offer(module))
+    if not callable(maker):
+        raise _refuse(f"{name} in {place} is not a class", spec, "a class without arguments")
+    try:
+        made = maker()
+    except Exception as error:
+        raise _refuse(
+            f"{name} raised {_said(error)} on construction", spec, "a class without arguments"
+        ) from error
+    for method in ("start", "act"):
+        if not callable(getattr(made, method, None)):
+            raise _refuse(
+                f"{name} is not a controller: it lacks the method {method}",
+                spec,
+                "start(problem) and act(observation) -> (speed, yaw rate)",
+            )
+    return cast(Controller, made)
+
+
+def _load_file(place: str, spec: str) -> ModuleType:
+    path = Path(place).expanduser()
+    if not path.is_file():
+        raise _refuse(f"no such file: {place}", spec, "path/to/file.py:Class")
+    path = path.resolve()
+    label = f"_controller_{path.stem}_{zlib.crc32(str(path).encode()):x}"
+    found = importlib.util.spec_from_file_location(label, path)
+    if found is None or found.loader is None:
+        raise _refuse(f"not a Python file: {place}", spec, "path/to/file.py:Class")
+    module = importlib.util.module_from_spec(found)
+    sys.modules[label] = module
+    _look_in(str(path.parent))
+    try:
+        found.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[label]
+        raise _refuse(
+            f"{place} raised {_said(error)} while it was loaded", spec, "a file that loads"
+        ) from error
+    return module
+
+
+def _load_module(place: str, spec: str) -> ModuleType:
+    _look_in(str(Path.cwd()))
+    importlib.invalidate_caches()
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        if error.name is not None and (place == error.name or place.startswith(error.name + ".")):
+            raise _refuse(
+                f"no module {place}", spec, "module:Class that can be imported from here"
+            ) from error
+        raise _refuse(
+            f"{place} raised {_said(error)} while it was loaded", spec, "a module that loads"
+        ) from error
+    except Exception as error:
+        raise _refuse(
+            f"{place} raised {_said(error)} while it was loaded", spec, "a module that loads"
+        ) from error
+
+
+def _look_in(folder: str) -> None:
+    if folder not in sys.path:
+        sys.path.append(folder)
+
+
+def _offer(module: ModuleType) -> str:
+    members: dict[str, Any] = vars(module)
+    found = sorted(
+        name
+        for name, value in members.items()
+        if isinstance(value, type) and callable(getattr(value, "act", None))
+    )
+    return f"one of {', '.join(found)}" if found else "a class with the methods start and act"
+
+
+def _said(error: BaseException) -> str:
+    text = str(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _refuse(problem: str, spec: str, expected: str) -> InputError:
+    return InputError(problem, file=_OPTION, value=spec, expected=expected)
