@@ -1,0 +1,85 @@
+"""The header of a record: the only place where records know the instance document."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import PurePath
+from typing import Any, cast
+
+from dubins_traffic.errors import InputError, RecordError
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record import schema
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What stands before the first frame. `versions` holds the package's under its name, then the libraries'."""
+
+    instance: Instance
+    controller: str | None
+    versions: Mapping[str, str]
+
+
+def encode(instance: Instance, controller: str | None) -> bytes:
+    """Return the message on ``/trial``, the same bytes for the same instance, controller and versions.
+
+    Of a controller given by a file's path only the last part of the path is kept.
+    """
+    bounds = instance.problem.car.bounds
+    document = {
+        "format": schema.FORMAT,
+        "version": schema.VERSION,
+        "package": version("dubins-traffic"),
+        "libraries": {"mcap": version("mcap")},
+        "seed": instance.seed,
+        "trial": instance.trial,
+        "controller": None if controller is None else PurePath(controller).name,
+        "rate": instance.problem.rate,
+        "cars": list(instance.names),
+        "bounds": {
+            "speed": bounds.speed,
+            "speed_min": bounds.speed_low,
+            "yaw_rate": bounds.yaw_rate,
+            "turning_radius": bounds.turning_radius,
+        },
+        "instance": instance_to_document(instance),
+    }
+    return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def decode(data: bytes, file: str | None = None) -> Header:
+    """Return the header that `data` encodes.
+
+    Raises
+    ------
+    RecordError
+        If it is not the header of a record, or one of a version that this package does not know.
+    """
+    try:
+        document: Any = json.loads(data)
+    except ValueError as error:
+        raise RecordError("damaged header", file=file, expected="JSON") from error
+    if not isinstance(document, dict) or document.get("format") != schema.FORMAT:
+        raise RecordError("not a record of a trial", file=file, expected=f"an MCAP file with {schema.HEADER}")
+    fields = cast("dict[str, Any]", document)
+    if fields.get("version") != schema.VERSION:
+        raise RecordError(
+            "unknown version of the record",
+            file=file,
+            field="version",
+            value=fields.get("version"),
+            expected=str(schema.VERSION),
+        )
+    try:
+        instance = instance_from_document(fields["instance"])
+        versions = {"dubins-traffic": str(fields["package"]), **fields["libraries"]}
+        return Header(instance, fields["controller"], versions)
+    except KeyError as error:
+        raise RecordError("missing from the header", file=file, field=str(error.args[0])) from error
+    except InputError as error:
+        placed = error.within(field="instance")
+        raise RecordError(f"{placed.field}: {placed.problem}", file=file, expected=placed.expected) from error

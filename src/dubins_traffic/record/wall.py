@@ -1,0 +1,89 @@
+"""The sidecar of a record: what was measured on a wall clock, kept out of the record so that its bytes repeat."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, cast
+
+from dubins_traffic.errors import RecordError
+from dubins_traffic.record.atomic import replace_file
+
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """What a sidecar holds.
+
+    `time_to_begin_s` is the wall-clock time of the controller's `start`, None if it did not return; `act_s` sums
+    up the latencies of its `act` (count, mean, median, p99, max; empty without calls); `reproducible` is false for
+    a trial that a wall clock ended; `date` is UTC, ISO 8601; `machine` tells the system, processor, number of cores
+    and version of Python.
+    """
+
+    time_to_begin_s: float | None
+    act_s: Mapping[str, float]
+    reproducible: bool
+    date: str
+    machine: Mapping[str, Any]
+
+
+def measured(time_to_begin_s: float | None, act_s: Mapping[str, float], *, reproducible: bool = True) -> Wall:
+    """Return the sidecar of a trial that has just run on this machine."""
+    machine = {
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+    }
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    return Wall(time_to_begin_s, dict(act_s), reproducible, date, machine)
+
+
+def sidecar(record: Path | str) -> Path:
+    """Return the path of a record's sidecar: ``NAME.wall.json`` beside ``NAME.mcap``."""
+    path = Path(record)
+    name = path.stem if path.suffix == ".mcap" else path.name
+    return path.with_name(f"{name}.wall.json")
+
+
+def write(record: Path | str, wall: Wall) -> None:
+    """Write the sidecar of `record`, atomically."""
+    text = json.dumps({"version": VERSION, **asdict(wall)}, indent=2) + "\n"
+    replace_file(sidecar(record), lambda path: path.write_text(text, encoding="utf-8"))
+
+
+def read(record: Path | str) -> Wall | None:
+    """Return the sidecar of `record`, or None if there is none.
+
+    Raises
+    ------
+    RecordError
+        If a file of that name is there and is no sidecar.
+    """
+    path = sidecar(record)
+    try:
+        document: Any = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise RecordError(
+            "can't be read as a sidecar of a record", file=str(path), expected="JSON"
+        ) from error
+    if not isinstance(document, dict):
+        raise RecordError("not a sidecar of a record", file=str(path), expected="a JSON object")
+    fields = cast("dict[str, Any]", document)
+    if fields.pop("version", None) != VERSION:
+        raise RecordError(
+            "not a version of a sidecar", file=str(path), field="version", expected=str(VERSION)
+        )
+    try:
+        return Wall(**fields)
+    except TypeError as error:
+        raise RecordError(f"not a sidecar of a record: {error}", file=str(path)) from error
