@@ -17,7 +17,10 @@ CLOSING = 1e-12
 """Bodies close when the rate of their gap is below minus this, m/s."""
 NEVER = 1e300
 _STILL_STEP = 1e-5
-_NUMB = 1e-10
+_NUMB = 1e-7
+"""Two corners nearer than this have no direction free of rounding: the best face normal stands for it."""
+_FACE = 1.0 + 1e-6
+"""Beyond this ratio to the separation by faces, the nearest features are two corners."""
 _CAP = 4096
 
 
@@ -121,7 +124,7 @@ def separation(
             best, px, py, qx, qy = d2, ex, ey, fx, fy
     face, nx, ny = _face_axis(x0, y0, c0, s0, a0, b0, x1, y1, c1, s1, a1, b1)
     core = sqrt(best)
-    if core > _NUMB and face > 0.0:
+    if core > _NUMB and core > face * _FACE > 0.0:
         nx = (qx - px) / core
         ny = (qy - py) / core
     else:

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
-import llvmlite
+import llvmlite  # pyright: ignore[reportMissingTypeStubs]
 import numba
 import numpy as np
 from platformdirs import user_cache_path
@@ -64,6 +64,7 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
     The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is.
     """
-    numba.config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
-    compiler = cast(Any, numba.njit)(cache=True, error_model="numpy", nogil=True)
+    library = cast(Any, numba)
+    library.config.CACHE_DIR = str(cache_folder())
+    compiler = library.njit(cache=True, error_model="numpy", nogil=True)
     return cast(Callable[P, R], compiler(function))

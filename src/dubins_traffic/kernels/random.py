@@ -23,7 +23,7 @@ GRID = 2.0**-53
 
 
 @jit
-def block(seed: Any, trial: int, car: int, tick: int, draw: int) -> tuple[Any, Any, Any, Any]:
+def block(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> tuple[Any, Any, Any, Any]:
     """Return four random 32-bit words, as uint64; `seed` is a uint64."""
     return philox4x32(
         np.uint64(trial), np.uint64(car), np.uint64(tick), np.uint64(draw), seed & LOW, seed >> HALF
@@ -31,21 +31,21 @@ def block(seed: Any, trial: int, car: int, tick: int, draw: int) -> tuple[Any, A
 
 
 @jit
-def uniform(seed: Any, trial: int, car: int, tick: int, draw: int) -> float:
+def uniform(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> float:
     """Return a float in [0, 1), on a grid of 2**-53."""
     a, b, _, _ = block(seed, trial, car, tick, draw)
     return np.float64((a << UP) | (b >> DOWN)) * GRID
 
 
 @jit
-def below(seed: Any, trial: int, car: int, tick: int, draw: int, bound: int) -> int:
+def below(seed: Any, trial: Any, car: Any, tick: Any, draw: Any, bound: Any) -> Any:
     """Return an integer in [0, bound); bound <= 2**16, so that the bias is below 2**-16 per value."""
     a, _, _, _ = block(seed, trial, car, tick, draw)
     return np.int64((a * np.uint64(bound)) >> HALF)
 
 
 @jit
-def bell(seed: Any, trial: int, car: int, tick: int, draw: int) -> float:
+def bell(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> float:
     """Return a number of mean 0 and variance 1, close to normal and bounded by 6: the sum of twelve uniform
     32-bit fractions less 6 (Irwin-Hall). Uses the draws `draw`, `draw` + 1 and `draw` + 2.
     """

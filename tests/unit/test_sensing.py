@@ -1,0 +1,62 @@
+import math
+
+import numpy as np
+import pytest
+
+from dubins_traffic.cars.body import Car, DiscObstacle, PolygonObstacle
+from dubins_traffic.cars.sensing import SEEN_FIELDS, blur, neighbours, scan
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.kernels.trig import sincos
+
+
+def cars_at(*places):
+    state = State.zeros(1, len(places))
+    state.x[0] = [x for x, _ in places]
+    state.y[0] = [y for _, y in places]
+    return state
+
+
+def test_neighbours_are_those_within_the_radius_in_order_of_index() -> None:
+    state = cars_at((0, 0), (5.0, 0), (0, 5.0000001), (3, 4), (-1, 0))
+    seen = np.zeros((5, SEEN_FIELDS))
+    count = neighbours(state, Labels.zeros(1, 5), 0, 0, 5.0, seen)
+    assert seen[:count, 0].tolist() == [0, 1, 3, 4]
+    assert seen[2, 1:3].tolist() == [3, 4]
+    assert seen[0, 10] == -1
+
+
+def test_noise_has_the_asked_size_and_keeps_headings_unit() -> None:
+    rows = []
+    for tick in range(3000):
+        seen = np.zeros((2, SEEN_FIELDS))
+        seen[:, 0] = [0, 1]
+        seen[:, 3] = 1.0
+        blur(seen, 2, np.uint64(9), 4, tick, 0.05, 0.1)
+        rows.append(seen)
+    rows = np.array(rows)
+    assert rows[:, :, 1:3].std(axis=0) == pytest.approx(0.05, rel=0.05)
+    assert np.arctan2(rows[:, :, 4], rows[:, :, 3]).std(axis=0) == pytest.approx(0.1, rel=0.05)
+    assert np.hypot(rows[:, :, 3], rows[:, :, 4]) == pytest.approx(1.0, abs=1e-12)
+    assert abs(np.corrcoef(rows[:, 0, 1], rows[:, 1, 1])[0, 1]) < 0.06
+
+
+def test_a_scan_of_the_2016_layout() -> None:
+    state = cars_at((0, 0), (2, 0), (0, -1), (-3, 0))
+    obstacles = pack_obstacles(
+        [[DiscObstacle(0, 0.15, 0.1), PolygonObstacle(((3, 3), (4, 3), (4, 4), (3, 4)))]]
+    )
+    angles = np.linspace(-2, 2, 300)
+    rays = np.array([sincos(angle) for angle in angles])
+    ranges = np.zeros(300)
+    scan(state, 0, 0, pack_cars([Car()]), obstacles, rays, 0.08, 5.0, ranges)
+
+    def at(angle):
+        return ranges[int(np.abs(angles - angle).argmin())]
+
+    assert at(0.0) == pytest.approx(2 - 0.177, abs=1e-3)
+    assert at(-math.pi / 2) == pytest.approx(1 - 0.177, abs=1e-3)
+    assert at(math.pi / 2) == -math.inf  # 0.05 m away: nearer than the laser can tell
+    assert at(math.pi / 4) == pytest.approx(math.hypot(3, 3), abs=2e-2)
+    assert at(0.5) == math.inf
+    assert ranges[0] == math.inf  # the car behind is outside the sector
