@@ -1,0 +1,327 @@
+"""Road network descriptions (RND), version 0, in both containers: JSON and plain text.
+
+Both are read into the same mapping of fields, checked by `checked`, and written from it.
+
+Source: the documentation of the 2016 benchmark. A point (x, y) of the integer lattice maps to
+R(theta) (length x, length y) + (tx, ty), with `transform` = [tx, ty, theta].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any, NamedTuple, TypeGuard
+
+from dubins_traffic.errors import InputError
+
+Segment = tuple[int, int, int, int]
+
+LARGEST_POINT = 1_000_000
+LARGEST_GRID = 1_000_000
+LENGTHS = (1e-3, 1e6)
+WORLD = 1e6
+TURNS = 1e5
+FIELDS = ("version", "length", "transform", "shape", "segments")
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_PLAIN_KEY = re.compile(r"[A-Za-z_][\w.-]*", re.ASCII)
+
+
+class Description(NamedTuple):
+    """The checked fields of a description; `extra` holds the keys that version 0 does not know."""
+
+    segments: tuple[Segment, ...]
+    length: float
+    transform: tuple[float, float, float]
+    shape: tuple[int, int]
+    extra: dict[str, Any]
+
+
+def parse(text: str, file: str | None = None) -> dict[str, Any]:
+    """Return the fields of an RND text, JSON if it begins with a brace, else plain text.
+
+    Raises
+    ------
+    InputError
+        If the container is broken. The fields themselves are not looked at.
+    """
+    start = text.lstrip()
+    if not start:
+        raise InputError("empty", file=file, expected="a road network (RND, JSON or text)")
+    return parse_json(text, file) if start[0] in "{[" else _parse_lines(text, file)
+
+
+def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
+    """Return the JSON object in `text`; keys given twice, NaN and infinities are refused."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in found:
+                raise InputError("key given twice", file=file, field=key)
+            found[key] = value
+        return found
+
+    def constant(name: str) -> Any:
+        raise InputError("not a JSON number", file=file, value=name, expected="a finite number")
+
+    try:
+        value = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise InputError(f"not JSON ({error.msg}, {where})", file=file) from None
+    except RecursionError:
+        raise InputError("nested too deeply", file=file) from None
+    except ValueError as error:
+        raise InputError(f"not JSON ({error})", file=file) from None
+    if not isinstance(value, dict):
+        raise InputError("not a JSON object", file=file, value=value, expected="an object {...}")
+    return value
+
+
+def fields(document: Mapping[str, Any]) -> Description:
+    """Check the fields of a description.
+
+    Without `segments` the `shape` stands for the complete grid; without `shape` it is that of the segments.
+
+    Raises
+    ------
+    InputError
+        Naming the field and, for a segment, its place: ``segments[3]``.
+    """
+    if not isinstance(document, Mapping):
+        raise InputError("not a road network", value=document, expected="an object with segments or shape")
+    for name in ("version", "length"):
+        if name not in document:
+            raise InputError("missing", field=name, expected="0" if name == "version" else "a number > 0")
+    version = document["version"]
+    if not is_integer(version) or version != 0:
+        raise InputError("unknown version of RND", field="version", value=version, expected="0")
+    if "shape" not in document and "segments" not in document:
+        raise InputError("neither segments nor shape", field="segments", expected="at least one of them")
+    length = checked_length(document["length"])
+    transform = checked_transform(document.get("transform", (0, 0, 0)))
+    given = checked_shape(document["shape"]) if "shape" in document else None
+    if "segments" in document:
+        segments = checked_segments(document["segments"])
+    else:
+        segments = grid_segments(*given) if given else ()
+    shape = given if given is not None else extent(segments)
+    extra = {key: value for key, value in document.items() if key not in FIELDS}
+    return Description(segments, length, transform, shape, checked_extra(extra))
+
+
+def grid_segments(rows: int, columns: int) -> tuple[Segment, ...]:
+    """Return the segments of the complete grid in the order of 2016."""
+    segments: list[Segment] = []
+    for x in range(columns - 1):
+        for y in range(rows - 1):
+            segments += [(x, y, x + 1, y), (x, y, x, y + 1)]
+    segments += [(x, rows - 1, x + 1, rows - 1) for x in range(columns - 1)]
+    segments += [(columns - 1, y, columns - 1, y + 1) for y in range(rows - 1)]
+    return tuple(segments)
+
+
+def extent(segments: Sequence[Segment]) -> tuple[int, int]:
+    """Return the shape (rows, columns) of segments: (ymax - ymin + 1, xmax - xmin + 1)."""
+    if not segments:
+        raise InputError("no segments", field="segments", value=[], expected="at least one segment")
+    xs = [x for a, _, b, _ in segments for x in (a, b)]
+    ys = [y for _, a, _, b in segments for y in (a, b)]
+    return max(ys) - min(ys) + 1, max(xs) - min(xs) + 1
+
+
+def is_integer(value: object) -> TypeGuard[int]:
+    """Whether `value` is a whole number (2.0 is one, True is not)."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    return isinstance(value, Integral) or (math.isfinite(value) and float(value).is_integer())
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether `value` is a number that a float64 holds and not NaN."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def checked_length(value: object) -> float:
+    """Return the length of a lattice unit in metres."""
+    low, high = LENGTHS
+    if not is_finite(value) or not low <= float(value) <= high:
+        expected = f"a number of metres in [{low:g}, {high:g}]"
+        raise InputError("not a length", field="length", value=value, expected=expected)
+    return float(value)
+
+
+def checked_transform(value: object) -> tuple[float, float, float]:
+    """Return the rigid motion (tx, ty, theta)."""
+    row = _row(value)
+    if row is None or len(row) != 3:
+        raise InputError("not a transform", field="transform", value=value, expected="[x, y, theta]")
+    for k, (entry, bound) in enumerate(zip(row, (WORLD, WORLD, TURNS), strict=True)):
+        if not is_finite(entry) or abs(entry) > bound:
+            expected = f"a number in [{-bound:g}, {bound:g}]"
+            raise InputError("not a transform", field=f"transform[{k}]", value=entry, expected=expected)
+    return float(row[0]), float(row[1]), float(row[2])
+
+
+def checked_shape(value: object) -> tuple[int, int]:
+    """Return the shape (rows, columns)."""
+    row = _row(value)
+    if row is None or len(row) != 2:
+        raise InputError("not a shape", field="shape", value=value, expected="[rows, columns]")
+    for k, entry in enumerate(row):
+        if not is_integer(entry) or not 1 <= entry <= 2 * LARGEST_POINT + 1:
+            raise InputError("not a shape", field=f"shape[{k}]", value=entry, expected="an integer >= 1")
+    rows, columns = int(row[0]), int(row[1])
+    return rows, columns
+
+
+def checked_segments(value: object) -> tuple[Segment, ...]:
+    """Return the segments as integers [x0, y0, x1, y1]; how they lie to each other is not looked at."""
+    rows = _row(value)
+    if rows is None:
+        expected = "a list of segments [x0, y0, x1, y1]"
+        raise InputError("not a list", field="segments", value=value, expected=expected)
+    segments: list[Segment] = []
+    for s, entry in enumerate(rows):
+        row = _row(entry)
+        if row is None or len(row) != 4:
+            expected = "four integers [x0, y0, x1, y1]"
+            raise InputError("not a segment", field=f"segments[{s}]", value=entry, expected=expected)
+        for k, number in enumerate(row):
+            if not is_integer(number) or abs(number) > LARGEST_POINT:
+                expected = f"an integer in [-{LARGEST_POINT}, {LARGEST_POINT}]"
+                field = f"segments[{s}][{k}]"
+                raise InputError("not a lattice coordinate", field=field, value=number, expected=expected)
+        segments.append((int(row[0]), int(row[1]), int(row[2]), int(row[3])))
+    return tuple(segments)
+
+
+def checked_extra(extra: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the unknown keys, if JSON can hold them."""
+    for key, value in extra.items():
+        if not isinstance(key, str):
+            raise InputError("not a key", value=key, expected="a string")
+        try:
+            json.dumps(value, allow_nan=False)
+        except (TypeError, ValueError, RecursionError):
+            raise InputError("not a JSON value", field=key, value=value) from None
+    return dict(extra)
+
+
+def write_json(document: Mapping[str, Any]) -> str:
+    """Return the JSON text of a description, one line a key and eight segments a line."""
+    lines: list[str] = []
+    for key, value in document.items():
+        text = _json(value) if key != "segments" else _segment_lines(value)
+        lines.append(f"  {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def write_lines(document: Mapping[str, Any]) -> str:
+    """Return the plain text of a description, `segments` last."""
+    lines: list[str] = []
+    for key, value in document.items():
+        if key == "segments":
+            continue
+        if key in FIELDS:
+            row = value if isinstance(value, list) else [value]
+            lines.append(f"{key}: {' '.join(_json(number) for number in row)}")
+        else:
+            name = key if _PLAIN_KEY.fullmatch(key) else _escaped(key, "#:")
+            raw = isinstance(value, str) and _value(value) == value and value == " ".join(value.split())
+            plain = raw and value and "#" not in value and value.isascii()
+            lines.append(f"{name}: {value if plain else _escaped(value, '#')}")
+    lines.append("segments:")
+    lines += [" ".join(str(number) for number in segment) for segment in document["segments"]]
+    return "\n".join(lines) + "\n"
+
+
+def _parse_lines(text: str, file: str | None) -> dict[str, Any]:
+    document: dict[str, Any] = {}
+    segments: list[list[Any]] | None = None
+    for number, full in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
+        line = full.split("#", 1)[0].strip()
+        if not line:
+            continue
+        if segments is not None:
+            segments.append([_number(token) for token in line.split()])
+            continue
+        key, value = _entry(line, number, file)
+        if key in document:
+            raise InputError(f"key given twice (line {number})", file=file, field=key)
+        if key == "segments":
+            if value:
+                raise InputError(f"not a line break (line {number})", file=file, field=key, value=value)
+            document[key] = segments = []
+        elif key in FIELDS:
+            row = [_number(token) for token in value.split()]
+            document[key] = row[0] if key in {"version", "length"} and len(row) == 1 else row
+        else:
+            document[key] = _value(value)
+    return document
+
+
+def _entry(line: str, number: int, file: str | None) -> tuple[str, str]:
+    key, colon, value = line.partition(":")
+    key = key.strip()
+    if not colon or not key:
+        raise InputError(
+            f"not a line of RND text (line {number})", file=file, value=line, expected="key: values"
+        )
+    if key.startswith('"'):
+        decoded = _value(key)
+        key = decoded if isinstance(decoded, str) else key
+    return key, value.strip()
+
+
+def _number(token: str) -> Any:
+    if not _NUMBER.fullmatch(token) or len(token) > 400:
+        return token
+    return float(token) if any(mark in token for mark in ".eE") else int(token)
+
+
+def _value(text: str) -> Any:
+    """Return the value of an unknown key in plain text: JSON if it is that, else the text itself."""
+    try:
+        value = json.loads(text, parse_constant=str)
+        json.dumps(value, allow_nan=False)
+    except (ValueError, RecursionError):
+        return text
+    return value
+
+
+def _row(value: object) -> list[Any] | None:
+    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__"):
+        return None
+    return list(value)  # pyright: ignore[reportArgumentType]
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, allow_nan=False)
+
+
+def _escaped(value: Any, marks: str) -> str:
+    """Return JSON in which the `marks` stand in strings as escapes."""
+    text = _json(value)
+    if not any(mark in text for mark in marks):
+        return text
+    if isinstance(value, str):
+        for mark in marks:
+            text = text.replace(mark, f"\\u{ord(mark):04x}")
+        return text
+    return text.replace("#", "\\u0023")
+
+
+def _segment_lines(segments: Sequence[Sequence[int]]) -> str:
+    rows = [_json(list(segment)) for segment in segments]
+    lines = [", ".join(rows[k : k + 8]) for k in range(0, len(rows), 8)]
+    return "[\n    " + ",\n    ".join(lines) + "\n  ]"

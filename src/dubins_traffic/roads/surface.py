@@ -1,0 +1,212 @@
+"""Where points lie on a network, in NumPy: nearest segment and intersection, on the road or not, lane coordinates.
+
+The box around a network is cut into uniform cells; each keeps what may be nearest to a point in it, so that
+looking a point up costs the same on a network of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+
+CELLS_PER_SEGMENT = 4.0
+POINTS_AT_ONCE = 1 << 15
+
+Distance2 = Callable[[Floats, Floats, Ints], Floats]
+
+
+class Cells(NamedTuple):
+    """Uniform cells over a box: cell (cx, cy) has the number cy * nx + cx.
+
+    What may be nearest to a point of cell c stands, in ascending order, in ``seg_item`` (segments) and
+    ``vert_item`` (intersections) from ``start[c]`` up to ``start[c + 1]``.
+    """
+
+    x0: float
+    y0: float
+    scale: float
+    nx: int
+    ny: int
+    seg_start: Ints
+    seg_item: Ints
+    vert_start: Ints
+    vert_item: Ints
+
+
+class Surface:
+    """The segments and intersections of a network in the world.
+
+    Parameters
+    ----------
+    points : array (V, 2)
+        Intersections, metres.
+    ends : array (S, 2)
+        Numbers of the intersections at the ends of each segment.
+    tangents : array (S, 2)
+        Unit vectors along the segments.
+    lengths : array (S,)
+        Lengths of the segments, metres.
+    """
+
+    def __init__(self, points: Floats, ends: Ints, tangents: Floats, lengths: Floats) -> None:
+        self._points = points
+        self._a = points[ends[:, 0]]
+        self._b = points[ends[:, 1]]
+        self._tangents = tangents
+        self._lengths = lengths
+
+    def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
+        """Return the number of the nearest segment and the distance, for points (..., 2)."""
+        cells = self.cells
+        return self._nearest(points, self._segment_distance2, len(self._a), cells.seg_start, cells.seg_item)
+
+    def nearest_vertex(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
+        """Return the number of the nearest intersection and the distance, for points (..., 2)."""
+        cells = self.cells
+        count = len(self._points)
+        return self._nearest(points, self._vertex_distance2, count, cells.vert_start, cells.vert_item)
+
+    def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
+        """Whether points (..., 2) lie within `half_width` of a segment, its ends capped by discs."""
+        points = np.asarray(points, dtype=np.float64)
+        s, _ = self.nearest_segment(points)
+        return self._segment_distance2(points[..., 0], points[..., 1], s) <= half_width * half_width
+
+    def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
+        """Return (s, l): metres along a lane from its start, metres left of the segment's centre line."""
+        points = np.asarray(points, dtype=np.float64)
+        s = lane >> 1
+        rx, ry = points[..., 0] - self._a[s, 0], points[..., 1] - self._a[s, 1]
+        tx, ty = self._tangents[s, 0], self._tangents[s, 1]
+        along, left = rx * tx + ry * ty, tx * ry - ty * rx
+        return (self._lengths[s] - along, -left) if lane & 1 else (along, left)
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The cells, made when first asked for."""
+        low, high = self._points.min(axis=0), self._points.max(axis=0)
+        margin = 0.5 * float(self._lengths.mean())
+        x0, y0 = (low - margin).tolist()
+        width, height = (high - low + 2.0 * margin).tolist()
+        size = sqrt(width * height / (CELLS_PER_SEGMENT * len(self._lengths)))
+        nx, ny = ceil(width / size), ceil(height / size)
+        slack = 1e-9 * (size + abs(x0) + abs(y0) + width + height)
+        box = (x0, y0, size, nx, ny, slack)
+        seg = _sieve(box, self._segment_distance2, len(self._lengths))
+        vert = _sieve(box, self._vertex_distance2, len(self._points))
+        return Cells(x0, y0, 1.0 / size, nx, ny, *seg, *vert)
+
+    def _segment_distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
+        rx, ry = x - self._a[s, 0], y - self._a[s, 1]
+        qx, qy = x - self._b[s, 0], y - self._b[s, 1]
+        tx, ty = self._tangents[s, 0], self._tangents[s, 1]
+        along, across = rx * tx + ry * ty, tx * ry - ty * rx
+        beyond = np.where(along >= self._lengths[s], qx * qx + qy * qy, across * across)
+        return np.where(along <= 0.0, rx * rx + ry * ry, beyond)
+
+    def _vertex_distance2(self, x: Floats, y: Floats, v: Ints) -> Floats:
+        rx, ry = x - self._points[v, 0], y - self._points[v, 1]
+        return rx * rx + ry * ry
+
+    def _nearest(
+        self, points: npt.ArrayLike, distance2: Distance2, count: int, start: Ints, item: Ints
+    ) -> tuple[Ints, Floats]:
+        points = np.asarray(points, dtype=np.float64)
+        flat = points.reshape(-1, 2)
+        index = np.empty(len(flat), dtype=np.int64)
+        square = np.empty(len(flat), dtype=np.float64)
+        everything = np.arange(count)
+        for begin in range(0, len(flat), POINTS_AT_ONCE):
+            block = slice(begin, begin + POINTS_AT_ONCE)
+            x, y = flat[block, 0], flat[block, 1]
+            cell = self._cell(x, y)
+            inside = cell >= 0
+            near = _first_least(x[inside], y[inside], cell[inside], distance2, start, item)
+            index[block][inside], square[block][inside] = near
+            for k in np.flatnonzero(~inside) + begin:
+                away = distance2(flat[k, 0], flat[k, 1], everything)
+                index[k] = np.argmin(away)
+                square[k] = away[index[k]]
+        return index.reshape(points.shape[:-1]), np.sqrt(square).reshape(points.shape[:-1])
+
+    def _cell(self, x: Floats, y: Floats) -> Ints:
+        """Return the numbers of the cells of points, -1 outside the box."""
+        cells = self.cells
+        u, v = (x - cells.x0) * cells.scale, (y - cells.y0) * cells.scale
+        inside = (u >= 0.0) & (u < cells.nx) & (v >= 0.0) & (v < cells.ny)
+        cx = np.where(inside, u, 0.0).astype(np.int64)
+        cy = np.where(inside, v, 0.0).astype(np.int64)
+        return np.where(inside, cy * cells.nx + cx, -1)
+
+
+def _first_least(
+    x: Floats, y: Floats, cell: Ints, distance2: Distance2, start: Ints, item: Ints
+) -> tuple[Ints, Floats]:
+    """Return, for each point, the first of its cell's items that has the least squared distance, and that."""
+    if not len(x):
+        return np.empty(0, dtype=np.int64), np.empty(0)
+    count = start[cell + 1] - start[cell]
+    begin = np.cumsum(count) - count
+    group = np.repeat(np.arange(len(x)), count)
+    candidate = item[start[cell][group] + np.arange(len(group)) - begin[group]]
+    square = distance2(x[group], y[group], candidate)
+    least = np.minimum.reduceat(square, begin)
+    equal = np.flatnonzero(square == least[group])
+    _, first = np.unique(group[equal], return_index=True)
+    return candidate[equal[first]], least
+
+
+def _sieve(
+    box: tuple[float, float, float, int, int, float], distance2: Distance2, count: int
+) -> tuple[Ints, Ints]:
+    """Return (start, item): the items that may be nearest somewhere in each cell.
+
+    One cell that covers the box is halved again and again. Of half diagonal h and with least distance d from its
+    centre, it keeps the items at most d + 2h from the centre: no other is nearest to any of its points.
+    """
+    x0, y0, size, nx, ny, slack = box
+    depth = (max(nx, ny) - 1).bit_length()
+    cx = cy = np.zeros(1, dtype=np.int64)
+    item = np.arange(count)
+    start = np.array([0, count])
+    for level in range(depth, -1, -1):
+        side = size * (1 << level)
+        group = np.repeat(np.arange(len(cx)), np.diff(start))
+        middle_x, middle_y = x0 + (cx + 0.5) * side, y0 + (cy + 0.5) * side
+        distance = np.sqrt(distance2(middle_x[group], middle_y[group], item))
+        least = np.minimum.reduceat(distance, start[:-1])
+        keep = distance <= least[group] + (sqrt(2.0) * side + slack)
+        item, group = item[keep], group[keep]
+        start = np.searchsorted(group, np.arange(len(cx) + 1))
+        if level:
+            last = ((nx - 1) >> (level - 1), (ny - 1) >> (level - 1))
+            cx, cy, start, item = _halve(cx, cy, start, item, last)
+    number = cy * nx + cx
+    order = np.argsort(number)
+    return _gather(start, item, order)
+
+
+def _halve(
+    cx: Ints, cy: Ints, start: Ints, item: Ints, last: tuple[int, int]
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """Return the quarters of cells, with their items, that begin at most at the cell `last`."""
+    parent = np.repeat(np.arange(len(cx)), 4)
+    quarter = np.tile(np.arange(4), len(cx))
+    x, y = 2 * cx[parent] + (quarter & 1), 2 * cy[parent] + (quarter >> 1)
+    keep = (x <= last[0]) & (y <= last[1])
+    return x[keep], y[keep], *_gather(start, item, parent[keep])
+
+
+def _gather(start: Ints, item: Ints, order: Ints) -> tuple[Ints, Ints]:
+    """Return the groups of `item` that `start` delimits, in another order."""
+    count = np.diff(start)[order]
+    new = np.concatenate([[0], np.cumsum(count)])
+    place = np.repeat(start[:-1][order] - new[:-1], count) + np.arange(new[-1])
+    return new, item[place]
