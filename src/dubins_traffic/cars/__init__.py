@@ -1,1 +1,1 @@
-"""."""
+"""Cars: bodies, bounds, motion, contact, sensing."""

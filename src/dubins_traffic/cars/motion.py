@@ -207,7 +207,7 @@ def resolve(
         for k in range(pairs):
             m = work.pair[k, 0]
             o = work.pair[k, 1]
-            if m == i or o == i or (j >= 0 and (m == j or o == j)):
+            if i in (m, o) or (j >= 0 and j in (m, o)):
                 fixed = until[m] <= now and (o < 0 or until[o] <= now)
                 work.when[k] = NEVER
                 if not fixed:

@@ -94,8 +94,8 @@ def _cell_pairs(state: State, b: int, distance: float, pair: Ints, head: Ints, l
     found = 0
     limit = distance * distance
     for j in range(n):
-        kx = int(floor(state.x[b, j] * scale))
-        ky = int(floor(state.y[b, j] * scale))
+        kx = floor(float(state.x[b, j] * scale))
+        ky = floor(float(state.y[b, j] * scale))
         for mx in range(kx - 1, kx + 2):
             for my in range(ky - 1, ky + 2):
                 i = head[_bucket(mx, my, size)]

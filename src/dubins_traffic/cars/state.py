@@ -66,7 +66,7 @@ class SensedCar(NamedTuple):
     """Another car as a driver sees it."""
 
     name: str
-    index: int
+    index: int  # pyright: ignore[reportIncompatibleMethodOverride]  # no tuple is searched here
     pose: Pose
     twist: Twist
     body: Body
@@ -101,7 +101,7 @@ class State(NamedTuple):
     s: Floats
     speed: Floats
     yaw_rate: Floats
-    count: Ints
+    count: Ints  # pyright: ignore[reportIncompatibleMethodOverride]  # as above
 
     @staticmethod
     def zeros(trials: int, cars: int) -> State:

@@ -65,10 +65,8 @@ def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
 
 def _car_row(car: Car) -> tuple[float, ...]:
     body, bounds = car.body, car.bounds
-    if isinstance(body, Disc):
-        box = (0.0, 0.0, body.radius)
-    else:
-        box = (0.5 * body.length, 0.5 * body.width, 0.0)
+    disc = isinstance(body, Disc)
+    box = (0.0, 0.0, body.radius) if disc else (0.5 * body.length, 0.5 * body.width, 0.0)
     return (
         body.reach,
         *box,

@@ -1,1 +1,1 @@
-"""."""
+"""One trial: its phases, its clock, its tick."""

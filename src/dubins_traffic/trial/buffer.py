@@ -82,10 +82,10 @@ class FrameBuffer:
             contacts=tuple(self._contacts),
             events=tuple(self._events),
         )
-        for sink in self._sinks:
-            sink.frames(block)
         self._first += filled
         self._renew()
+        for sink in self._sinks:
+            sink.frames(block)
 
     def end(self, ending: Ending) -> None:
         """Hand over the rest and say how the trial ended."""

@@ -6,7 +6,6 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from time import perf_counter
 from types import FrameType
 
@@ -14,20 +13,8 @@ import numpy as np
 
 from dubins_traffic.errors import ControllerError
 from dubins_traffic.protocols import Closes, Controller, End, Ending
+from dubins_traffic.record.wall import Wall, measured
 from dubins_traffic.trial.trial import Trial
-
-
-@dataclass(frozen=True, slots=True)
-class Wall:
-    """What was measured on the wall clock; never part of the record proper.
-
-    `time_to_begin_s` is how long `start` took; `act_s` holds the latencies of `act`: count, mean, median, 99th
-    percentile and maximum, seconds. `reproducible` is false for a trial ended by its deadline.
-    """
-
-    time_to_begin_s: float | None
-    act_s: dict[str, float]
-    reproducible: bool
 
 
 class _TooLateError(Exception):
@@ -58,7 +45,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
         trial.end(End.CONTROLLER_FAULT, f"{type(error).__name__}: {error} at tick {trial.tick}")
     ending = trial.end(End.DURATION)
     ending = _close(controller, ending)
-    return ending, Wall(begin, _summary(latencies), ending.end is not End.DEADLINE)
+    return ending, measured(begin, _summary(latencies), reproducible=ending.end is not End.DEADLINE)
 
 
 def _drive(trial: Trial, controller: Controller, deadline: float | None, latencies: list[float]) -> None:

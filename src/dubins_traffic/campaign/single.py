@@ -1,0 +1,122 @@
+"""A trial put together: the instance's simulator, the built-in e-agents, a record, a score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dubins_traffic.agents.fleet import Fleet
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.protocols import Controller, Ending, Simulator, Sink
+from dubins_traffic.record import wall
+from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.scoring.score import Score, Scorer
+from dubins_traffic.simulators import registry as simulators
+from dubins_traffic.trial.run import run
+from dubins_traffic.trial.trial import Trial as BareTrial
+
+
+class Trial(BareTrial):
+    """A trial of one instance, stepped by its user.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is run.
+    sinks : sequence of Sink
+        Receive instance, frames and ending; a `RecordWriter`, a `Scorer`, or one's own.
+    record : Path or str, optional
+        Where to write a record.
+    simulator : Simulator, optional
+        Instead of the one that the instance names.
+
+    Examples
+    --------
+    >>> import dubins_traffic as dt
+    >>> trial = dt.Trial(dt.draw(dt.load_config("demo"), seed=1, trial=0))
+    >>> while trial.ending is None:
+    ...     observation = trial.step((0.5, 0.0))
+    >>> str(trial.ending.end), trial.ending.ticks
+    ('duration', 1800)
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        *,
+        sinks: Sequence[Sink] = (),
+        record: Path | str | None = None,
+        simulator: Simulator | None = None,
+    ) -> None:
+        writer = () if record is None else (RecordWriter(record),)
+        super().__init__(
+            instance,
+            simulator=simulator or simulators.load(instance.simulator),
+            agents=[Fleet()] if instance.e_agents else [],
+            sinks=(*writer, *sinks),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came of a trial: its ending, score, wall-clock figures, and where its record is."""
+
+    instance: Instance
+    controller: str
+    ending: Ending
+    score: Score
+    wall: wall.Wall
+    record: Path | None
+
+
+def run_trial(
+    instance: Instance,
+    controller: str | Controller = "lanes",
+    *,
+    record: Path | str | None = None,
+    overwrite: bool = False,
+    deadline: float | None = None,
+    sinks: Sequence[Sink] = (),
+) -> Result:
+    """Run one controller on one instance, and score it.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is run.
+    controller : str or Controller
+        A built-in name, ``module:Class``, ``path/to/file.py:Class``, or a controller.
+    record : Path or str, optional
+        Where to write the record (`*.mcap`); its wall-clock sidecar is written beside it.
+    overwrite : bool
+        Whether an existing record may be replaced.
+    deadline : float, optional
+        Seconds within which each `act` must answer; by default it may take its time.
+    sinks : sequence of Sink
+        Further sinks.
+
+    Raises
+    ------
+    InputError
+        If the controller can't be loaded or the record can't be written.
+    """
+    name = controller if isinstance(controller, str) else type(controller).__name__
+    driver = controllers.load(controller) if isinstance(controller, str) else controller
+    scorer = Scorer()
+    writer = None
+    if record is not None:
+        writer = RecordWriter(record, controller=name, overwrite=overwrite)
+    first = () if writer is None else (writer,)
+    try:
+        trial = Trial(instance, sinks=(*first, scorer, *sinks))
+        ending, measured = run(trial, driver, deadline)
+    finally:
+        if writer is not None:
+            writer.close()
+    path = None if record is None else Path(record)
+    if path is not None:
+        wall.write(path, measured)
+    score = scorer.result(controller=name, record=path, wall=measured)
+    return Result(instance, name, ending, score, measured, path)
