@@ -1,0 +1,75 @@
+"""Instants of a trial worth pointing at: contacts, events, visits of goals, and whatever a caller adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
+from dubins_traffic.problem.instance import Instance
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A mark on the timeline of a replay.
+
+    `kind` sets its colour: ``contact``, ``goal``, ``event``, ``breach``; others look like an event. `time` is in
+    seconds; a mark that lasts began at `since`. `car` is the index of the car it is about (-1: none), `point` where
+    it happened, world frame, metres.
+    """
+
+    time: float
+    kind: str
+    text: str
+    car: int = NONE
+    point: tuple[float, float] | None = None
+    since: float | None = None
+
+
+def contact_mark(instance: Instance, contact: Contact) -> Mark:
+    """Return the mark of a contact, which names both and who is at fault."""
+    names = instance.names
+    other = names[contact.other] if contact.other >= 0 else f"obstacle {-1 - contact.other}"
+    guilty = [
+        name for name, fault in zip((names[contact.car], other), contact.at_fault, strict=True) if fault
+    ]
+    text = f"{names[contact.car]} touches {other}"
+    if guilty:
+        text += f" ({' and '.join(guilty)} at fault)"
+    return Mark(contact.time, "contact", text, contact.car, (contact.x, contact.y))
+
+
+def event_mark(instance: Instance, rate: float, event: Event) -> Mark:
+    """Return the mark of an event."""
+    words = [event.kind.replace("_", " ")]
+    if event.car >= 0:
+        words.append(instance.names[event.car])
+    text = ": ".join(words)
+    return Mark(event.tick / rate, "event", f"{text} ({event.detail})" if event.detail else text, event.car)
+
+
+def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:
+    """Return the ego's visits of goals as (frame of the block, number of the goal's intersection), in order.
+
+    A visit is an entry of the centre into the goal's disc; being in it in the first frame counts.
+    """
+    at = frames.at[:, EGO]
+    entry = np.concatenate([[True], at[1:] != at[:-1]])[: len(at)] & np.isin(
+        at, instance.problem.goal_vertices
+    )
+    return [(int(frame), int(at[frame])) for frame in np.flatnonzero(entry)]
+
+
+def marks_of(instance: Instance, frames: Frames, more: Sequence[Mark] = ()) -> list[Mark]:
+    """Return all marks of a trial in order of time: contacts, events, visits of goals and `more`."""
+    marks = [contact_mark(instance, contact) for contact in frames.contacts]
+    marks += [event_mark(instance, frames.rate, event) for event in frames.events]
+    points, lattice = instance.problem.network.points, instance.problem.network.intersections
+    for frame, vertex in goal_visits(instance, frames):
+        x, y = lattice[vertex]
+        place = (float(points[vertex, 0]), float(points[vertex, 1]))
+        marks.append(Mark((frames.first + frame) / frames.rate, "goal", f"ego visits ({x}, {y})", EGO, place))
+    marks += more
+    return sorted(marks, key=lambda mark: mark.time)

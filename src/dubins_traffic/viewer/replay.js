@@ -1,0 +1,259 @@
+// The page: clock, controls, keys, pointers. Tests and scripts speak to window.replay.
+
+const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
+const SWITCHES = { f: "follow", t: "trails", l: "labels", n: "lanes", r: "sensing" };
+const PANEL_PERIOD = 100;
+const KEY_PAN = 60;
+
+const trial = new Trial(JSON.parse(find("data").textContent));
+const state = { time: trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
+const map = new MapView(find("map"), trial);
+const timeline = new Timeline(find("timeline"), trial);
+const panel = new Panel(trial, { choose, seek });
+const slider = find("slider");
+const show = {};
+let asked = false;
+
+Object.assign(slider, { min: trial.start, max: trial.end, step: 1 / trial.rate, value: trial.start });
+
+function draw() {
+  map.draw(state.time, state.chosen, show);
+}
+
+function refresh(force = true) {
+  slider.value = state.time;
+  const words = `${decimals(state.time, 2)} s of ${decimals(trial.end, 2)} s`;
+  slider.setAttribute("aria-valuetext", words);
+  find("clock").textContent = `${decimals(state.time, 2)} / ${decimals(trial.end, 2)} s`;
+  const now = performance.now();
+  if (force || now - state.panelAt >= PANEL_PERIOD) {
+    panel.update(state.time, state.chosen);
+    state.panelAt = now;
+  }
+  draw();
+}
+
+function tick(now) {
+  asked = false;
+  if (!state.playing) return;
+  const passed = state.last === null ? 0 : (now - state.last) / 1000;
+  state.last = now;
+  state.time = Math.min(trial.end, state.time + Math.min(passed, 0.25) * state.speed);
+  if (state.time >= trial.end) pause();
+  else ask();
+  refresh(!state.playing);
+}
+
+function ask() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(tick);
+}
+
+function reflect() {
+  document.body.classList.toggle("playing", state.playing);
+  find("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
+}
+
+function play() {
+  if (state.playing || trial.frames < 2) return;
+  if (state.time >= trial.end) state.time = trial.start;
+  state.playing = true;
+  state.last = null;
+  reflect();
+  ask();
+}
+
+function pause() {
+  state.playing = false;
+  reflect();
+  refresh();
+}
+
+function toggle() {
+  if (state.playing) pause();
+  else play();
+}
+
+function seek(time) {
+  state.time = Math.min(Math.max(Number(time), trial.start), trial.end);
+  refresh();
+}
+
+function step(frames) {
+  if (state.playing) pause();
+  const [frame, part] = trial.place(state.time);
+  seek(trial.time(frames < 0 && part > 1e-3 ? frame + 1 + frames : frame + frames));
+}
+
+function choose(car) {
+  state.chosen = car;
+  refresh();
+}
+
+function setSpeed(speed) {
+  state.speed = speed;
+  find("speed").value = String(speed);
+}
+
+function fit() {
+  state.fitted = true;
+  const [stage, toggles, buttons] = ["stage", "toggles", "zoom"].map((id) => find(id).getBoundingClientRect());
+  const narrow = stage.width < 600;
+  map.fit({
+    above: narrow ? buttons.bottom - stage.top : 0,
+    right: narrow ? 0 : stage.right - buttons.left,
+    below: stage.bottom - toggles.top,
+  });
+  draw();
+}
+
+function zoom(factor, px, py) {
+  state.fitted = false;
+  map.camera.zoom(factor, px, py);
+  draw();
+}
+
+function pan(dx, dy) {
+  state.fitted = false;
+  find("follow").checked = show.follow = false;
+  map.camera.pan(dx, dy);
+  draw();
+}
+
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  map.recolour();
+  timeline.draw();
+  draw();
+}
+
+function listenToControls() {
+  find("play").addEventListener("click", toggle);
+  find("back").addEventListener("click", () => step(-1));
+  find("forward").addEventListener("click", () => step(1));
+  slider.addEventListener("input", () => seek(slider.value));
+  find("zoom-in").addEventListener("click", () => zoom(1.4));
+  find("zoom-out").addEventListener("click", () => zoom(1 / 1.4));
+  find("fit").addEventListener("click", fit);
+  for (const speed of SPEEDS) find("speed").append(new Option(`${speed}×`, String(speed)));
+  setSpeed(1);
+  find("speed").addEventListener("change", () => setSpeed(Number(find("speed").value)));
+  for (const name of Object.values(SWITCHES)) {
+    show[name] = find(name).checked;
+    find(name).addEventListener("change", () => {
+      show[name] = find(name).checked;
+      draw();
+    });
+  }
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  dark.addEventListener("change", () => setTheme(dark.matches ? "dark" : "light"));
+  find("theme").addEventListener("click", () => setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+  document.documentElement.dataset.theme = dark.matches ? "dark" : "light";
+  const strip = find("timeline");
+  strip.addEventListener("click", ({ offsetX }) => seek(timeline.markAt(offsetX)?.time ?? timeline.time(offsetX)));
+  strip.addEventListener("pointermove", ({ offsetX }) => {
+    strip.title = timeline.markAt(offsetX)?.text ?? "";
+  });
+}
+
+function listenToPointers() {
+  const canvas = find("map");
+  const held = new Map();
+  let travelled = 0;
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, [event.offsetX, event.offsetY]);
+    travelled = 0;
+    canvas.classList.add("dragging");
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = held.get(event.pointerId);
+    if (!before) return;
+    const [dx, dy] = [event.offsetX - before[0], event.offsetY - before[1]];
+    travelled += Math.hypot(dx, dy);
+    held.set(event.pointerId, [event.offsetX, event.offsetY]);
+    if (travelled < 4) return;
+    pan(dx / held.size, dy / held.size);
+    const other = [...held].find(([id]) => id !== event.pointerId)?.[1];
+    if (!other) return;
+    const span = Math.hypot(before[0] - other[0], before[1] - other[1]);
+    const now = Math.hypot(event.offsetX - other[0], event.offsetY - other[1]);
+    if (span > 10) zoom(now / span, (event.offsetX + other[0]) / 2, (event.offsetY + other[1]) / 2);
+  });
+  const release = (event) => {
+    if (held.delete(event.pointerId) && event.type === "pointerup" && travelled < 4) {
+      const car = map.carAt(event.offsetX, event.offsetY, state.time);
+      if (car >= 0) choose(car);
+    }
+    if (held.size === 0) canvas.classList.remove("dragging");
+  };
+  canvas.addEventListener("pointerup", release);
+  canvas.addEventListener("pointercancel", release);
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), event.offsetX, event.offsetY);
+  }, { passive: false });
+}
+
+const ACTIONS = {
+  ArrowLeft: (event) => (event.shiftKey ? seek(state.time - 1) : step(-1)),
+  ArrowRight: (event) => (event.shiftKey ? seek(state.time + 1) : step(1)),
+  Home: () => seek(trial.start),
+  End: () => seek(trial.end),
+  "<": () => setSpeed(SPEEDS[Math.max(0, SPEEDS.indexOf(state.speed) - 1)]),
+  ">": () => setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, SPEEDS.indexOf(state.speed) + 1)]),
+  "+": () => zoom(1.25),
+  "=": () => zoom(1.25),
+  "-": () => zoom(0.8),
+  0: fit,
+};
+const PANS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+function listenToKeys() {
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const { target, key } = event;
+    const native = target.closest("button, select, summary, input[type=checkbox]");
+    if (key === " ") {
+      if (native) return;
+      toggle();
+    } else if (target.id === "map" && key in PANS && !event.shiftKey) {
+      pan(...PANS[key].map((part) => part * KEY_PAN));
+    } else if (key in SWITCHES) {
+      find(SWITCHES[key]).click();
+    } else if (key in ACTIONS && target.tagName !== "SELECT") {
+      ACTIONS[key](event);
+    } else {
+      return;
+    }
+    event.preventDefault();
+  });
+}
+
+function layOut() {
+  map.resize();
+  timeline.draw();
+  if (state.fitted) fit();
+  else draw();
+}
+
+listenToControls();
+listenToPointers();
+listenToKeys();
+map.recolour();
+new ResizeObserver(layOut).observe(find("stage"));
+window.addEventListener("resize", layOut);
+layOut();
+refresh();
+
+window.replay = {
+  get ready() { return true; },
+  get time() { return state.time; },
+  get playing() { return state.playing; },
+  get start() { return trial.start; },
+  get end() { return trial.end; },
+  get frame() { return trial.place(state.time)[0]; },
+  pose: (car) => trial.pose(car, state.time),
+  seek, play, pause,
+};

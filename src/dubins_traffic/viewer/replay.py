@@ -1,0 +1,247 @@
+"""A recorded trial as one self-contained page that plays it: no server, no network, opens from a file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.body import Body, Disc, DiscObstacle, Obstacle
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.record.atomic import replace_file
+from dubins_traffic.record.sink import Ending
+from dubins_traffic.spec.propositions import NAMES
+from dubins_traffic.viewer import palette
+from dubins_traffic.viewer.marks import Mark, goal_visits, marks_of
+from dubins_traffic.viewer.scene import centre_lines, lane_hints
+
+SCRIPTS = ("replay_data.js", "replay_map.js", "replay_timeline.js", "replay_panel.js", "replay.js")
+HEADING_STEPS = 32767
+UNITS = ("s", "m")
+
+
+def write_replay(
+    path: str | os.PathLike[str],
+    instance: Instance,
+    frames: Frames,
+    ending: Ending | None,
+    summary: Mapping[str, object] | None = None,
+    marks: Sequence[Mark] = (),
+) -> None:
+    """Write the page that replays a trial.
+
+    Parameters
+    ----------
+    path : path
+        The page to write; it appears only when complete.
+    instance : Instance
+        The instance that was tried.
+    frames : Frames
+        All frames of the trial in one block, at least one.
+    ending : Ending or None
+        How the trial ended; None if its record was cut off.
+    summary : mapping, optional
+        The score, name to value, shown beside the map in this order.
+    marks : sequence of Mark
+        What else to show on the timeline; contacts, events and visits of goals are there already.
+
+    Raises
+    ------
+    InputError
+        If there is no frame, or the page can't be written.
+    """
+    text = replay_page(instance, frames, ending, summary, marks)
+    replace_file(Path(path), lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
+
+
+def replay_page(
+    instance: Instance,
+    frames: Frames,
+    ending: Ending | None,
+    summary: Mapping[str, object] | None = None,
+    marks: Sequence[Mark] = (),
+) -> str:
+    """Return the page that `write_replay` writes; equal arguments give equal text."""
+    if len(frames) == 0:
+        raise InputError("nothing to replay", field="frames", value=0, expected="at least one frame")
+    title = f"Trial {instance.trial} of seed {instance.seed}"
+    style = _part("replay.css")
+    script = "\n".join(["(() => {", '"use strict";', *(_part(name) for name in SCRIPTS), "})();"])
+    document = _document(title, instance, frames, ending, summary or {}, marks_of(instance, frames, marks))
+    fields = {
+        "TITLE": html.escape(title),
+        "STYLE": style,
+        "STYLE_HASH": _hash(style),
+        "SCRIPT": script,
+        "SCRIPT_HASH": _hash(script),
+        "DATA": _json(document),
+    }
+    pieces = _part("replay.html").split("@@")
+    return "".join(fields[piece] if index % 2 else piece for index, piece in enumerate(pieces))
+
+
+def _part(name: str) -> str:
+    return (resources.files("dubins_traffic.viewer") / name).read_text(encoding="utf-8").strip()
+
+
+def _hash(text: str) -> str:
+    """Return the source expression of `text` for a Content-Security-Policy."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _json(document: Any) -> str:
+    """Return JSON in ASCII that can't end the element it stands in, whatever the names are."""
+    text = json.dumps(document, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _document(
+    title: str,
+    instance: Instance,
+    frames: Frames,
+    ending: Ending | None,
+    summary: Mapping[str, object],
+    marks: Sequence[Mark],
+) -> dict[str, Any]:
+    problem = instance.problem
+    points = problem.network.points
+    origin: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return {
+        "title": title,
+        "rate": frames.rate,
+        "first": frames.first,
+        "frames": len(frames),
+        "origin": [float(origin[0]), float(origin[1])],
+        "cars": [
+            {"name": name, "kind": kind, "colour": palette.car_colour(index)}
+            for index, (name, kind) in enumerate(
+                zip(instance.names, ("ego", *(agent.type for agent in instance.e_agents)), strict=True)
+            )
+        ],
+        "body": _body(problem.car.body),
+        "w": problem.car.w,
+        "sensing": problem.sensing_radius,
+        "roads": _roads(problem, origin),
+        "goals": {
+            "vertices": list(dict.fromkeys(problem.goal_vertices)),
+            "radius": problem.intersection_radius,
+            "visits": goal_visits(instance, frames),
+        },
+        "obstacles": [_obstacle(obstacle, origin) for obstacle in problem.obstacles],
+        "series": _series(frames, origin),
+        "ending": None if ending is None else {"end": ending.end.value, "detail": ending.detail},
+        "summary": [[_caption(name), _shown(value)] for name, value in summary.items()],
+        "flags": NAMES,
+        "marks": [_mark(mark, origin) for mark in marks],
+    }
+
+
+def _roads(problem: Problem, origin: Floats) -> dict[str, Any]:
+    network, car = problem.network, problem.car
+    return {
+        "width": car.road_width,
+        "lattice": [list(point) for point in network.intersections],
+        "points": _f32(network.points - origin),
+        "ends": _i32(network.ends),
+        "segments": [list(segment) for segment in network.segments],
+        "centres": _f32(centre_lines(network, 0.5 * car.road_width) - origin),
+        "hints": _f32(lane_hints(network, car.w) - origin),
+    }
+
+
+def _series(frames: Frames, origin: Floats) -> dict[str, str]:
+    """Pack the arrays of the frames car after car: (N, F) float32, headings int16, the discrete ones as runs."""
+    heading = np.round(np.nan_to_num(frames.theta) * (HEADING_STEPS / math.pi)).astype("<i2")
+    return {
+        "x": _f32(frames.x.T - origin[0]),
+        "y": _f32(frames.y.T - origin[1]),
+        "heading": _base64(heading.T),
+        "speed": _f32(frames.speed.T),
+        "yawRate": _f32(frames.yaw_rate.T),
+        "segment": _runs(frames.segment),
+        "at": _runs(frames.at),
+        "bits": _runs(frames.bits),
+    }
+
+
+def _runs(values: npt.NDArray[Any]) -> str:
+    """Pack (F, N) integers as, for every car, the number of runs and then (first frame, value) of each."""
+    packed: list[npt.NDArray[Any]] = []
+    for column in values.T:
+        first = np.flatnonzero(np.concatenate([[True], column[1:] != column[:-1]]))
+        packed += [np.array([len(first)]), np.stack([first, column[first]], axis=1).ravel()]
+    return _i32(np.concatenate(packed))
+
+
+def _f32(values: npt.NDArray[Any]) -> str:
+    return _base64(values.astype("<f4"))
+
+
+def _i32(values: npt.NDArray[Any]) -> str:
+    return _base64(values.astype("<i4"))
+
+
+def _base64(values: npt.NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _body(body: Body) -> dict[str, float]:
+    return {"radius": body.radius} if isinstance(body, Disc) else {"length": body.length, "width": body.width}
+
+
+def _obstacle(obstacle: Obstacle, origin: Floats) -> dict[str, Any]:
+    if isinstance(obstacle, DiscObstacle):
+        return {"disc": [obstacle.x - float(origin[0]), obstacle.y - float(origin[1]), obstacle.radius]}
+    return {"polygon": (np.asarray(obstacle.vertices) - origin).tolist()}
+
+
+def _mark(mark: Mark, origin: Floats) -> dict[str, Any]:
+    point = (
+        None if mark.point is None else [mark.point[0] - float(origin[0]), mark.point[1] - float(origin[1])]
+    )
+    return {
+        "time": mark.time,
+        "since": mark.since,
+        "kind": mark.kind,
+        "text": mark.text,
+        "car": mark.car,
+        "point": point,
+    }
+
+
+def _caption(name: str) -> str:
+    """Return the name of a score as people read it: ``off_road_s`` as ``off road (s)``."""
+    words, _, unit = name.rpartition("_")
+    return f"{words} ({unit})".replace("_", " ") if words and unit in UNITS else name.replace("_", " ")
+
+
+def _shown(value: object) -> str:
+    """Return a value of a score as people read it."""
+    if value is None:
+        return "\N{EN DASH}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        pairs = cast("Mapping[object, object]", value).items()
+        return ", ".join(f"{name}: {_shown(item)}" for name, item in pairs) or "none"
+    if isinstance(value, list | tuple):
+        items = cast("Sequence[object]", value)
+        if any(isinstance(item, Mapping) for item in items):
+            return str(len(items))
+        return ", ".join(_shown(item) for item in items) or "none"
+    return str(value)

@@ -1,0 +1,112 @@
+// The trial: unpacked series, and what can be asked of it at any instant.
+
+const HEADING_STEPS = 32767;
+
+function unpack(text, Kind) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Kind(bytes.buffer);
+}
+
+// Runs (see _runs in replay.py) as one value per car and frame.
+function unpackRuns(text, cars, frames) {
+  const packed = unpack(text, Int32Array);
+  const values = new Int32Array(cars * frames);
+  let place = 0;
+  for (let car = 0; car < cars; car += 1) {
+    const runs = packed[place];
+    place += 1;
+    for (let run = 0; run < runs; run += 1, place += 2) {
+      const last = run + 1 < runs ? packed[place + 2] : frames;
+      values.fill(packed[place + 1], car * frames + packed[place], car * frames + last);
+    }
+  }
+  return values;
+}
+
+function pairs(values, size) {
+  const rows = [];
+  for (let place = 0; place < values.length; place += size) rows.push(values.subarray(place, place + size));
+  return rows;
+}
+
+class Trial {
+  constructor({ roads, series, first, ...rest }) {
+    Object.assign(this, rest);
+    this.start = first / this.rate;
+    this.end = (first + this.frames - 1) / this.rate;
+    this.width = roads.width;
+    this.lattice = roads.lattice;
+    this.segments = roads.segments;
+    this.points = pairs(unpack(roads.points, Float32Array), 2);
+    this.ends = pairs(unpack(roads.ends, Int32Array), 2);
+    this.centres = pairs(unpack(roads.centres, Float32Array), 4);
+    this.hints = pairs(unpack(roads.hints, Float32Array), 6);
+    for (const name of ["x", "y", "speed", "yawRate"]) this[name] = unpack(series[name], Float32Array);
+    this.heading = unpack(series.heading, Int16Array);
+    for (const name of ["segment", "at", "bits"]) {
+      this[name] = unpackRuns(series[name], this.cars.length, this.frames);
+    }
+    this.reach = this.body.radius ?? Math.hypot(this.body.length, this.body.width) / 2;
+    this.contacts = this.marks.filter((mark) => mark.kind === "contact" && mark.point);
+  }
+
+  // Number of the last frame at or before the time, and how far the next one is on its way to it.
+  place(time) {
+    const exact = (Math.min(Math.max(time, this.start), this.end) - this.start) * this.rate;
+    const frame = Math.min(Math.floor(exact + 1e-6), this.frames - 1);
+    return [frame, frame + 1 < this.frames ? Math.max(0, exact - frame) : 0];
+  }
+
+  time(frame) {
+    return this.start + frame / this.rate;
+  }
+
+  // Position (relative to the origin) and heading between frames; speeds as of the last frame.
+  pose(car, time) {
+    const [frame, part] = this.place(time);
+    const here = car * this.frames + frame;
+    const next = part > 0 ? here + 1 : here;
+    const turn = ((this.heading[next] - this.heading[here] + 3 * HEADING_STEPS) % (2 * HEADING_STEPS)) - HEADING_STEPS;
+    return {
+      x: this.x[here] + part * (this.x[next] - this.x[here]),
+      y: this.y[here] + part * (this.y[next] - this.y[here]),
+      theta: ((this.heading[here] + part * turn) * Math.PI) / HEADING_STEPS,
+      speed: this.speed[here],
+      yawRate: this.yawRate[here],
+    };
+  }
+
+  // The labels of 2016: nearest segment, and the intersection whose disc holds the centre.
+  labels(car, time) {
+    const here = car * this.frames + this.place(time)[0];
+    const { name } = this.cars[car];
+    const segment = this.segments[this.segment[here]];
+    const point = this.lattice[this.at[here]];
+    return [segment && `${name}_s_${segment.join("_")}`, point && `${name}_t_${point.join("_")}`].filter(Boolean);
+  }
+
+  // The propositions that hold of a car, by name.
+  propositions(car, time) {
+    const bits = this.bits[car * this.frames + this.place(time)[0]];
+    return Object.keys(this.flags).filter((name) => bits & this.flags[name]);
+  }
+
+  // Which goals are lit: those visited in the round under way, and the one the ego is in; rounds and visits so far.
+  progress(time) {
+    const [frame] = this.place(time);
+    const counts = new Map(this.goals.vertices.map((vertex) => [vertex, 0]));
+    const lit = new Set();
+    let rounds = 0;
+    for (const [when, vertex] of this.goals.visits) {
+      if (when > frame) break;
+      counts.set(vertex, counts.get(vertex) + 1);
+      lit.add(vertex);
+      if (lit.size === counts.size) {
+        rounds += 1;
+        lit.clear();
+      }
+    }
+    if (counts.has(this.at[frame])) lit.add(this.at[frame]);
+    return { rounds, counts, lit };
+  }
+}

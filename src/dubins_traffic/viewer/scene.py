@@ -1,0 +1,83 @@
+"""What both plots and replays draw of a road network: centre lines, hints of the lanes' directions, extents."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.body import DiscObstacle, Obstacle
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.network import RoadNetwork
+
+HINT_SPACING = 4.0
+
+
+class Extent(NamedTuple):
+    """A box in the world frame, metres."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    @property
+    def width(self) -> float:
+        """Width in metres."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """Height in metres."""
+        return self.top - self.bottom
+
+
+def centre_lines(network: RoadNetwork, half_width: float) -> Floats:
+    """Return the stretches of the segments' centre lines outside junctions, (S, 2, 2) metres.
+
+    An end at which other segments meet is drawn back by `half_width`, by at most 35 % of the segment.
+    """
+    points, ends = network.points, network.ends
+    trim = np.where(network.degrees[ends] > 1, half_width, 0.0)
+    trim = np.minimum(trim, 0.35 * network.lengths[:, None])
+    start = points[ends[:, 0]] + trim[:, :1] * network.tangents
+    stop = points[ends[:, 1]] - trim[:, 1:] * network.tangents
+    return np.stack([start, stop], axis=1)
+
+
+def lane_hints(network: RoadNetwork, w: float) -> Floats:
+    """Return chevrons on the right lanes that point the way one drives there, (H, 3, 2) metres.
+
+    Each lane bears one in its middle, long ones more, about `HINT_SPACING` lane lengths of 2w * 5 apart.
+    """
+    hints: list[Floats] = []
+    for (first, second), length, tangent in zip(network.ends, network.lengths, network.tangents, strict=True):
+        count = max(1, round(float(length) / (HINT_SPACING * max(3.0 * w, 1e-9))))
+        places = (np.arange(count) + 0.5) / count * length
+        for origin, t in ((network.points[first], tangent), (network.points[second], -tangent)):
+            right = np.array([t[1], -t[0]])
+            tips = origin + places[:, None] * t + w * right + 0.22 * w * t
+            back = 0.44 * w * t
+            side = 0.32 * w * right
+            hints.append(np.stack([tips - back - side, tips, tips - back + side], axis=1))
+    return np.concatenate(hints) if hints else np.zeros((0, 3, 2))
+
+
+def obstacle_points(obstacle: Obstacle) -> Floats:
+    """Return points that span the box of an obstacle, (P, 2) metres."""
+    if isinstance(obstacle, DiscObstacle):
+        centre, radius = np.array([obstacle.x, obstacle.y]), obstacle.radius
+        return np.stack([centre - radius, centre + radius])
+    return np.asarray(obstacle.vertices, dtype=np.float64).reshape(-1, 2)
+
+
+def extent(network: RoadNetwork, half_width: float, *others: Floats) -> Extent:
+    """Return the box that holds the roads and, of `others` (each (..., 2)), all finite points."""
+    points = network.points
+    low, high = points.min(axis=0) - half_width, points.max(axis=0) + half_width
+    for other in others:
+        flat = other.reshape(-1, 2)
+        flat = flat[np.isfinite(flat).all(axis=1)]
+        if len(flat):
+            low, high = np.minimum(low, flat.min(axis=0)), np.maximum(high, flat.max(axis=0))
+    return Extent(float(low[0]), float(low[1]), float(high[0]), float(high[1]))
