@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from dubins_traffic.errors import InputError
 
 
-class Parameters(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class RuleParameters:
     """Parameters of the rules by name; metres, seconds, metres per second.
 
     A problem that asks for the rules carries all of them in `Problem.rules`.
+
+    Raises
+    ------
+    InputError
+        If a value is not a finite number >= 0, or not whole where a count is asked.
     """
 
     crossing_degree: int = 3
@@ -71,3 +82,42 @@ class Parameters(NamedTuple):
     """A verdict says whether the culprit was within the sensing radius in this last time."""
     gap_rounds: float = 10.0
     """satisfied: no gap between visits of a goal over this many free-flow rounds."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            _check(field.name, getattr(self, field.name), whole=isinstance(field.default, int))
+        if self.left_release > self.left_set:
+            raise InputError(
+                "left would fall where it rises",
+                field="left_release",
+                value=self.left_release,
+                expected=f"at most left_set ({self.left_set})",
+            )
+
+    @classmethod
+    def from_mapping(cls, rules: Mapping[str, Any]) -> RuleParameters:
+        """Return the parameters in `rules`, such as `Problem.rules`; those left out have their defaults.
+
+        Raises
+        ------
+        InputError
+            If a name is none of ours, or a value is refused (above).
+        """
+        known = {field.name for field in fields(cls)}
+        for name in rules:
+            if name not in known:
+                raise InputError("no parameter of the rules", field=name, expected=f"one of {sorted(known)}")
+        return cls(**rules)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return all parameters by name, in the order of their definition."""
+        return asdict(self)
+
+
+def _check(name: str, value: object, *, whole: bool) -> None:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if whole and not isinstance(value, int):
+        number = False
+    if not number or not math.isfinite(value) or value < 0:  # pyright: ignore  # a number by then
+        kind = "a whole number >= 0" if whole else "a finite number >= 0"
+        raise InputError("not a value of this parameter", field=name, value=value, expected=kind)

@@ -1,0 +1,444 @@
+"""The propositions of one frame, for all cars of a batch, in the order of RULES: lane state, still, queue,
+blocked, overtaking, left.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.roads.lookup import (
+    lane_coordinates,
+    lane_direction,
+    lane_end,
+    nearest_segment,
+    nearest_vertex,
+)
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.blocking import narrows, obstacle_narrows
+from dubins_traffic.spec.lane_state import lane_state
+from dubins_traffic.spec.obstacles import ObstacleLanes
+from dubins_traffic.spec.propositions import (
+    AHEAD,
+    APPROACH,
+    BLOCKED,
+    BREACH3,
+    CLEAR,
+    ENTERED,
+    EXCUSED,
+    FIRST,
+    FORFEITED,
+    IN_CROSSING,
+    LEFT,
+    ON_ROAD,
+    OVERTAKING,
+    STANDS,
+    STILL,
+    STOPPED,
+    TURNED,
+)
+from dubins_traffic.spec.queue import foremost, keep_order
+from dubins_traffic.spec.shape import distance2_to_body, half_extent
+from dubins_traffic.spec.tables import (
+    APPROACH2,
+    APPROACH_SINCE,
+    BLOCKED_AHEAD,
+    CROSS2,
+    CROSSERS,
+    CROSSING_DEGREE,
+    EXCUSE,
+    FIRST_SINCE,
+    FORFEITS,
+    FREE_NEEDED,
+    GAP2,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    JUDGED3,
+    LANE,
+    LANE_WIDTH,
+    LATERAL,
+    LEFT_RELEASE,
+    LEFT_SET,
+    NET,
+    NEXT_IN_LANE,
+    NEXT_IN_QUEUE,
+    NEXT_ON_SEGMENT,
+    OVERTAKING_AHEAD,
+    OVERTAKING_BEHIND,
+    PROGRESS,
+    QUEUE,
+    QUEUE2,
+    RADIUS,
+    RANK,
+    REACH,
+    ROUNDING,
+    SEGMENT,
+    STAND_MOVE2,
+    STAND_TICKS,
+    STOP_MOVE2,
+    STOP_TICKS,
+    TICKET,
+    TOP,
+    TURN_BACK,
+    Memory,
+    RuleTable,
+)
+
+RULE3 = STOPPED | CLEAR | AHEAD
+KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
+
+
+@jit
+def label_frame(
+    tick: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    labels: Labels,
+    memory: Memory,
+) -> None:
+    """Label frame `tick` of every trial: `labels` and `memory` hold those of the frame before and are updated.
+
+    Before frame 0 both are as they are made: no lane, no vertex, no flag.
+    """
+    for b in range(state.count.shape[0]):
+        cars = state.count[b]
+        for n in range(cars):
+            _locate(b, n, tick, state, roads, rules, labels, memory)
+        for n in range(cars):
+            _stop(b, n, tick, roads, rules, labels, memory)
+        for n in range(cars):
+            _queue(b, n, tick, roads, rules, labels, memory)
+        for n in range(cars):
+            _stand(b, n, rules, labels, memory)
+        for n in range(cars):
+            _block(b, n, state, roads, obstacles, rules, labels, memory)
+        for n in range(cars):
+            _forget(b, n, roads, rules, labels, memory)
+
+
+@jit
+def _locate(
+    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
+) -> None:
+    """Find segment, disc and lane state of a car, and whether it was still; enter it in the lists.
+
+    Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them.
+    """
+    real = rules.real
+    net = rules.whole[b, NET]
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
+    segment, off2 = nearest_segment(t, net, x, y)
+    v, away2 = nearest_vertex(t, net, x, y)
+    at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
+    body2 = distance2_to_body(
+        t.vert[t.vert_off[net] + v, 0], t.vert[t.vert_off[net] + v, 1], x, y, c, s, half_length, half_width
+    )
+    crosses = v if body2 < real[b, CROSS2] else -1
+
+    before = np.int64(labels.bits[b, n])
+    bits = before & KEPT
+    lane_before = labels.lane[b, n]
+    lane, top, progress, lateral, turned = lane_state(
+        t,
+        net,
+        at,
+        labels.at[b, n],
+        lane_before,
+        memory.measure[b, n, TOP],
+        segment,
+        off2,
+        x,
+        y,
+        c,
+        s,
+        real[b, TURN_BACK],
+    )
+    bits = _entry(b, tick, t, rules, crosses, labels.crosses[b, n], lane_before, before, bits)
+    if off2 <= t.half_width[net] * t.half_width[net]:
+        bits |= ON_ROAD
+    if turned:
+        bits |= TURNED
+    if lane != lane_before:
+        bits &= ~STOPPED
+        memory.mark[b, n, APPROACH_SINCE] = -1
+    labels.segment[b, n] = segment
+    labels.at[b, n] = at
+    labels.crosses[b, n] = crosses
+    labels.lane[b, n] = lane
+    labels.bits[b, n] = bits | _still(b, n, tick, x, y, rules, memory)
+
+    measure = memory.measure
+    measure[b, n, TOP] = top
+    measure[b, n, PROGRESS] = progress
+    measure[b, n, LATERAL] = lateral
+    measure[b, n, REACH] = 0.0
+    measure[b, n, GAP2] = -1.0
+    if crosses >= 0:
+        memory.head[crosses, CROSSERS] += 1
+    memory.link[n, NEXT_ON_SEGMENT] = memory.head[segment, SEGMENT]
+    memory.head[segment, SEGMENT] = n
+    if lane >= 0:
+        tx, ty = lane_direction(t, net, lane)
+        half = half_extent(tx, ty, c, s, half_length, half_width, real[b, ROUNDING])
+        measure[b, n, REACH] = lateral + half
+        end = lane_end(t, net, lane)
+        row = t.vert_off[net] + end
+        if t.degree[row] >= rules.whole[b, CROSSING_DEGREE]:
+            measure[b, n, GAP2] = distance2_to_body(
+                t.vert[row, 0], t.vert[row, 1], x, y, c, s, half_length, half_width
+            )
+        _enter_in_lane(b, n, lane, memory)
+
+
+@jit
+def _entry(
+    b: int,
+    tick: int,
+    t: RoadTable,
+    rules: RuleTable,
+    crosses: int,
+    crossed: int,
+    lane_before: int,
+    before: Any,
+    bits: Any,
+) -> Any:
+    """Return `bits` with the flags of the disc that the body meets; an entry is judged on the flags `before`."""
+    if crosses < 0:
+        return bits & ~BREACH3
+    net = rules.whole[b, NET]
+    crossing = t.degree[t.vert_off[net] + crosses] >= rules.whole[b, CROSSING_DEGREE]
+    if crosses != crossed:
+        bits &= ~BREACH3
+        if tick > 0:
+            bits |= ENTERED
+        if crossing and tick > 0 and rules.whole[b, JUDGED3] != 0:
+            rightly = before & RULE3 == STOPPED | CLEAR
+            if not (rightly and lane_end(t, net, lane_before) == crosses):
+                bits |= BREACH3
+    if crossing:
+        bits |= IN_CROSSING
+    return bits
+
+
+@jit
+def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memory: Memory) -> int:
+    """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
+    trail = memory.trail
+    rows = trail.shape[0]
+    trail[tick % rows, b, n, 0] = x
+    trail[tick % rows, b, n, 1] = y
+    if _moved2(b, n, tick, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]:
+        return STILL
+    return 0
+
+
+@jit
+def _moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
+    """Return the squared distance of the centre from where it was `ago` ticks before; huge before that."""
+    if tick < ago:
+        return 1e300
+    trail = memory.trail
+    rows = trail.shape[0]
+    now = tick % rows
+    then = (tick - ago) % rows
+    dx = trail[now, b, n, 0] - trail[then, b, n, 0]
+    dy = trail[now, b, n, 1] - trail[then, b, n, 1]
+    return dx * dx + dy * dy
+
+
+@jit
+def _enter_in_lane(b: int, n: int, lane: int, memory: Memory) -> None:
+    """Put car n into the list of its lane, foremost first."""
+    progress = memory.measure[b, n, PROGRESS]
+    behind = memory.head[lane, LANE]
+    ahead = -1
+    while behind >= 0 and memory.measure[b, behind, PROGRESS] > progress:
+        ahead = behind
+        behind = memory.link[behind, NEXT_IN_LANE]
+    memory.link[n, NEXT_IN_LANE] = behind
+    if ahead < 0:
+        memory.head[lane, LANE] = n
+    else:
+        memory.link[ahead, NEXT_IN_LANE] = n
+
+
+@jit
+def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
+    """Find whether a car approaches, has stopped and gets a ticket; enter it in the queue ahead.
+
+    Sets CLEAR too, which needs who crosses what.
+    """
+    net = rules.whole[b, NET]
+    real = rules.real
+    mark = memory.mark
+    gap2 = memory.measure[b, n, GAP2]
+    lane = labels.lane[b, n]
+    crosses = labels.crosses[b, n]
+    bits = np.int64(labels.bits[b, n])
+    mark[b, n, RANK] = -1
+    if gap2 < 0.0:
+        if bits & IN_CROSSING != 0 and memory.head[crosses, CROSSERS] == 1:
+            bits |= CLEAR
+        labels.bits[b, n] = bits & ~STOPPED
+        return
+    v = lane_end(t, net, lane)
+    own = 1 if crosses == v else 0
+    if memory.head[v, CROSSERS] == own:
+        bits |= CLEAR
+    outside = gap2 >= real[b, CROSS2]
+    if not outside or gap2 > real[b, QUEUE2]:
+        bits &= ~STOPPED
+    if outside and gap2 <= real[b, APPROACH2] and foremost(rules, memory, b, n, lane):
+        bits |= APPROACH
+        if mark[b, n, APPROACH_SINCE] < 0:
+            mark[b, n, APPROACH_SINCE] = tick
+        ago = rules.whole[b, STOP_TICKS]
+        long = tick - mark[b, n, APPROACH_SINCE] >= ago
+        if bits & STOPPED == 0 and long and _moved2(b, n, tick, ago, memory) <= real[b, STOP_MOVE2]:
+            bits |= STOPPED
+            mark[b, n, TICKET] = tick
+            mark[b, n, FORFEITS] = 0
+            mark[b, n, FIRST_SINCE] = -1
+    else:
+        mark[b, n, APPROACH_SINCE] = -1
+    if bits & STOPPED != 0:
+        memory.link[n, NEXT_IN_QUEUE] = memory.head[v, QUEUE]
+        memory.head[v, QUEUE] = n
+    labels.bits[b, n] = bits
+
+
+@jit
+def _queue(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
+    """Order the queue of which car n is the head of the list, and flag its cars."""
+    if labels.bits[b, n] & STOPPED == 0:
+        return
+    net = rules.whole[b, NET]
+    v = lane_end(t, net, labels.lane[b, n])
+    if memory.head[v, QUEUE] != n:
+        return
+    clear = memory.head[v, CROSSERS] == 0
+    keep_order(t, rules, labels.lane, memory, b, net, n, clear, tick)
+    member = n
+    while member >= 0:
+        flags = FIRST if memory.mark[b, member, RANK] == 0 else AHEAD
+        if memory.mark[b, member, FORFEITS] > 0:
+            flags |= FORFEITED
+        else:
+            flags |= EXCUSED
+        labels.bits[b, member] = np.int64(labels.bits[b, member]) | flags
+        member = memory.link[member, NEXT_IN_QUEUE]
+
+
+@jit
+def _stand(b: int, n: int, rules: RuleTable, labels: Labels, memory: Memory) -> None:
+    """Excuse the cars close behind excused ones, and say who stands, in the lane of which car n is foremost.
+
+    A car without lane state is excused by nothing.
+    """
+    lane = labels.lane[b, n]
+    if lane < 0:
+        _say_stands(b, n, labels)
+        return
+    if memory.head[lane, LANE] != n:
+        return
+    measure = memory.measure
+    start = n
+    member = n
+    while member >= 0:
+        progress = measure[b, member, PROGRESS]
+        while measure[b, start, PROGRESS] - progress > rules.real[b, EXCUSE]:
+            start = memory.link[start, NEXT_IN_LANE]
+        other = start
+        while other != member and measure[b, other, PROGRESS] > progress:
+            if labels.bits[b, other] & EXCUSED != 0:
+                labels.bits[b, member] = np.int64(labels.bits[b, member]) | EXCUSED
+                break
+            other = memory.link[other, NEXT_IN_LANE]
+        _say_stands(b, member, labels)
+        member = memory.link[member, NEXT_IN_LANE]
+
+
+@jit
+def _say_stands(b: int, n: int, labels: Labels) -> None:
+    bits = np.int64(labels.bits[b, n])
+    if bits & (STILL | EXCUSED) == STILL:
+        labels.bits[b, n] = bits | STANDS
+
+
+@jit
+def _block(
+    b: int,
+    n: int,
+    state: State,
+    t: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    labels: Labels,
+    memory: Memory,
+) -> None:
+    """Find whether the lane of a car is blocked, whether it overtakes, and whether it is left."""
+    real = rules.real
+    lane = labels.lane[b, n]
+    bits = np.int64(labels.bits[b, n])
+    if lane < 0:
+        labels.bits[b, n] = bits & ~(OVERTAKING | LEFT)
+        return
+    net = rules.whole[b, NET]
+    tx, ty = lane_direction(t, net, lane)
+    own = memory.measure[b, n, PROGRESS]
+    width = real[b, LANE_WIDTH]
+    needed = real[b, FREE_NEEDED]
+    blocked = False
+    beside = False
+    other = memory.head[lane // 2, SEGMENT]
+    while other >= 0:
+        if other != n and labels.bits[b, other] & STANDS != 0:
+            progress, lateral = lane_coordinates(t, net, lane, state.x[b, other], state.y[b, other])
+            half = half_extent(
+                tx, ty, state.c[b, other], state.s[b, other],
+                real[b, HALF_LENGTH], real[b, HALF_WIDTH], real[b, ROUNDING],
+            )  # fmt: skip
+            ahead = progress - own
+            if narrows(lateral - half, lateral + half, width, needed):
+                blocked = blocked or 0.0 < ahead <= real[b, BLOCKED_AHEAD]
+                beside = beside or -real[b, OVERTAKING_BEHIND] <= ahead <= real[b, OVERTAKING_AHEAD]
+        other = memory.link[other, NEXT_ON_SEGMENT]
+    if obstacles.base[b] >= 0:
+        length = t.seg[t.seg_off[net] + lane // 2, 4]
+        blocked = blocked or obstacle_narrows(
+            obstacles, b, lane, length, own, own + real[b, BLOCKED_AHEAD], width, needed
+        )
+        beside = beside or obstacle_narrows(
+            obstacles, b, lane, length,
+            own - real[b, OVERTAKING_BEHIND], own + real[b, OVERTAKING_AHEAD], width, needed,
+        )  # fmt: skip
+    if blocked:
+        bits |= BLOCKED | OVERTAKING
+    elif not beside and bits & LEFT == 0:
+        bits &= ~OVERTAKING
+    if bits & ENTERED != 0 or labels.crosses[b, n] == lane_end(t, net, lane):
+        bits &= ~OVERTAKING
+    reach = memory.measure[b, n, REACH]
+    if reach > real[b, LEFT_SET]:
+        bits |= LEFT
+    elif reach < real[b, LEFT_RELEASE]:
+        bits &= ~LEFT
+    labels.bits[b, n] = bits
+
+
+@jit
+def _forget(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
+    """Empty the lists in which a car has been entered."""
+    lane = labels.lane[b, n]
+    memory.head[labels.segment[b, n], SEGMENT] = -1
+    if labels.crosses[b, n] >= 0:
+        memory.head[labels.crosses[b, n], CROSSERS] = 0
+    if lane >= 0:
+        memory.head[lane, LANE] = -1
+        memory.head[lane_end(t, rules.whole[b, NET], lane), QUEUE] = -1

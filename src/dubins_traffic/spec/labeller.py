@@ -1,0 +1,188 @@
+"""Labels the frames of a batch of trials, tick by tick, and says who is at fault in their collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from dubins_traffic.cars.body import Car, Obstacle
+from dubins_traffic.cars.state import Contact, Labels, Pose, State
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.table import pack
+from dubins_traffic.spec.fault import with_fault
+from dubins_traffic.spec.frame import label_frame
+from dubins_traffic.spec.obstacles import place_obstacles
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.tables import (
+    LATERAL,
+    PROGRESS,
+    REACH,
+    STAND_TICKS,
+    STOP_TICKS,
+    Memory,
+    pack_rules,
+)
+
+
+class Judged(Protocol):
+    """What the labeller asks of a problem (`problem.instance.Problem`)."""
+
+    @property
+    def network(self) -> RoadNetwork:
+        """The roads."""
+        ...
+
+    @property
+    def intersection_radius(self) -> float:
+        """R, metres."""
+        ...
+
+    @property
+    def car(self) -> Car:
+        """The car that all drive."""
+        ...
+
+    @property
+    def rate(self) -> float:
+        """Control rate, Hz."""
+        ...
+
+    @property
+    def sensing_radius(self) -> float:
+        """Metres."""
+        ...
+
+    @property
+    def obstacles(self) -> Sequence[Obstacle]:
+        """Static obstacles."""
+        ...
+
+    @property
+    def rules(self) -> Mapping[str, Any]:
+        """Parameters by name; empty if not judged."""
+        ...
+
+
+class Posed(Protocol):
+    """What the labeller asks of an instance (`problem.instance.Instance`)."""
+
+    @property
+    def problem(self) -> Judged:
+        """What is judged."""
+        ...
+
+    @property
+    def starts(self) -> Sequence[Pose]:
+        """One pose per car."""
+        ...
+
+
+class Labeller:
+    """Computes the propositions of RULES for every car of a batch, one compiled call per tick.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One instance per trial of the batch. Instances that share a network object and a lane width share its
+        table.
+
+    Attributes
+    ----------
+    labels : Labels
+        The propositions of the present frame, (B, N), updated in place.
+    memory : Memory
+        All that is remembered from frame to frame: tickets, forfeits, greatest progress, trails.
+
+    Notes
+    -----
+    Entries against rule 3 count as breaches only where the problem carries rules and rules 2 and 3 are defined on
+    its roads; all else is computed everywhere (docs/design/010-propositions.md).
+    """
+
+    def __init__(self, instances: Sequence[Posed]) -> None:
+        problems = [instance.problem for instance in instances]
+        nets, networks, widths = _distinct_roads(problems)
+        cars = pack_cars([problem.car for problem in problems])
+        self._roads = pack(networks, widths)
+        self._rules = pack_rules(
+            [RuleParameters.from_mapping(problem.rules) for problem in problems],
+            [problem.intersection_radius for problem in problems],
+            [problem.rate for problem in problems],
+            nets,
+            [bool(problem.rules) for problem in problems],
+            cars,
+        )
+        obstacles = pack_obstacles([problem.obstacles for problem in problems])
+        self._obstacles = place_obstacles(obstacles, self._roads, np.array(nets, dtype=np.int64))
+        self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
+        self._tick = -1
+
+    def reset(self, state: State) -> Labels:
+        """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
+        trials, cars = state.x.shape
+        depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
+        self.memory = Memory.empty(trials, cars, depth, self._heads)
+        self.labels = Labels.zeros(trials, cars)
+        self._tick = 0
+        self._label(state)
+        return self.labels
+
+    def update(
+        self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
+    ) -> Sequence[Sequence[Contact]]:
+        """Label frame `tick`, one after the last, and return the contacts of the tick before it with `at_fault`.
+
+        Raises
+        ------
+        ValueError
+            If a frame has been left out: the propositions depend on every frame.
+        """
+        if tick != self._tick + 1:
+            raise ValueError(f"frame {self._tick + 1} must follow, got {tick}")
+        judged: Sequence[Sequence[Contact]] = contacts
+        if any(contacts):
+            bits = self.labels.bits
+            judged = [
+                tuple(with_fault(contact, bits[b]) for contact in own) for b, own in enumerate(contacts)
+            ]
+        self._tick = tick
+        self._label(state)
+        return judged
+
+    @property
+    def progress(self) -> Floats:
+        """s: progress of the centres along their lane states, metres, (B, N); 0 without lane state."""
+        return self.memory.measure[:, :, PROGRESS]
+
+    @property
+    def lateral(self) -> Floats:
+        """l: lateral offset of the centres, left positive, metres, (B, N); 0 without lane state."""
+        return self.memory.measure[:, :, LATERAL]
+
+    @property
+    def reach(self) -> Floats:
+        """Largest lateral coordinate of the bodies, metres, (B, N); 0 without lane state."""
+        return self.memory.measure[:, :, REACH]
+
+    def _label(self, state: State) -> None:
+        label_frame(self._tick, state, self._roads, self._obstacles, self._rules, self.labels, self.memory)
+
+
+def _distinct_roads(problems: Sequence[Judged]) -> tuple[list[int], list[RoadNetwork], list[float]]:
+    """Return each problem's road number, and of each distinct pair of network and lane width these two."""
+    numbers: dict[tuple[int, float], int] = {}
+    nets: list[int] = []
+    networks: list[RoadNetwork] = []
+    widths: list[float] = []
+    for problem in problems:
+        key = (id(problem.network), problem.car.lane_width)
+        if key not in numbers:
+            numbers[key] = len(networks)
+            networks.append(problem.network)
+            widths.append(problem.car.lane_width)
+        nets.append(numbers[key])
+    return nets, networks, widths

@@ -1,0 +1,45 @@
+"""Labels as words, as in 2016: `<car>_s_x0_y0_x1_y1` and `<car>_t_x_y`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.roads.network import RoadNetwork
+
+
+def words(network: RoadNetwork, names: Sequence[str], segment: Ints, at: Ints) -> tuple[str, ...]:
+    """Return the labels that hold in one frame.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+        The roads.
+    names : sequence of str
+        Names of the cars.
+    segment, at : (N,) int64
+        Nearest segment of each car, and the intersection whose disc holds its centre (-1: none).
+
+    Returns
+    -------
+    tuple of str
+        One segment label per car, by car, each followed by the intersection label if there is one.
+    """
+    found: list[str] = []
+    for name, s, v in zip(names, segment.tolist(), at.tolist(), strict=True):
+        x0, y0, x1, y1 = network.segments[s]
+        found.append(f"{name}_s_{x0}_{y0}_{x1}_{y1}")
+        if v >= 0:
+            x, y = network.intersections[v]
+            found.append(f"{name}_t_{x}_{y}")
+    return tuple(found)
+
+
+def labels_2016(network: RoadNetwork, names: Sequence[str], frames: Frames) -> Iterator[tuple[str, ...]]:
+    """Yield the labels of each frame of a block (see `words`).
+
+    The radius is the instance's intersection radius, by which `Frames.at` has been found.
+    """
+    for segment, at in zip(frames.segment, frames.at, strict=True):
+        yield words(network, names, segment, at)

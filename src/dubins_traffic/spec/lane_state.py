@@ -1,0 +1,88 @@
+"""The lane state of one car: which lane it is on, and its progress there (RULES, *Lane state*)."""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction
+from dubins_traffic.roads.table import RoadTable
+
+
+@jit
+def lane_by_heading(t: RoadTable, net: int, segment: int, c: float, s: float) -> int:
+    """Return the lane of `segment` that the heading (c, s) follows; direction 0 if it is square to both."""
+    tx, ty = lane_direction(t, net, 2 * segment)
+    return 2 * segment if c * tx + s * ty >= 0.0 else 2 * segment + 1
+
+
+@jit
+def lane_away(t: RoadTable, net: int, v: int, x: float, y: float) -> int:
+    """Return the lane out of vertex v whose centre line is nearest to (x, y), the lower segment on ties."""
+    row = t.vert_off[net] + v
+    best = -1
+    nearest = 0.0
+    for k in range(4):
+        lane = t.arms[row, k]
+        if lane >= 0:
+            d2 = distance2(t, net, lane // 2, x, y)
+            if best < 0 or d2 < nearest or (d2 == nearest and lane < best):
+                best = lane
+                nearest = d2
+    return best
+
+
+@jit
+def lane_state(
+    t: RoadTable,
+    net: int,
+    at: int,
+    at_before: int,
+    lane: int,
+    top: float,
+    segment: int,
+    off2: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    turn_back: float,
+) -> tuple[int, float, float, float, bool]:
+    """Return the new lane state: (lane, greatest progress, progress, lateral offset, whether it flipped).
+
+    Parameters
+    ----------
+    t, net
+        The roads.
+    at, at_before
+        Vertices whose discs hold the centre in this frame and the one before; -1 for none.
+    lane, top
+        Lane state of the frame before (-1: none) and the greatest progress since it was set. At the start neither
+        `at_before` nor `lane` is set.
+    segment, off2
+        Nearest segment, and the squared distance from it.
+    x, y, c, s
+        The pose.
+    turn_back
+        Metres of progress lost that make a turn.
+    """
+    if at >= 0:
+        return -1, 0.0, 0.0, 0.0, False
+    fresh = True
+    if at_before >= 0:
+        lane = lane_away(t, net, at_before, x, y)
+    elif lane < 0:
+        lane = lane_by_heading(t, net, segment, c, s)
+    else:
+        half2 = t.half_width[net] * t.half_width[net]
+        elsewhere = segment != lane // 2 and off2 <= half2
+        if elsewhere and distance2(t, net, lane // 2, x, y) > half2:
+            lane = lane_by_heading(t, net, segment, c, s)
+        else:
+            fresh = False
+    progress, lateral = lane_coordinates(t, net, lane, x, y)
+    if fresh or progress > top:
+        return lane, progress, progress, lateral, False
+    if top - progress < turn_back:
+        return lane, top, progress, lateral, False
+    lane = lane ^ 1
+    progress, lateral = lane_coordinates(t, net, lane, x, y)
+    return lane, progress, progress, lateral, True

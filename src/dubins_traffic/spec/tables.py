@@ -1,0 +1,190 @@
+"""What the kernels of this room read and write: the rules of each trial, and what the cars' past has left behind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.tables import CarTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from dubins_traffic.spec.parameters import RuleParameters
+
+RADIUS: Final = 0
+HALF_LENGTH: Final = 1
+HALF_WIDTH: Final = 2
+ROUNDING: Final = 3
+LANE_WIDTH: Final = 4
+FREE_NEEDED: Final = 5
+TURN_BACK: Final = 6
+LEFT_SET: Final = 7
+LEFT_RELEASE: Final = 8
+CROSS2: Final = 9
+APPROACH2: Final = 10
+QUEUE2: Final = 11
+STOP_MOVE2: Final = 12
+STAND_MOVE2: Final = 13
+EXCUSE: Final = 14
+BLOCKED_AHEAD: Final = 15
+OVERTAKING_BEHIND: Final = 16
+OVERTAKING_AHEAD: Final = 17
+REALS: Final = 18
+
+NET: Final = 0
+STOP_TICKS: Final = 1
+STAND_TICKS: Final = 2
+GROUP_TICKS: Final = 3
+FORFEIT_TICKS: Final = 4
+CROSSING_DEGREE: Final = 5
+JUDGED3: Final = 6
+WHOLES: Final = 7
+
+TOP: Final = 0
+PROGRESS: Final = 1
+LATERAL: Final = 2
+REACH: Final = 3
+GAP2: Final = 4
+MEASURES: Final = 5
+
+APPROACH_SINCE: Final = 0
+TICKET: Final = 1
+FORFEITS: Final = 2
+FIRST_SINCE: Final = 3
+RANK: Final = 4
+MARKS: Final = 5
+
+NEXT_IN_LANE: Final = 0
+NEXT_ON_SEGMENT: Final = 1
+NEXT_IN_QUEUE: Final = 2
+MEMBER: Final = 3
+GROUP: Final = 4
+LINKS: Final = 5
+
+LANE: Final = 0
+SEGMENT: Final = 1
+QUEUE: Final = 2
+CROSSERS: Final = 3
+HEADS: Final = 4
+
+
+class RuleTable(NamedTuple):
+    """The rules of each trial: `real` (B, REALS) float64 and `whole` (B, WHOLES) int64, columns as named above.
+
+    `CROSS2`, `APPROACH2` and `QUEUE2` are squared distances of the body, without its rounding, from a vertex:
+    nearer it meets the disc, and up to there it approaches or keeps its place.
+    """
+
+    real: Floats
+    whole: Ints
+
+
+class Memory(NamedTuple):
+    """What the propositions remember, all of it explicit.
+
+    Attributes
+    ----------
+    measure : (B, N, MEASURES) float64
+        Greatest progress since the lane state was set (`TOP`), progress s and lateral offset l of the centre
+        (`PROGRESS`, `LATERAL`), largest lateral coordinate of the body (`REACH`), all metres in the lane state
+        and 0 without one; squared distance of the body, without its rounding, from the crossing ahead (`GAP2`,
+        -1 if there is none).
+    mark : (B, N, MARKS) int64
+        First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
+        in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
+        (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none.
+    trail : (M, B, N, 2) float64
+        Positions at the last M ticks, tick k in row k mod M.
+    link : (N, LINKS) int64
+        Scratch: the cars of one lane, segment and queue as linked lists; members and groups of a queue.
+    head : (H, HEADS) int64
+        Scratch: the first car of each lane, segment, queue (-1: none), and how many cars cross a vertex.
+    """
+
+    measure: Floats
+    mark: Ints
+    trail: Floats
+    link: Ints
+    head: Ints
+
+    @staticmethod
+    def empty(trials: int, cars: int, depth: int, heads: int) -> Memory:
+        """Return the memory of `trials` x `cars` cars before their first frame."""
+        mark = np.full((trials, cars, MARKS), -1, dtype=np.int64)
+        mark[:, :, FORFEITS] = 0
+        head = np.full((heads, HEADS), -1, dtype=np.int64)
+        head[:, CROSSERS] = 0
+        return Memory(
+            np.zeros((trials, cars, MEASURES)),
+            mark,
+            np.zeros((depth, trials, cars, 2)),
+            np.full((cars, LINKS), -1, dtype=np.int64),
+            head,
+        )
+
+
+def ticks(duration: float, rate: float) -> int:
+    """Return the number of ticks of a duration in seconds (RULES, *Ground*): ceil(duration * rate - 1e-9)."""
+    return math.ceil(duration * rate - 1e-9)
+
+
+def pack_rules(
+    parameters: Sequence[RuleParameters],
+    radii: Sequence[float],
+    rates: Sequence[float],
+    nets: Sequence[int],
+    judged3: Sequence[bool],
+    cars: CarTable,
+) -> RuleTable:
+    """Return the rules of each trial as a table.
+
+    Parameters
+    ----------
+    parameters, radii, rates
+        The parameters, the intersection radius R (m) and the control rate (Hz) of each trial.
+    nets
+        Number of each trial's network in the road table.
+    judged3
+        Whether an entry against rule 3 counts as a breach there.
+    cars
+        The car of each trial.
+    """
+    real = np.zeros((len(parameters), REALS))
+    whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
+    for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
+        rounding = float(cars.rounding[b])
+        width = 2.0 * (float(cars.half_width[b]) + rounding)
+        cross = radius + rounding
+        approach = cross + own.approach_distance
+        queue = cross + own.queue_distance
+        stop = own.still_speed * own.stop_time
+        stand = own.still_speed * own.stand_time
+        real[b, RADIUS] = radius
+        real[b, HALF_LENGTH] = cars.half_length[b]
+        real[b, HALF_WIDTH] = cars.half_width[b]
+        real[b, ROUNDING] = rounding
+        real[b, LANE_WIDTH] = 2.0 * cars.w[b]
+        real[b, FREE_NEEDED] = width + own.blocked_gap
+        real[b, TURN_BACK] = own.turn_back
+        real[b, LEFT_SET] = own.left_set
+        real[b, LEFT_RELEASE] = own.left_release
+        real[b, CROSS2] = cross * cross
+        real[b, APPROACH2] = approach * approach
+        real[b, QUEUE2] = queue * queue
+        real[b, STOP_MOVE2] = stop * stop
+        real[b, STAND_MOVE2] = stand * stand
+        real[b, EXCUSE] = own.excuse_distance
+        real[b, BLOCKED_AHEAD] = own.blocked_ahead
+        real[b, OVERTAKING_BEHIND] = own.overtaking_behind
+        real[b, OVERTAKING_AHEAD] = own.overtaking_ahead
+        whole[b, NET] = nets[b]
+        whole[b, STOP_TICKS] = ticks(own.stop_time, rate)
+        whole[b, STAND_TICKS] = ticks(own.stand_time, rate)
+        whole[b, GROUP_TICKS] = ticks(own.group_time, rate)
+        whole[b, FORFEIT_TICKS] = ticks(own.forfeit_time, rate)
+        whole[b, CROSSING_DEGREE] = own.crossing_degree
+        whole[b, JUDGED3] = judged3[b]
+    return RuleTable(real, whole)
