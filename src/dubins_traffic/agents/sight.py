@@ -1,0 +1,101 @@
+"""Who must stand: cars with something near in the sector that the 2016 laser covers."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from dubins_traffic.agents.tables import (
+    HALF_LENGTH,
+    HALF_WIDTH,
+    ROUNDING,
+    SPAN,
+    STOP,
+    Cast,
+    Workspace,
+)
+from dubins_traffic.cars.near import candidates
+from dubins_traffic.cars.state import State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.boxes import nearest_in_box, separation
+from dubins_traffic.kernels.compile import jit
+
+COS_EDGE = -0.4161468365471424
+SIN_EDGE = 0.9092974268256817
+"""Cosine and sine of 2.0 rad, the edge of the sector on either side of the heading."""
+
+
+@jit
+def sees(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    stop: float,
+    ox: float,
+    oy: float,
+    oc: float,
+    os: float,
+    a: float,
+    b: float,
+    r: float,
+) -> bool:
+    """Return whether a rounded box has a point nearer than `stop` to (x, y) and at most 2.0 rad off the heading.
+
+    Exact: either the point of the box that is nearest lies in the sector, or else the nearest one in the sector
+    lies on one of the sector's edges.
+    """
+    px, py = nearest_in_box(x, y, ox, oy, oc, os, a, b)
+    dx = px - x
+    dy = py - y
+    d = sqrt(dx * dx + dy * dy)
+    if d - r >= stop:
+        return False
+    if d <= r or c * dx + s * dy >= COS_EDGE * d:
+        return True
+    half = 0.5 * stop
+    for side in range(2):
+        sine = SIN_EDGE if side == 0 else -SIN_EDGE
+        ec = c * COS_EDGE - s * sine
+        es = s * COS_EDGE + c * sine
+        gap, _, _, _, _ = separation(
+            x + half * ec, y + half * es, ec, es, half, 0.0, 0.0, ox, oy, oc, os, a, b, r
+        )  # fmt: skip
+        if gap < 0.0:
+            return True
+    return False
+
+
+@jit
+def look(state: State, b: int, cast: Cast, obstacles: ObstacleTable, work: Workspace) -> int:
+    """Set `held[n]` to 1 for each e-agent of trial b that sees something nearer than it stops at, else to 0.
+
+    Returns the number of pairs that had to be looked at; if it exceeds the room for pairs, nothing was decided.
+    """
+    span = cast.build[b, SPAN]
+    found = candidates(state, b, span, obstacles, span, work.pair, work.head, work.link, work.cell)
+    if found > work.pair.shape[0]:
+        return found
+    for n in range(state.count[b]):
+        work.held[n] = 0
+    p = cast.build[b, HALF_LENGTH]
+    q = cast.build[b, HALF_WIDTH]
+    r = cast.build[b, ROUNDING]
+    for k in range(found):
+        i = work.pair[k, 0]
+        j = work.pair[k, 1]
+        if j < 0:
+            row = obstacles.part[-1 - j]
+            if sees(
+                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], cast.law[b, i, STOP],
+                row[0], row[1], row[2], row[3], row[4], row[5], row[6],
+            ):  # fmt: skip
+                work.held[i] = 1
+            continue
+        for _ in range(2):
+            if work.held[i] == 0 and sees(
+                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], cast.law[b, i, STOP],
+                state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r,
+            ):  # fmt: skip
+                work.held[i] = 1
+            i, j = j, i
+    return found

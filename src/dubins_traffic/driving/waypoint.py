@@ -1,0 +1,103 @@
+"""Driving to a point: the turn-then-drive law of 2016, and the curve law for cars that can't turn in place."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from dubins_traffic.kernels.compile import jit
+
+TAN_WANDER = 0.07011455787200271
+"""Tangent of 0.07 rad, the bearing tolerance of the 2016 e-agent."""
+TAN_SIMPLE = 0.10033467208545055
+"""Tangent of 0.1 rad, the bearing tolerance of the 2016 ego controller."""
+_SHARPEST = 1e3
+
+
+@jit
+def turn_then_drive(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    goal_x: float,
+    goal_y: float,
+    tangent: float,
+    miss: float,
+    speed: float,
+    yaw_rate: float,
+    period: float,
+) -> tuple[float, float]:
+    """Return (speed, yaw rate): turn in place while the bearing error is too large, else drive straight.
+
+    Parameters
+    ----------
+    x, y, c, s : float
+        Pose of the car, metres, heading as a unit vector.
+    goal_x, goal_y : float
+        The point to drive to, metres.
+    tangent : float
+        Tangent of the bearing error beyond which the car turns.
+    miss : float
+        Largest lateral distance of the goal from the line ahead, metres, that is left alone: it tightens the
+        tolerance for goals farther than ``miss / tangent``. Infinite for the plain law.
+    speed, yaw_rate : float
+        How fast to drive (m/s) and to turn (rad/s).
+    period : float
+        Seconds of a tick. Neither motion overshoots within a tick, so the law works at any control rate; where
+        ``yaw_rate * period`` is below the tolerance, as at 30 Hz, this changes nothing.
+
+    Notes
+    -----
+    With the goal straight behind, the car turns right, as in 2016 (an error of pi is wrapped to -pi).
+    """
+    dx = goal_x - x
+    dy = goal_y - y
+    ahead = c * dx + s * dy
+    left = c * dy - s * dx
+    if ahead > 0.0 and abs(left) <= min(tangent * ahead, miss):
+        return min(speed, ahead / period), 0.0
+    if ahead <= 0.0 and left == 0.0:
+        if ahead == 0.0:
+            return 0.0, 0.0
+        return 0.0, -yaw_rate
+    turn = yaw_rate
+    if ahead > 0.0:
+        turn = min(turn, abs(left) / (sqrt(ahead * ahead + left * left) * period))
+    return 0.0, turn if left > 0.0 else -turn
+
+
+@jit
+def pursue(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    goal_x: float,
+    goal_y: float,
+    speed: float,
+    slowest: float,
+    yaw_rate: float,
+    radius: float,
+) -> tuple[float, float]:
+    """Return (speed, yaw rate) of the arc through the goal that leaves along the heading (pure pursuit).
+
+    The arc is never tighter than `radius` (0: any); with the goal behind, the tightest one is taken, to the left
+    when it lies straight behind. Where the arc asks for more than `yaw_rate`, the car slows, to `slowest` at least.
+
+    Source: R. C. Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992.
+    """
+    dx = goal_x - x
+    dy = goal_y - y
+    d2 = dx * dx + dy * dy
+    if d2 <= 0.0:
+        return speed, 0.0
+    ahead = c * dx + s * dy
+    left = c * dy - s * dx
+    sharpest = 1.0 / radius if radius > 1.0 / _SHARPEST else _SHARPEST
+    bend = min(2.0 * abs(left) / d2, sharpest)
+    if ahead < 0.0:
+        bend = sharpest
+    if bend * speed > yaw_rate:
+        speed = max(yaw_rate / bend, slowest)
+    turn = min(bend * speed, yaw_rate)
+    return speed, turn if left >= 0.0 else -turn
