@@ -1,0 +1,259 @@
+"""Trials configurations: version 0 as in 2016, and version 1, a superset of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from dubins_traffic.cars.body import Car
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.angles import sincos
+from dubins_traffic.problem.faults import parse
+from dubins_traffic.problem.files import Kind, Source, detect, parse_json, plain, read_source
+from dubins_traffic.problem.instance import EAgent
+from dubins_traffic.problem.kinds import kind_of, parameters_of
+from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings, Settings0
+from dubins_traffic.problem.versions import version_of
+from dubins_traffic.roads.network import RoadNetwork
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedAgent:
+    """An e-agent of a configuration: what it is, and where it starts (None: drawn)."""
+
+    agent: EAgent
+    start: Pose | None
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """A checked trials configuration.
+
+    Parameters
+    ----------
+    document : Mapping
+        The document as it was read; `to_document` gives it back.
+    settings : Settings
+        All settings, with defaults.
+    network : RoadNetwork or None
+        The road network, if it is the same in all trials.
+    agents : tuple of PlannedAgent
+        The e-agents, counts multiplied out.
+    file : str or None
+        Where it was read.
+    """
+
+    document: Mapping[str, Any]
+    settings: Settings
+    network: RoadNetwork | None
+    agents: tuple[PlannedAgent, ...]
+    file: str | None = None
+
+    @staticmethod
+    def from_document(
+        document: Mapping[str, Any],
+        file: str | None = None,
+        folder: Path | None = None,
+        rnd: str | os.PathLike[str] | None = None,
+    ) -> Configuration:
+        """Check `document`; a relative path in `rnd` is looked up in `folder`, then in the current directory.
+
+        Parameters
+        ----------
+        document : Mapping
+            A trials configuration, version 0 or 1.
+        file : str, optional
+            Named in messages.
+        folder : Path, optional
+            The folder in which the configuration stands.
+        rnd : path, optional
+            A road network description that overrides the document's.
+
+        Raises
+        ------
+        InputError
+            For the first thing wrong, with its field.
+        """
+        own = plain(document, file)
+        if rnd is not None:
+            own.pop("network", None)
+            own["rnd"] = os.fspath(rnd)
+            folder = None
+        settings = _settings(own, file)
+        try:
+            network = _network(settings.rnd, folder)
+            agents = plan_agents(settings.e_agents)
+            if network is not None:
+                for k, goal in enumerate(settings.goals or ()):
+                    check_goal(network, goal, k)
+        except InputError as error:
+            raise error.within(file=file) from None
+        return Configuration(own, settings, network, agents, file)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the document, equal to the one that was read."""
+        return deepcopy(dict(self.document))
+
+    @property
+    def version(self) -> int:
+        """Version of the document, 0 or 1."""
+        return self.document["version"]
+
+    @property
+    def number_trials(self) -> int:
+        """Number of trials (1 where the document gives none)."""
+        return self.settings.number_trials
+
+    @property
+    def car(self) -> Car:
+        """The car; all cars are alike."""
+        return self.settings.car.core()
+
+
+def load_config(
+    source: str | os.PathLike[str] | Mapping[str, Any], rnd: str | os.PathLike[str] | None = None
+) -> Configuration:
+    """Return the trials configuration at `source`: a file, the name of a shipped one, ``-``, or a document.
+
+    Parameters
+    ----------
+    source : path, str or Mapping
+        A file is preferred to a shipped configuration of the same name.
+    rnd : path, optional
+        A road network description that overrides the configuration's.
+
+    Raises
+    ------
+    InputError
+        If there is no such configuration or something in it is wrong.
+    """
+    if isinstance(source, Mapping):
+        return Configuration.from_document(source, rnd=rnd)
+    found = find_source(source)
+    document = parse_json(found.text, found.name)
+    kind = detect(document, found.name)
+    if kind is not Kind.CONFIGURATION:
+        raise InputError(
+            f"not a trials configuration but a {kind}",
+            file=found.name,
+            value=sorted(document),
+            expected="problem_domain, rnd, e-agents, ...",
+        )
+    return Configuration.from_document(document, found.name, found.folder, rnd)
+
+
+def find_source(name: str | os.PathLike[str]) -> Source:
+    """Return the file called `name`, else the shipped configuration of that name.
+
+    Raises
+    ------
+    InputError
+        If there is neither.
+    """
+    text = os.fspath(name)
+    if text in shipped_names() and not Path(text).is_file():
+        item = files("dubins_traffic.problem") / "configurations" / f"{text}.json"
+        return Source(text, None, item.read_text(encoding="utf-8"))
+    if text != "-" and not Path(text).exists() and not Path(text).suffix and os.sep not in text:
+        known = ", ".join(shipped_names())
+        raise InputError(
+            "no such file or shipped configuration", file=text, expected=f"a file or one of {known}"
+        )
+    return read_source(text)
+
+
+def shipped_names() -> list[str]:
+    """Return the names of the shipped configurations."""
+    folder = files("dubins_traffic.problem") / "configurations"
+    return sorted(item.name.removesuffix(".json") for item in folder.iterdir() if item.name.endswith(".json"))
+
+
+def check_goal(network: RoadNetwork, goal: list[int] | tuple[int, ...], index: int) -> tuple[int, int]:
+    """Return the `index`-th goal as a lattice point.
+
+    Raises
+    ------
+    InputError
+        If it is no intersection of the network.
+    """
+    point = (goal[0], goal[1])
+    try:
+        network.vertex(point)
+    except InputError:
+        raise InputError(
+            "goal is off the network",
+            field=f"goals[{index}]",
+            value=list(point),
+            expected="an intersection of the road network",
+        ) from None
+    return point
+
+
+def pose_of(x: float, y: float, theta: float) -> Pose:
+    """Return the pose at (x, y) with heading `theta`, radians."""
+    cosine, sine = sincos(theta)
+    return Pose(x, y, cosine, sine)
+
+
+def _settings(document: Mapping[str, Any], file: str | None) -> Settings:
+    if version_of(document, file) == 0:
+        parse(Settings0, document, file=file)
+        known = {key: value for key, value in document.items() if key in VERSION_0_KEYS}
+        entries = known.get("e-agents", [])
+        known["e-agents"] = [{"type": entry["type"], "name": entry["name"]} for entry in entries]
+        return parse(Settings, {**known, "ego": {"start": "origin"}}, file=file)
+    return parse(Settings, document, file=file)
+
+
+def _network(rnd: Any, folder: Path | None) -> RoadNetwork | None:
+    if rnd is None:
+        return None
+    if not isinstance(rnd, str):
+        try:
+            return RoadNetwork.from_document(rnd)
+        except InputError as error:
+            raise error.within(field="rnd") from None
+    beside = (folder or Path()) / rnd
+    path = beside if beside.is_file() else Path(rnd)
+    if rnd != "-" and not path.exists():
+        expected = "a file beside the configuration or in the current directory"
+        raise InputError("no such file", field="rnd", value=rnd, expected=expected)
+    return RoadNetwork.read(rnd if rnd == "-" else str(path))
+
+
+def plan_agents(entries: list[AgentEntry]) -> tuple[PlannedAgent, ...]:
+    """Return the e-agents that `entries` of a document stand for, counts multiplied out."""
+    agents: list[PlannedAgent] = []
+    taken: dict[str, str] = {}
+    counters: dict[str, int] = {}
+    for k, entry in enumerate(entries):
+        where = f"e-agents[{k}]"
+        try:
+            kind = kind_of(entry.type)
+            parameters = parameters_of(kind, entry.parameters)
+        except InputError as error:
+            raise error.within(field=where) from None
+        start = pose_of(*entry.start) if entry.start is not None else None
+        for name in _names(entry, counters):
+            if name == "ego" or name in taken:
+                problem = (
+                    "an e-agent can't be called ego" if name == "ego" else f"name taken by {taken[name]}"
+                )
+                raise InputError(problem, field=f"{where}.name", value=name, expected="a name of its own")
+            taken[name] = where
+            agents.append(PlannedAgent(EAgent(kind, name, entry.type, parameters), start))
+    return tuple(agents)
+
+
+def _names(entry: AgentEntry, counters: dict[str, int]) -> list[str]:
+    if entry.count is None:
+        return [entry.name]
+    first = counters.get(entry.name, 0)
+    counters[entry.name] = first + entry.count
+    return [f"{entry.name}{k}" for k in range(first, first + entry.count)]

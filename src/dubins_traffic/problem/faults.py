@@ -1,0 +1,150 @@
+"""What pydantic finds wrong, in the words of `InputError`: file, field, value, expectation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from dubins_traffic.errors import InputError
+
+M = TypeVar("M", bound=BaseModel)
+
+_EXPECTED = {
+    "missing": "this key",
+    "int_type": "an integer",
+    "int_parsing_size": "an integer",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+    "model_attributes_type": "an object",
+    "greater_than": "a number > {gt}",
+    "greater_than_equal": "a number >= {ge}",
+    "less_than": "a number < {lt}",
+    "less_than_equal": "a number <= {le}",
+    "too_short": "at least {min_length} items",
+    "too_long": "at most {max_length} items",
+    "string_pattern_mismatch": "a text matching {pattern}",
+    "literal_error": "{expected}",
+}
+
+
+class Strict(BaseModel):
+    """Base of all models: exact types (no true for 1, no 1.0 for 1), finite numbers, unknown keys refused."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Open(Strict):
+    """The same for documents whose unknown keys are kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+def fault(problem: str, expected: str, field: str = "", value: object = None) -> PydanticCustomError:
+    """Return the error for a validator to raise: what is wrong, and what would have been right.
+
+    `field` and `value` say which part of the validated value is to blame, if not all of it.
+    """
+    context = {"problem": problem, "expected": expected, "field": field, "value": value}
+    return PydanticCustomError("fault", "{problem}", context)
+
+
+def parse(model: type[M], document: object, *, file: str | None = None, field: str | None = None) -> M:
+    """Return `document` as a `model`.
+
+    Raises
+    ------
+    InputError
+        For the first thing wrong, below `field`; says how many more there are.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        first = _translate(model, details[0])
+        if len(details) > 1:
+            first.problem += f" (and {len(details) - 1} more faults)"
+        raise first.within(file=file, field=field) from None
+
+
+def field_path(location: Sequence[int | str]) -> str:
+    """Return a path such as ``rnd.segments[3]``.
+
+    Examples
+    --------
+    >>> field_path(("e-agents", 0, "name"))
+    'e-agents[0].name'
+    """
+    path = ""
+    for part in location:
+        if isinstance(part, int):
+            path += f"[{part}]"
+        else:
+            path += f".{part}" if path else part
+    return path
+
+
+def _translate(model: type[BaseModel], detail: ErrorDetails) -> InputError:
+    kind = detail["type"]
+    context: Mapping[str, Any] = detail.get("ctx", {})
+    field = field_path(detail["loc"]) or None
+    if kind == "missing":
+        return InputError("missing", field=field, expected=_description(model, detail["loc"]))
+    if kind == "fault":
+        below = context["field"]
+        error = InputError(
+            context["problem"],
+            field=below or None,
+            value=context["value"] if below else detail["input"],
+            expected=context["expected"],
+        )
+        return error.within(field=field)
+    if kind == "extra_forbidden":
+        problem, expected = "unknown key", _known_keys(model, detail["loc"])
+    else:
+        problem = "wrong value"
+        expected = _EXPECTED.get(kind, detail["msg"]).format(**context)
+    return InputError(problem, field=field, value=detail["input"], expected=expected)
+
+
+def _owner(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel] | None:
+    """Return the model in which the last key of `location` stands."""
+    current: type[BaseModel] | None = model
+    for part in location[:-1]:
+        if isinstance(part, int) or current is None:
+            continue
+        known = [info for name, info in current.model_fields.items() if (info.alias or name) == part]
+        current = _inner(known[0].annotation) if known else None
+    return current
+
+
+def _inner(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _inner(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def _known_keys(model: type[BaseModel], location: Sequence[int | str]) -> str:
+    owner = _owner(model, location)
+    names = [info.alias or name for name, info in owner.model_fields.items()] if owner else []
+    return "one of " + ", ".join(names) if names else "no such key"
+
+
+def _description(model: type[BaseModel], location: Sequence[int | str]) -> str:
+    owner = _owner(model, location)
+    if owner is not None:
+        for name, info in owner.model_fields.items():
+            if (info.alias or name) == location[-1] and info.description:
+                return info.description
+    return _EXPECTED["missing"]

@@ -1,0 +1,188 @@
+"""Documents as files: reading (by path, name or standard input), telling what they are, writing."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, cast
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.files import read_text, write_text
+
+STANDARD_INPUT = "-"
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+_DEEPEST = 100
+
+
+class Kind(StrEnum):
+    """What a file may hold."""
+
+    NETWORK = "network"
+    CONFIGURATION = "configuration"
+    INSTANCE = "instance"
+    TRIAL_DATA = "trial data"
+    RECORD = "record"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A text that has been read: the name used in messages, its folder (None for standard input), the text."""
+
+    name: str
+    folder: Path | None
+    text: str
+
+
+def read_source(path: str | os.PathLike[str]) -> Source:
+    """Return the text of the file at `path`, or standard input for ``-``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is a folder, a record, or can't be read.
+    """
+    name = os.fspath(path)
+    if is_record(name):
+        raise InputError("a record", file=name, value=name, expected="a document in JSON or a road network")
+    return Source(name, None if name == STANDARD_INPUT else Path(name).parent, read_text(name))
+
+
+def is_record(path: str | os.PathLike[str]) -> bool:
+    """Tell whether the file at `path` begins like a record (MCAP)."""
+    try:
+        with Path(path).open("rb") as stream:
+            return stream.read(len(MCAP_MAGIC)) == MCAP_MAGIC
+    except (OSError, ValueError):
+        return False
+
+
+def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
+    """Return the JSON object in `text`.
+
+    Raises
+    ------
+    InputError
+        If it is not JSON, not an object, has a key twice, a number that is not finite, or is nested too
+        deep.
+    """
+    try:
+        document: object = json.loads(text, object_pairs_hook=_object)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        near = error.doc[error.pos : error.pos + 20]
+        raise InputError(f"not JSON ({error.msg}, {where})", file=file, value=near, expected="JSON") from None
+    except InputError as error:
+        raise error.within(file=file) from None
+    except (RecursionError, ValueError) as error:
+        reason = "nested too deep" if isinstance(error, RecursionError) else "a number has too many digits"
+        raise InputError(f"not a document ({reason})", file=file, expected="a smaller document") from None
+    return plain(document, file=file)
+
+
+def plain(document: object, file: str | None = None) -> dict[str, Any]:
+    """Return a deep copy of a JSON object in plain dictionaries and lists.
+
+    Raises
+    ------
+    InputError
+        If it is not an object, holds what JSON can't, or a number that is not finite.
+    """
+    if not isinstance(document, Mapping):
+        raise InputError("not an object", file=file, value=document, expected="a JSON object")
+    try:
+        return cast("dict[str, Any]", _plain(document, "", 0))
+    except InputError as error:
+        raise error.within(file=file) from None
+
+
+def dumps(document: Mapping[str, Any]) -> str:
+    """Return a JSON object as text, one line per top-level key, floats in shortest round-trip form."""
+    lines = (f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in document.items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+    """Write a JSON object to `path`, whole or not at all; InputError if that can't be done."""
+    write_text(os.fspath(path), dumps(document))
+
+
+def detect(document: Mapping[str, Any], file: str | None = None) -> Kind:
+    """Tell what a JSON document is from its keys.
+
+    Raises
+    ------
+    InputError
+        If it is none of the documents.
+    """
+    keys = document.keys()
+    if keys & {"trialconf", "instances"}:
+        return Kind.TRIAL_DATA
+    if "problem_domain" in keys:
+        return Kind.CONFIGURATION
+    if "starts" in keys or (keys >= {"goals", "rnd"} and not keys & _CONFIGURATION_ONLY):
+        return Kind.INSTANCE
+    if keys & (_CONFIGURATION_ONLY | {"e-agents"}):
+        return Kind.CONFIGURATION
+    if "goals" in keys:
+        return Kind.INSTANCE
+    if keys & {"segments", "shape", "length", "transform"}:
+        return Kind.NETWORK
+    raise InputError(
+        "unknown kind of document",
+        file=file,
+        value=sorted(keys),
+        expected="the keys of a road network, a trials configuration, a problem instance or a trial data file",
+    )
+
+
+_CONFIGURATION_ONLY = frozenset({"number_trials", "duration_bounds", "number_goals_bounds", "network"})
+
+
+def detect_text(text: str, file: str | None = None) -> Kind:
+    """Tell what a text is: a road network in the plain-text container, else as `detect`."""
+    if is_text_network(text):
+        return Kind.NETWORK
+    return detect(parse_json(text, file), file)
+
+
+def is_text_network(text: str) -> bool:
+    """Tell whether `text` is the plain-text container of a road network: ``key: value`` lines."""
+    for line in text.splitlines():
+        bare = line.split("#", 1)[0].strip()
+        if bare:
+            return bare[0] not in '{["' and ":" in bare
+    return False
+
+
+def _object(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in result:
+            raise InputError("key stands twice", field=key, value=value, expected="each key once")
+        result[key] = value
+    return result
+
+
+def _plain(value: object, path: str, depth: int) -> Any:
+    if depth > _DEEPEST:
+        raise InputError("nested too deep", field=path[:60], expected=f"at most {_DEEPEST} levels")
+    if isinstance(value, Mapping):
+        result: dict[str, Any] = {}
+        for key, item in cast("Mapping[object, object]", value).items():
+            if not isinstance(key, str):
+                raise InputError("not a key", field=path or None, value=key, expected="a text")
+            result[key] = _plain(item, f"{path}.{key}" if path else key, depth + 1)
+        return result
+    if isinstance(value, list | tuple):
+        items = cast("list[object]", value)
+        return [_plain(item, f"{path}[{k}]", depth + 1) for k, item in enumerate(items)]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError("not a finite number", field=path, value=value, expected="a finite number")
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise InputError("not a JSON value", field=path, value=value, expected="what JSON can hold")

@@ -1,0 +1,112 @@
+"""The kinds of e-agents, their names of 2016 and their parameters: the one table of them.
+
+The agents' room drives what is listed here; documents are checked against it. `EAgent.parameters` always holds all
+parameters of the kind, defaults filled in, and for a `loop` the cycle that was drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem import limits
+from dubins_traffic.problem.faults import Strict, parse
+
+Speed = Annotated[float, Field(gt=0, le=limits.SPEED)]
+Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
+Seconds = Annotated[float, Field(ge=0, le=limits.SECONDS)]
+LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
+TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class Wander(Strict):
+    """The reference behaviour of 2016: a random walk on the right lanes, turn in place, then drive."""
+
+    speed: Speed = Field(0.5, description="speed between turns, m/s")
+    yaw_rate: Speed = Field(0.9, description="yaw rate of turns in place, rad/s")
+    offset: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.7, description="how far right of the centre line it drives, in lane widths"
+    )
+    bearing_tolerance: Annotated[float, Field(gt=0, le=3)] = Field(
+        0.07, description="it turns in place while the bearing error exceeds this, rad"
+    )
+    waypoint_radius: Annotated[float, Field(gt=0, le=limits.METRES)] = Field(
+        0.075, description="a waypoint is reached within this distance, m"
+    )
+    stop_range: Distance = Field(0.5, description="it stops while a laser return is below this, m")
+    ego_range: Distance = Field(1.0, description="it does not drive while the ego is within this, m")
+
+
+class Loop(Strict):
+    """Drives round a cycle of segments on the right lanes."""
+
+    cycle: list[LatticePoint] | None = Field(
+        None,
+        min_length=2,
+        max_length=limits.GOALS,
+        description="lattice points of the intersections, in order, the last joined to the first; null: drawn",
+    )
+    speed: Speed = Field(0.5, description="speed, m/s")
+    yaw_rate: Speed = Field(0.9, description="largest yaw rate, rad/s")
+    stop_range: Distance = Field(0.5, description="gap to what is ahead at which it stops, m")
+
+
+class Follow(Strict):
+    """Follows behind the ego along the ego's own path."""
+
+    gap: Distance = Field(1.0, description="distance kept behind the ego, along its path, m")
+    speed: Speed = Field(0.5, description="largest speed, m/s")
+    yaw_rate: Speed = Field(0.9, description="largest yaw rate, rad/s")
+    sensing_only: bool = Field(False, description="whether it sees the ego within the sensing radius only")
+
+
+class Parked(Strict):
+    """Stands where it starts and, after a time, drives off as `wander` does."""
+
+    vacates_after: Seconds | None = Field(30.0, description="seconds until it drives off; null: never")
+    speed: Speed = Field(0.5, description="speed once it drives, m/s")
+
+
+class Scripted(Strict):
+    """Plays given commands, then stands."""
+
+    commands: list[TimedCommand] = Field(
+        max_length=limits.COMMANDS, description="a list of [seconds, speed in m/s, yaw rate in rad/s]"
+    )
+    repeat: bool = Field(False, description="whether the commands begin again after the last")
+
+
+KINDS: Mapping[str, type[Strict]] = {
+    "wander": Wander,
+    "loop": Loop,
+    "follow": Follow,
+    "parked": Parked,
+    "scripted": Scripted,
+}
+"""Kinds by name, each with the model of its parameters."""
+
+NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}
+"""Types (package/executable) of 2016, and what they are called here."""
+
+
+def kind_of(name: str) -> str:
+    """Return the kind that `name`, ours or of 2016, stands for.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    kind = NAMES_2016.get(name, name)
+    if kind not in KINDS:
+        known = ", ".join([*KINDS, *NAMES_2016])
+        raise InputError("unknown type of e-agent", field="type", value=name, expected=f"one of {known}")
+    return kind
+
+
+def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the rest."""
+    return parse(KINDS[kind], given, field="parameters").model_dump()

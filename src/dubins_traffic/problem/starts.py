@@ -1,0 +1,125 @@
+"""Where the cars of an instance start."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.body import Car, Obstacle
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.problem.overlap import body_shape, obstacle_shape, overlap
+from dubins_traffic.problem.places import Places
+from dubins_traffic.roads.network import RoadNetwork
+
+ROOMY = 0.5
+"""Gap left between two bodies, metres for w = 0.3 m, while there is room: more than the 0.5 m of free view that the
+reference e-agent needs to set off."""
+TIGHT = 0.1
+"""Gap left between two bodies where that does not fit, metres for w = 0.3 m."""
+
+
+class Wish(NamedTuple):
+    """Where a car is to start: the pose, or None to draw it, and the lanes it may be drawn on (None: all)."""
+
+    pose: Pose | None
+    lanes: Collection[int] | None = None
+
+
+class Ground(NamedTuple):
+    """What starts depend on: the roads, the car, the intersection radius R (metres), the obstacles."""
+
+    network: RoadNetwork
+    car: Car
+    intersection_radius: float
+    obstacles: tuple[Obstacle, ...]
+
+
+def draw_starts(ground: Ground, names: Sequence[str], wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
+    """Return the start poses of all cars.
+
+    Those not given are drawn uniformly over the right lanes' centre lines, headed with the lane, bodies clear of
+    the obstacles, of all discs of intersections and of one another by a gap. Where that does not fit, the cars are
+    packed, then the gap is reduced, then places inside discs are used.
+
+    Raises
+    ------
+    InputError
+        If given starts overlap, or if the cars don't fit; says how many do.
+    """
+    _check_given(ground, names, wishes)
+    poses = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
+    if len(poses) == len(wishes):
+        return [poses[n] for n in range(len(wishes))]
+    free = Places(ground.network, ground.car.w)
+    for obstacle in ground.obstacles:
+        free.block_shape(obstacle_shape(obstacle), ground.car.body.reach)
+    outside = free.copy()
+    outside.block_discs(ground.network.points, ground.intersection_radius + ground.car.body.reach)
+    best = 0
+    for areas in ((outside,), (outside, free)):
+        for gap in (ROOMY, TIGHT) if len(areas) == 1 else (TIGHT,):
+            for packed in (False, True):
+                found = _attempt(areas, gap, packed, ground.car, wishes, draws)
+                if len(found) == len(wishes):
+                    return [found[n] for n in range(len(wishes))]
+                best = max(best, len(found))
+    raise InputError(
+        f"only {best} of {len(wishes)} cars fit on the road network",
+        field="e-agents",
+        value=len(wishes) - 1,
+        expected=f"at most {max(best - 1, 0)} e-agents, or a larger network",
+    )
+
+
+def _attempt(
+    areas: Sequence[Places], gap: float, packed: bool, car: Car, wishes: Sequence[Wish], draws: Draws
+) -> dict[int, Pose]:
+    """Place cars in turn, in the first area that has room for each, until one finds none."""
+    own = [area.copy() for area in areas]
+    radius = 2.0 * car.body.reach + gap * (car.w / 0.3)
+    order = np.array(draws.shuffled(areas[0].lanes), dtype=np.int64) if packed else None
+    found = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
+    for pose in found.values():
+        for area in own:
+            area.block(pose.x, pose.y, radius)
+    drawn = [n for n, wish in enumerate(wishes) if wish.pose is None]
+    for n in sorted(drawn, key=lambda n: wishes[n].lanes is None):
+        lanes = wishes[n].lanes
+        spots = (a.choose(draws, lanes) if order is None else a.first(order, lanes) for a in own)
+        spot = next((spot for spot in spots if spot is not None), None)
+        if spot is None:
+            break
+        pose = found[n] = own[0].pose(*spot)
+        for area in own:
+            area.block(pose.x, pose.y, radius)
+    return found
+
+
+def _check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
+    """Refuse given starts in which a body overlaps another or an obstacle."""
+    given = [
+        (name, wish.pose, body_shape(ground.car.body, wish.pose))
+        for name, wish in zip(names, wishes, strict=True)
+        if wish.pose is not None
+    ]
+    obstacles = [obstacle_shape(obstacle) for obstacle in ground.obstacles]
+    for k, (name, pose, shape) in enumerate(given):
+        for other, _, other_shape in given[:k]:
+            if overlap(shape, other_shape):
+                raise _overlap_error(name, pose, other)
+        for number, obstacle in enumerate(obstacles):
+            if overlap(shape, obstacle):
+                raise _overlap_error(name, pose, f"obstacles[{number}]")
+
+
+def _overlap_error(name: str, pose: Pose, other: str) -> InputError:
+    return InputError(
+        f"the start of {name} overlaps {other}",
+        field=f"start of {name}",
+        value=[pose.x, pose.y, pose.theta],
+        expected="starts clear of other cars and of obstacles",
+    )
