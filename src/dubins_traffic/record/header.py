@@ -24,10 +24,15 @@ class Header:
     versions: Mapping[str, str]
 
 
+def bare_name(controller: str) -> str:
+    """Return the name of a controller without the folders of a path: ``file.py:Class``."""
+    return PurePath(controller).name
+
+
 def encode(instance: Instance, controller: str | None) -> bytes:
     """Return the message on ``/trial``, the same bytes for the same instance, controller and versions.
 
-    Of a controller given by a file's path only the last part of the path is kept.
+    Of a controller given by a file's path only the last part of the path is kept (`bare_name`).
     """
     bounds = instance.problem.car.bounds
     document = {
@@ -37,7 +42,7 @@ def encode(instance: Instance, controller: str | None) -> bytes:
         "libraries": {"mcap": version("mcap")},
         "seed": instance.seed,
         "trial": instance.trial,
-        "controller": None if controller is None else PurePath(controller).name,
+        "controller": None if controller is None else bare_name(controller),
         "rate": instance.problem.rate,
         "cars": list(instance.names),
         "bounds": {

@@ -1,0 +1,68 @@
+"""The collisions of a trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import Ending
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """The ego touched something, at `time` seconds, in the tick that ends in frame `tick`.
+
+    `partner` names the other car, or is ``obstacle k``. `at_fault` tells whether the ego was at fault and
+    `partner_at_fault` whether the other was; an obstacle never is.
+    """
+
+    time: float
+    tick: int
+    car: str
+    partner: str
+    at_fault: bool
+    partner_at_fault: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the collision as a JSON object, with the key `with` for the partner."""
+        return {
+            "time": self.time,
+            "tick": self.tick,
+            "car": self.car,
+            "with": self.partner,
+            "at_fault": self.at_fault,
+            "with_at_fault": self.partner_at_fault,
+        }
+
+
+class Collisions:
+    """Lists the collisions of the ego and counts those among others."""
+
+    def begin(self, instance: Instance) -> None:
+        """Start an empty list."""
+        self._names = instance.names
+        self._found: list[Collision] = []
+        self.among_others = 0
+
+    def frames(self, frames: Frames) -> None:
+        """Take the contacts of a block."""
+        for contact in frames.contacts:
+            if EGO not in (contact.car, contact.other):
+                self.among_others += 1
+                continue
+            fault, partner_fault = contact.at_fault
+            other = contact.other
+            if other == EGO:
+                other, fault, partner_fault = contact.car, partner_fault, fault
+            partner = self._names[other] if other >= 0 else f"obstacle {-1 - other}"
+            ego = self._names[EGO]
+            self._found.append(Collision(contact.time, contact.tick, ego, partner, fault, partner_fault))
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is left to do."""
+
+    def result(self) -> tuple[Collision, ...]:
+        """Return the ego's collisions in order of time."""
+        return tuple(self._found)

@@ -1,0 +1,111 @@
+"""Visits of the goals: which, how often, with what gaps, and completed rounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import Ending
+
+Mask = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+
+
+class GoalDiscs:
+    """The discs of a problem's goals, each goal once, in the order of the document."""
+
+    def __init__(self, instance: Instance) -> None:
+        problem = instance.problem
+        self.goals = tuple(dict.fromkeys(problem.goals))
+        vertices = [problem.network.vertex(goal) for goal in self.goals]
+        self._centres: Floats = np.asarray(problem.network.points)[vertices].reshape(-1, 2)
+        self._radius = problem.intersection_radius
+
+    def inside(self, frames: Frames) -> Mask:
+        """Return whether the ego's centre lies in each disc at each frame, (F, goals)."""
+        x = frames.x[:, EGO, None] - self._centres[:, 0]
+        y = frames.y[:, EGO, None] - self._centres[:, 1]
+        return np.sqrt(x * x + y * y) < self._radius
+
+
+class Rounds:
+    """Counts rounds: whenever all of `goals` goals are done, one round is added and all are to do again."""
+
+    def __init__(self, goals: int) -> None:
+        self.count = 0
+        self._all = (1 << goals) - 1
+        self._done = 0
+
+    def add(self, done: Mask) -> None:
+        """Take the goals done at each of some consecutive frames, (F, goals)."""
+        rows = done[done.any(axis=1)]
+        for row in np.packbits(rows, axis=1, bitorder="little"):
+            self._done |= int.from_bytes(row.tobytes(), "little")
+            if self._done == self._all:
+                self.count += 1
+                self._done = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GoalVisits:
+    """Visits of one goal; `longest_gap_s` is the longest time without one, from frame 0 to the last frame."""
+
+    goal: tuple[int, int]
+    visits: int
+    longest_gap_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Visits:
+    """Visits of all goals, each goal once; `visited` is the share of them visited, 1 without goals."""
+
+    goals: tuple[GoalVisits, ...]
+    visited: float
+    rounds: int
+
+
+class Visiting:
+    """Visits: entries of the ego's centre into a goal's disc, a start inside included (RULES, *Verdicts*).
+
+    A round is complete when every goal has been visited since the last round; without goals there are none.
+    """
+
+    def begin(self, instance: Instance) -> None:
+        """Start counting."""
+        self._discs = GoalDiscs(instance)
+        count = len(self._discs.goals)
+        self._rounds = Rounds(count)
+        self._inside = np.zeros(count, dtype=bool)
+        self._visits = np.zeros(count, dtype=np.int64)
+        self._last = np.zeros(count, dtype=np.int64)
+        self._gap = np.zeros(count, dtype=np.int64)
+        self._end = 0
+        self._rate = instance.problem.rate
+
+    def frames(self, frames: Frames) -> None:
+        """Take a block of frames."""
+        if not len(frames):
+            return
+        inside = self._discs.inside(frames)
+        entered = inside & ~np.vstack([self._inside, inside[:-1]])
+        self._inside = inside[-1]
+        self._end = frames.first + len(frames) - 1
+        self._rounds.add(entered)
+        for at, goal in np.argwhere(entered):
+            tick = frames.first + at
+            self._visits[goal] += 1
+            self._gap[goal] = max(self._gap[goal], tick - self._last[goal])
+            self._last[goal] = tick
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is left to do."""
+
+    def result(self) -> Visits:
+        """Return the visits up to the last frame."""
+        gaps = np.maximum(self._gap, self._end - self._last) / self._rate
+        rows = zip(self._discs.goals, self._visits.tolist(), gaps.tolist(), strict=True)
+        visited = float((self._visits > 0).mean()) if len(self._visits) else 1.0
+        return Visits(tuple(GoalVisits(*row) for row in rows), visited, self._rounds.count)

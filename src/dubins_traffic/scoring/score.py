@@ -1,0 +1,169 @@
+"""The score of a trial: every metric, from one pass over its frames, live or from a record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.record.reader import Record, replay
+from dubins_traffic.record.sink import Ending
+from dubins_traffic.record.wall import Wall
+from dubins_traffic.scoring.clearance import Clearance
+from dubins_traffic.scoring.collisions import Collision, Collisions
+from dubins_traffic.scoring.driving import Driven, Driving
+from dubins_traffic.scoring.goals import GoalVisits, Visiting
+from dubins_traffic.scoring.icra2016 import Icra2016
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """The score of one trial; one element of ``trials`` in ``run --json``.
+
+    Attributes
+    ----------
+    trial, seed : int
+        Number of the trial and the seed from which it follows.
+    end : str or None
+        Why the trial ended; None for a record that was cut off.
+    controller, record : str or None
+        Name of the ego's controller; path of the record.
+    duration_s : float
+        Simulated seconds up to the last frame.
+    icra2016 : float
+        The score of ICRA 2016 (`dubins_traffic.scoring.icra2016`).
+    collisions : tuple of Collision
+        Contacts of the ego, in order of time; `collisions_among_others` counts the rest.
+    rounds : int
+        Rounds counted by visits (`dubins_traffic.scoring.goals`); `goals_visited` is the share of the goals visited
+        at least once, and `goals` tells visits and longest gap of each.
+    driven : Driven
+        Distance, standing, time off the road, departures from the lane (`dubins_traffic.scoring.driving`).
+    min_clearance_m : float or None
+        Smallest gap to any other car or obstacle; None if there is none.
+    time_to_begin_s : float or None
+        Wall-clock seconds of the controller's `start`; None if not measured.
+    """
+
+    trial: int
+    seed: int
+    end: str | None
+    controller: str | None
+    record: str | None
+    duration_s: float
+    icra2016: float
+    collisions: tuple[Collision, ...]
+    collisions_among_others: int
+    rounds: int
+    goals_visited: float
+    goals: tuple[GoalVisits, ...]
+    driven: Driven
+    min_clearance_m: float | None
+    time_to_begin_s: float | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the score as a JSON object; the fields of `driven` stand beside the others."""
+        document: dict[str, Any] = {}
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if name == "collisions":
+                document[name] = [collision.to_json() for collision in self.collisions]
+            elif name == "goals":
+                document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
+            elif name == "driven":
+                document |= asdict(self.driven)
+            else:
+                document[name] = value
+        return document
+
+
+class Scorer:
+    """A sink that holds all metrics of one trial."""
+
+    def __init__(self) -> None:
+        self._icra2016 = Icra2016()
+        self._collisions = Collisions()
+        self._visiting = Visiting()
+        self._driving = Driving()
+        self._clearance = Clearance()
+        self._metrics = (self._icra2016, self._collisions, self._visiting, self._driving, self._clearance)
+
+    def begin(self, instance: Instance) -> None:
+        """Start all metrics."""
+        self._instance = instance
+        self._ending: Ending | None = None
+        self._count = 0
+        for metric in self._metrics:
+            metric.begin(instance)
+
+    def frames(self, frames: Frames) -> None:
+        """Show a block of frames to all metrics."""
+        self._count += len(frames)
+        for metric in self._metrics:
+            metric.frames(frames)
+
+    def end(self, ending: Ending) -> None:
+        """Keep the named end of the trial."""
+        self._ending = ending
+        for metric in self._metrics:
+            metric.end(ending)
+
+    def result(
+        self, *, controller: str | None = None, record: Path | str | None = None, wall: Wall | None = None
+    ) -> Score:
+        """Return the score up to the last frame.
+
+        Parameters
+        ----------
+        controller : str, optional
+            Name of the ego's controller; a path is left out, as in records.
+        record : Path or str, optional
+            Where the record is.
+        wall : Wall, optional
+            What was measured on the wall clock.
+        """
+        visits = self._visiting.result()
+        return Score(
+            trial=self._instance.trial,
+            seed=self._instance.seed,
+            end=None if self._ending is None else self._ending.end.value,
+            controller=None if controller is None else bare_name(controller),
+            record=None if record is None else str(record),
+            duration_s=max(0, self._count - 1) / self._instance.problem.rate,
+            icra2016=self._icra2016.result(),
+            collisions=self._collisions.result(),
+            collisions_among_others=self._collisions.among_others,
+            rounds=visits.rounds,
+            goals_visited=visits.visited,
+            goals=visits.goals,
+            driven=self._driving.result(),
+            min_clearance_m=self._clearance.result(),
+            time_to_begin_s=None if wall is None else wall.time_to_begin_s,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreSheet:
+    """The scores of several trials, in their order."""
+
+    trials: tuple[Score, ...]
+
+    @property
+    def icra2016_sum(self) -> float:
+        """The final score of ICRA 2016: the sum over trials, correctly rounded."""
+        return math.fsum(score.icra2016 for score in self.trials)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``run --json`` and ``score --json`` print."""
+        return {"trials": [score.to_json() for score in self.trials], "icra2016_sum": self.icra2016_sum}
+
+
+def score(record: Record) -> Score:
+    """Score a record: the same numbers as a `Scorer` that saw the trial; also of one that was cut off."""
+    scorer = Scorer()
+    replay(record, [scorer])
+    return scorer.result(controller=record.controller, record=record.file, wall=record.wall)
