@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.roads.network import RoadNetwork
 
 
@@ -23,26 +24,29 @@ def draw_cycle(network: RoadNetwork, draws: Draws) -> list[list[int]]:
         walk.append(following[draws.below(len(following))])
 
 
-def cycle_lanes(network: RoadNetwork, agent: EAgent) -> tuple[int, ...]:
-    """Return the lanes of a loop's cycle, in order.
+def cycle_lanes(network: RoadNetwork, points: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    """Return the lanes of a cycle of lattice points, the last joined to the first (which may stand again at the end).
 
     Raises
     ------
     InputError
         If a point is no intersection or two that follow one another are not joined by a segment.
     """
-    points = agent.parameters["cycle"]
+    if len(points) > 1 and list(points[0]) == list(points[-1]):
+        points = points[:-1]
     lanes: list[int] = []
     for k, point in enumerate(points):
-        field = f"cycle[{k}] of {agent.name}"
+        following = points[(k + 1) % len(points)]
         try:
-            start = network.vertex(tuple(point))
-            end = network.vertex(tuple(points[(k + 1) % len(points)]))
+            start = network.vertex((point[0], point[1]))
+            end = network.vertex((following[0], following[1]))
         except InputError as error:
-            raise error.within(field=field) from None
+            raise error.within(field=f"cycle[{k}]") from None
         lane = next((lane for lane in network.arms(start) if network.lane_ends(lane)[1] == end), None)
         if lane is None:
             expected = "points that follow one another along segments, the last joined to the first"
-            raise InputError("no segment to the next point", field=field, value=point, expected=expected)
+            raise InputError(
+                "no segment to the next point", field=f"cycle[{k}]", value=point, expected=expected
+            )
         lanes.append(lane)
     return tuple(lanes)

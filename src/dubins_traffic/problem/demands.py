@@ -66,24 +66,32 @@ def _check_clearances(network: RoadNetwork, apart: float, aside: float) -> None:
     widest = max(apart, aside)
     for first, second in pairs(*covered(start, end, 0.5 * widest, widest)):
         low, high = np.minimum(first, second), np.maximum(first, second)
-        v, other = high - count, low - count
-        both = (other >= 0) & (v != other)
-        gap = points[v[both]] - points[other[both]]
-        distance = np.sqrt(gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1])
-        if len(distance) and distance.min() < apart - SLACK:
-            k = int(np.argmin(distance))
-            names = [str(list(network.intersections[u[both][k]])) for u in (other, v)]
-            problem = f"intersections {' and '.join(names)} are too close"
-            raise _undefined(problem, "rnd", float(distance[k]), apart)
+        v = high - count
+        both = (low >= count) & (v != low - count)
+        _check_apart(network, low[both] - count, v[both], apart)
         mixed = (low < count) & (v >= 0)
-        s, v = low[mixed], v[mixed]
-        loose = (ends[s, 0] != v) & (ends[s, 1] != v)
-        s, v = s[loose], v[loose]
-        distance = _distance(network, s, points[v])
-        if len(distance) and distance.min() < aside - SLACK:
-            k = int(np.argmin(distance))
-            problem = f"intersection {list(network.intersections[v[k]])} is too close to segments[{s[k]}]"
-            raise _undefined(problem, "rnd", float(distance[k]), aside)
+        _check_aside(network, low[mixed], v[mixed], aside)
+
+
+def _check_apart(network: RoadNetwork, first: Ints, second: Ints, least: float) -> None:
+    gap = network.points[first] - network.points[second]
+    distance = _norm(gap)
+    if len(distance) and float(distance.min()) < least - SLACK:
+        k = int(np.argmin(distance))
+        a, b = (list(network.intersections[int(v[k])]) for v in (first, second))
+        raise _undefined(f"intersections {a} and {b} are too close", "rnd", float(distance[k]), least)
+
+
+def _check_aside(network: RoadNetwork, s: Ints, v: Ints, least: float) -> None:
+    ends = network.ends[s]
+    loose = (ends[:, 0] != v) & (ends[:, 1] != v)
+    s, v = s[loose], v[loose]
+    distance = _distance(network, s, network.points[v])
+    if len(distance) and float(distance.min()) < least - SLACK:
+        k = int(np.argmin(distance))
+        point = list(network.intersections[int(v[k])])
+        problem = f"intersection {point} is too close to segments[{int(s[k])}]"
+        raise _undefined(problem, "rnd", float(distance[k]), least)
 
 
 def _undefined(problem: str, field: str, value: float, least: float) -> InputError:
@@ -100,5 +108,8 @@ def _distance(network: RoadNetwork, s: Ints, p: Floats) -> Floats:
     a = network.points[network.ends[s, 0]]
     t = network.tangents[s]
     along = np.clip((p[:, 0] - a[:, 0]) * t[:, 0] + (p[:, 1] - a[:, 1]) * t[:, 1], 0.0, network.lengths[s])
-    gap = p - a - along[:, None] * t
-    return np.sqrt(gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1])
+    return _norm(p - a - along[:, None] * t)
+
+
+def _norm(vectors: Floats) -> Floats:
+    return np.sqrt(vectors[:, 0] * vectors[:, 0] + vectors[:, 1] * vectors[:, 1])

@@ -87,10 +87,10 @@ def complete_agents(
     """Return the e-agents with everything about them drawn."""
     agents: list[EAgent] = []
     for agent in (plan.agent for plan in planned):
-        if agent.kind == "loop" and agent.parameters["cycle"] is None:
-            parameters = {**agent.parameters, "cycle": draw_cycle(network, draws)}
-            agent = EAgent(agent.kind, agent.name, agent.type, parameters)
-        agents.append(agent)
+        parameters = dict(agent.parameters)
+        if agent.kind == "loop" and parameters["cycle"] is None:
+            parameters["cycle"] = draw_cycle(network, draws)
+        agents.append(EAgent(agent.kind, agent.name, agent.type, parameters))
     return tuple(agents)
 
 
@@ -98,9 +98,16 @@ def agent_wishes(network: RoadNetwork, agents: Sequence[EAgent], given: Sequence
     """Return where each e-agent is to start: as given, else drawn; a loop on its cycle."""
     wishes: list[Wish] = []
     for agent, pose in zip(agents, given, strict=True):
-        lanes = cycle_lanes(network, agent) if agent.kind == "loop" else None
+        lanes = _cycle(network, agent) if agent.kind == "loop" else None
         wishes.append(Wish(pose, lanes))
     return wishes
+
+
+def _cycle(network: RoadNetwork, agent: EAgent) -> tuple[int, ...]:
+    try:
+        return cycle_lanes(network, agent.parameters["cycle"])
+    except InputError as error:
+        raise error.within(field=f"e-agents ({agent.name}).parameters") from None
 
 
 def _draw(configuration: Configuration, seed: int, trial: int) -> Instance:

@@ -92,12 +92,13 @@ def plain(document: object, file: str | None = None) -> dict[str, Any]:
     InputError
         If it is not an object, holds what JSON can't, or a number that is not finite.
     """
-    if not isinstance(document, Mapping):
-        raise InputError("not an object", file=file, value=document, expected="a JSON object")
     try:
-        return cast("dict[str, Any]", _plain(document, "", 0))
+        copy = _plain(document, "", 0)
     except InputError as error:
         raise error.within(file=file) from None
+    if not isinstance(copy, dict):
+        raise InputError("not an object", file=file, value=copy, expected="a JSON object")
+    return cast("dict[str, Any]", copy)
 
 
 def dumps(document: Mapping[str, Any]) -> str:

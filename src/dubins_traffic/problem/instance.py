@@ -50,7 +50,7 @@ class EAgent:
     kind: str
     name: str
     type: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class Instance:
     disturbances: Disturbances = field(default_factory=Disturbances)
     end_on_collision: bool = False
     simulator: str = "embedded"
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def ticks(self) -> int:

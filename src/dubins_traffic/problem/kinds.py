@@ -25,49 +25,53 @@ TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
 class Wander(Strict):
     """The reference behaviour of 2016: a random walk on the right lanes, turn in place, then drive."""
 
-    speed: Speed = Field(0.5, description="speed between turns, m/s")
-    yaw_rate: Speed = Field(0.9, description="yaw rate of turns in place, rad/s")
+    speed: Speed = Field(default=0.5, description="speed between turns, m/s")
+    yaw_rate: Speed = Field(default=0.9, description="yaw rate of turns in place, rad/s")
     offset: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.7, description="how far right of the centre line it drives, in lane widths"
+        default=0.7, description="how far right of the centre line it drives, in lane widths"
     )
     bearing_tolerance: Annotated[float, Field(gt=0, le=3)] = Field(
-        0.07, description="it turns in place while the bearing error exceeds this, rad"
+        default=0.07, description="it turns in place while the bearing error exceeds this, rad"
     )
     waypoint_radius: Annotated[float, Field(gt=0, le=limits.METRES)] = Field(
-        0.075, description="a waypoint is reached within this distance, m"
+        default=0.075, description="a waypoint is reached within this distance, m"
     )
-    stop_range: Distance = Field(0.5, description="it stops while a laser return is below this, m")
-    ego_range: Distance = Field(1.0, description="it does not drive while the ego is within this, m")
+    stop_range: Distance = Field(default=0.5, description="it stops while a laser return is below this, m")
+    ego_range: Distance = Field(default=1.0, description="it does not drive while the ego is within this, m")
 
 
 class Loop(Strict):
     """Drives round a cycle of segments on the right lanes."""
 
     cycle: list[LatticePoint] | None = Field(
-        None,
+        default=None,
         min_length=2,
         max_length=limits.GOALS,
         description="lattice points of the intersections, in order, the last joined to the first; null: drawn",
     )
-    speed: Speed = Field(0.5, description="speed, m/s")
-    yaw_rate: Speed = Field(0.9, description="largest yaw rate, rad/s")
-    stop_range: Distance = Field(0.5, description="gap to what is ahead at which it stops, m")
+    speed: Speed = Field(default=0.5, description="speed, m/s")
+    yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
+    stop_range: Distance = Field(default=0.5, description="gap to what is ahead at which it stops, m")
 
 
 class Follow(Strict):
     """Follows behind the ego along the ego's own path."""
 
-    gap: Distance = Field(1.0, description="distance kept behind the ego, along its path, m")
-    speed: Speed = Field(0.5, description="largest speed, m/s")
-    yaw_rate: Speed = Field(0.9, description="largest yaw rate, rad/s")
-    sensing_only: bool = Field(False, description="whether it sees the ego within the sensing radius only")
+    gap: Distance = Field(default=1.0, description="distance kept behind the ego, along its path, m")
+    speed: Speed = Field(default=0.5, description="largest speed, m/s")
+    yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
+    sensing_only: bool = Field(
+        default=False, description="whether it sees the ego within the sensing radius only"
+    )
 
 
 class Parked(Strict):
     """Stands where it starts and, after a time, drives off as `wander` does."""
 
-    vacates_after: Seconds | None = Field(30.0, description="seconds until it drives off; null: never")
-    speed: Speed = Field(0.5, description="speed once it drives, m/s")
+    vacates_after: Seconds | None = Field(
+        default=30.0, description="seconds until it drives off; null: never"
+    )
+    speed: Speed = Field(default=0.5, description="speed once it drives, m/s")
 
 
 class Scripted(Strict):
@@ -76,7 +80,7 @@ class Scripted(Strict):
     commands: list[TimedCommand] = Field(
         max_length=limits.COMMANDS, description="a list of [seconds, speed in m/s, yaw rate in rad/s]"
     )
-    repeat: bool = Field(False, description="whether the commands begin again after the last")
+    repeat: bool = Field(default=False, description="whether the commands begin again after the last")
 
 
 KINDS: Mapping[str, type[Strict]] = {

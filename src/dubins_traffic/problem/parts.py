@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, create_model, model_validator
 
@@ -36,7 +36,7 @@ _LASER = Laser()
 class DiscModel(Strict):
     """A round body."""
 
-    radius: Length = Field(Disc().radius, description="radius, m")
+    radius: Length = Field(default=Disc().radius, description="radius, m")
 
 
 class RectangleModel(Strict):
@@ -49,8 +49,8 @@ class RectangleModel(Strict):
 class BodyModel(Strict):
     """The body that collides: a disc or a rectangle."""
 
-    disc: DiscModel | None = Field(None, description="a round body")
-    rectangle: RectangleModel | None = Field(None, description="a rectangular body")
+    disc: DiscModel | None = Field(default=None, description="a round body")
+    rectangle: RectangleModel | None = Field(default=None, description="a rectangular body")
 
     @model_validator(mode="after")
     def _one(self) -> BodyModel:
@@ -69,17 +69,17 @@ class BoundsModel(Strict):
     """Bounds on commands."""
 
     speed: Annotated[float, Field(gt=0, le=limits.SPEED)] = Field(
-        _CAR.bounds.speed, description="largest speed, m/s"
+        default=_CAR.bounds.speed, description="largest speed, m/s"
     )
     yaw_rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(
-        _CAR.bounds.yaw_rate, description="largest yaw rate, rad/s; times the period at most 1/2"
+        default=_CAR.bounds.yaw_rate, description="largest yaw rate, rad/s; times the period at most 1/2"
     )
     speed_min: Annotated[float, Field(ge=-limits.SPEED, le=limits.SPEED)] | None = Field(
-        None,
+        default=None,
         description="smallest speed, m/s, at most the largest; null: the car reverses as fast as it drives",
     )
     turning_radius: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        0.0, description="smallest turning radius, m; 0: it turns in place"
+        default=0.0, description="smallest turning radius, m; 0: it turns in place"
     )
 
     @model_validator(mode="after")
@@ -96,9 +96,9 @@ class BoundsModel(Strict):
 class CarModel(Strict):
     """The car; all cars of a trial are alike."""
 
-    w: Length = Field(_CAR.w, description="nominal width that sets the roads (lanes 2w, roads 4w), m")
-    body: BodyModel = Field(BodyModel(disc=DiscModel()), description="the body that collides")
-    bounds: BoundsModel = Field(BoundsModel(), description="bounds on commands")
+    w: Length = Field(default=_CAR.w, description="nominal width that sets the roads (lanes 2w, roads 4w), m")
+    body: BodyModel = Field(default=BodyModel(disc=DiscModel()), description="the body that collides")
+    bounds: BoundsModel = Field(default=BoundsModel(), description="bounds on commands")
 
     def core(self) -> Car:
         """Return the car itself."""
@@ -124,14 +124,18 @@ class CarModel(Strict):
 class LaserModel(Strict):
     """A laser scanner on the car's centre; the defaults are the layout of 2016."""
 
-    rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(_LASER.rays, description="number of rays")
-    angle_min: Angle = Field(_LASER.angle_min, description="bearing of the first ray, rad")
-    angle_max: Angle = Field(_LASER.angle_max, description="bearing of the last ray, rad")
-    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        _LASER.range_min, description="smallest range, m"
+    rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(
+        default=_LASER.rays, description="number of rays"
     )
-    range_max: Length = Field(_LASER.range_max, description="largest range, m")
-    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(_LASER.rate, description="scans per second")
+    angle_min: Angle = Field(default=_LASER.angle_min, description="bearing of the first ray, rad")
+    angle_max: Angle = Field(default=_LASER.angle_max, description="bearing of the last ray, rad")
+    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
+        default=_LASER.range_min, description="smallest range, m"
+    )
+    range_max: Length = Field(default=_LASER.range_max, description="largest range, m")
+    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(
+        default=_LASER.rate, description="scans per second"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> LaserModel:
@@ -177,8 +181,8 @@ class PolygonModel(Strict):
 class ObstacleModel(Strict):
     """A static obstacle: a disc or a polygon."""
 
-    disc: DiscObstacleModel | None = Field(None, description="a disc")
-    polygon: PolygonModel | None = Field(None, description="a simple polygon, convex or not")
+    disc: DiscObstacleModel | None = Field(default=None, description="a disc")
+    polygon: PolygonModel | None = Field(default=None, description="a simple polygon, convex or not")
 
     @model_validator(mode="after")
     def _one(self) -> ObstacleModel:
@@ -205,16 +209,16 @@ class DisturbancesModel(Strict):
     """Seeded disturbances of the ego."""
 
     position_noise: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        0.0, description="standard deviation of the observed position, m"
+        default=0.0, description="standard deviation of the observed position, m"
     )
     heading_noise: Annotated[float, Field(ge=0, le=10)] = Field(
-        0.0, description="standard deviation of the observed heading, rad"
+        default=0.0, description="standard deviation of the observed heading, rad"
     )
     command_delay: Annotated[int, Field(ge=0, le=limits.DELAY)] = Field(
-        0, description="ticks by which commands take effect late"
+        default=0, description="ticks by which commands take effect late"
     )
     command_loss: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="probability that a command is lost and the last one stays in force"
+        default=0.0, description="probability that a command is lost and the last one stays in force"
     )
 
     def core(self) -> Disturbances:
@@ -228,12 +232,17 @@ def _rule_field(name: str, default: float) -> tuple[Any, Any]:
     return (Annotated[float, Field(ge=0, le=limits.METRES)], Field(default, description=name))
 
 
-RulesModel = create_model(
-    "RulesModel",
-    __base__=Strict,
-    __doc__="Parameters of the rules to judge; those left out have their defaults (spec.parameters).",
-    **{name: _rule_field(name, value) for name, value in RuleParameters().to_mapping().items()},  # pyright: ignore
-)
+if TYPE_CHECKING:
+
+    class RulesModel(Strict):
+        """Parameters of the rules to judge."""
+else:
+    RulesModel = create_model(
+        "RulesModel",
+        __base__=Strict,
+        __doc__="Parameters of the rules to judge; those left out have their defaults (spec.parameters).",
+        **{name: _rule_field(name, value) for name, value in RuleParameters().to_mapping().items()},
+    )
 
 
 def _switch(value: object) -> object:
@@ -251,9 +260,9 @@ Rules = Annotated[RulesModel | None, BeforeValidator(_switch), Field(json_schema
 LaserSwitch = Annotated[LaserModel | None, BeforeValidator(_switch), Field(json_schema_extra=_with_switch)]
 
 
-def _check_rnd(value: object) -> object:
+def _check_rnd(value: Any) -> Any:
     if isinstance(value, str | dict) and value:
-        return value
+        return value  # pyright: ignore[reportUnknownVariableType]
     raise fault("not a road network", "a road network description (an object) or the path of one")
 
 

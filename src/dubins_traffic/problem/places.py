@@ -46,6 +46,11 @@ class Places:
         self._low: Floats = np.zeros(len(lanes))
         self._high: Floats = network.lengths[segment].copy()
 
+    @property
+    def count(self) -> int:
+        """Number of lanes of the network."""
+        return len(self._tx)
+
     def copy(self) -> Places:
         """Return a copy that may be cut on its own."""
         twin = object.__new__(Places)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from dubins_traffic.cars.body import Obstacle
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Open, Strict, fault
 from dubins_traffic.problem.instance import Laser
@@ -21,6 +23,7 @@ from dubins_traffic.problem.parts import (
     RoadReference,
     Rules,
 )
+from dubins_traffic.spec.parameters import RuleParameters
 
 NAME = r"^[A-Za-z][A-Za-z0-9_/]*$"
 
@@ -50,28 +53,32 @@ def check_start(value: object) -> object:
     return check_pose(value)
 
 
+def _numbers(value: object) -> list[float]:
+    """Return a list of finite numbers; an empty one if `value` is not that."""
+    row = cast("Sequence[object]", value) if isinstance(value, list | tuple) else ()
+    numbers = [
+        float(x) for x in row if isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e300
+    ]
+    return numbers if len(numbers) == len(row) else []
+
+
 def check_pose(value: object) -> tuple[float, float, float]:
     """Return a pose (x, y, theta), metres and radians."""
-    bounds = (limits.METRES, limits.METRES, 1e6)
-    if isinstance(value, list | tuple) and len(value) == 3:
-        for number, bound in zip(value, bounds, strict=True):
-            if isinstance(number, bool) or not isinstance(number, int | float) or not abs(number) <= bound:
-                break
-        else:
-            return float(value[0]), float(value[1]), float(value[2])
-    raise fault("not a pose", f"[x, y, theta], m and rad, at most {limits.METRES:g} m")
+    row = _numbers(value)
+    if len(row) == 3 and max(abs(row[0]), abs(row[1]), abs(row[2])) <= limits.METRES:
+        return row[0], row[1], row[2]
+    raise fault("not a pose", f"[x, y, theta], m and rad, none above {limits.METRES:g}")
 
 
 def check_heading(value: object) -> tuple[float, ...]:
     """Return a pose (x, y, theta), or (x, y, cos, sin) as it is."""
-    if isinstance(value, list | tuple) and len(value) == 4:
-        numbers = [v for v in value if isinstance(v, int | float) and not isinstance(v, bool)]
-        if len(numbers) == 4 and max(abs(v) for v in numbers[:2]) <= limits.METRES:
-            x, y, c, s = (float(v) for v in numbers)
-            if abs(c * c + s * s - 1.0) <= 1e-6:
-                return x, y, c, s
-        raise fault("not a pose", "[x, y, cos, sin] with a heading of length 1, at most 1e6 m")
-    return check_pose(value)
+    row = _numbers(value)
+    if len(row) != 4:
+        return check_pose(value)
+    x, y, c, s = row
+    if max(abs(x), abs(y)) > limits.METRES or abs(c * c + s * s - 1.0) > 1e-6:
+        raise fault("not a pose", f"[x, y, cos, sin] with a heading of length 1, at most {limits.METRES:g} m")
+    return x, y, c, s
 
 
 POSE_SCHEMA: dict[str, Any] = {
@@ -111,11 +118,13 @@ class AgentEntry(Open):
         description='what drives it: wander, loop, follow, parked, scripted, or "wander/wander"'
     )
     name: str = Field(
-        "agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."
+        default="agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."
     )
-    count: Annotated[int, Field(ge=0, le=limits.CARS)] | None = Field(None, description="how many of them")
-    parameters: dict[str, Any] = Field({}, description="parameters of its kind")
-    start: GivenPose = Field(None, description="[x, y, theta]; left out: drawn")
+    count: Annotated[int, Field(ge=0, le=limits.CARS)] | None = Field(
+        default=None, description="how many of them"
+    )
+    parameters: dict[str, Any] = Field(default={}, description="parameters of its kind")
+    start: GivenPose = Field(default=None, description="[x, y, theta]; left out: drawn")
 
     @model_validator(mode="after")
     def _single_start(self) -> AgentEntry:
@@ -136,9 +145,9 @@ class RandomNetwork(Strict):
         description="number of segments, N - 1 up to floor(2N - 2 sqrt N)"
     )
     min_angle: Annotated[float, Field(gt=0, le=math.pi)] = Field(
-        math.pi / 3, description="smallest angle between two segments at an intersection, rad"
+        default=math.pi / 3, description="smallest angle between two segments at an intersection, rad"
     )
-    rigid_motion: bool = Field(False, description="whether the network is turned and moved at random")
+    rigid_motion: bool = Field(default=False, description="whether the network is turned and moved at random")
 
     @model_validator(mode="after")
     def _possible(self) -> RandomNetwork:
@@ -159,9 +168,9 @@ class GridNetwork(Strict):
 
     rows: Annotated[int, Field(ge=1, le=limits.INTERSECTIONS)] = Field(description="intersections along y")
     columns: Annotated[int, Field(ge=1, le=limits.INTERSECTIONS)] = Field(description="intersections along x")
-    length: Length = Field(3.0, description="length of a segment, m")
-    removed: Annotated[float, Field(ge=0, le=1)] = Field(0.0, description="share of segments removed")
-    rigid_motion: bool = Field(False, description="whether the grid is turned and moved at random")
+    length: Length = Field(default=3.0, description="length of a segment, m")
+    removed: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="share of segments removed")
+    rigid_motion: bool = Field(default=False, description="whether the grid is turned and moved at random")
 
     @model_validator(mode="after")
     def _possible(self) -> GridNetwork:
@@ -173,8 +182,8 @@ class GridNetwork(Strict):
 class NetworkModel(Strict):
     """The road network of each trial, if it is not fixed: random or a grid."""
 
-    random: RandomNetwork | None = Field(None, description="a random planar network")
-    grid: GridNetwork | None = Field(None, description="a grid with segments removed")
+    random: RandomNetwork | None = Field(default=None, description="a random planar network")
+    grid: GridNetwork | None = Field(default=None, description="a grid with segments removed")
 
     @model_validator(mode="after")
     def _one(self) -> NetworkModel:
@@ -187,7 +196,7 @@ class EgoModel(Strict):
     """The ego."""
 
     start: Start = Field(
-        "drawn",
+        default="drawn",
         description='[x, y, theta], "drawn", or "origin" (the world\'s origin if on the road, else drawn)',
     )
 
@@ -199,11 +208,15 @@ class Settings0(Open):
     problem_domain: Literal["dubins_traffic"] = Field(description='"dubins_traffic"')
     rnd: RoadReference = Field(description="a road network description, or the path of one")
     e_agents: list[AgentEntry0] = Field(
-        [], alias="e-agents", max_length=limits.CARS, description="the e-agents"
+        default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
     )
-    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(1, description="number of trials")
-    duration_bounds: DurationBounds = Field([30, 90], description="[low, high], whole seconds, both included")
-    number_goals_bounds: GoalBounds = Field([1, 4], description="[low, high], both included")
+    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(
+        default=1, description="number of trials"
+    )
+    duration_bounds: DurationBounds = Field(
+        default=[30, 90], description="[low, high], whole seconds, both included"
+    )
+    number_goals_bounds: GoalBounds = Field(default=[1, 4], description="[low, high], both included")
 
 
 VERSION_0_KEYS = frozenset(info.alias or name for name, info in Settings0.model_fields.items())
@@ -213,18 +226,24 @@ class World(Open):
     """What configurations and instances of version 1 say alike."""
 
     e_agents: list[AgentEntry] = Field(
-        [], alias="e-agents", max_length=limits.CARS, description="the e-agents"
+        default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
     )
-    intersection_radius: Length | None = Field(None, description="R, m; left out: 1.0 m * w / 0.3 m")
-    car: CarModel = Field(CarModel(), description="the car; all cars are alike")
-    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(30.0, description="control rate, Hz")
-    sensing_radius: Length = Field(5.0, description="distance within which other cars are seen, m")
-    laser: LaserSwitch = Field(None, description="laser; true: the layout of 2016")
-    obstacles: list[ObstacleModel] = Field([], max_length=limits.OBSTACLES, description="static obstacles")
-    disturbances: DisturbancesModel = Field(DisturbancesModel(), description="seeded disturbances of the ego")
-    end_on_collision: bool = Field(False, description="whether a collision of the ego ends the trial")
-    rules: Rules = Field(None, description="rules to judge; true: with all defaults")
-    simulator: Annotated[str, Field(min_length=1)] = Field("embedded", description="name of the simulator")
+    intersection_radius: Length | None = Field(default=None, description="R, m; left out: 1.0 m * w / 0.3 m")
+    car: CarModel = Field(default=CarModel(), description="the car; all cars are alike")
+    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(default=30.0, description="control rate, Hz")
+    sensing_radius: Length = Field(default=5.0, description="distance within which other cars are seen, m")
+    laser: LaserSwitch = Field(default=None, description="laser; true: the layout of 2016")
+    obstacles: list[ObstacleModel] = Field(
+        default=[], max_length=limits.OBSTACLES, description="static obstacles"
+    )
+    disturbances: DisturbancesModel = Field(
+        default=DisturbancesModel(), description="seeded disturbances of the ego"
+    )
+    end_on_collision: bool = Field(default=False, description="whether a collision of the ego ends the trial")
+    rules: Rules = Field(default=None, description="rules to judge; true: with all defaults")
+    simulator: Annotated[str, Field(min_length=1)] = Field(
+        default="embedded", description="name of the simulator"
+    )
 
     @model_validator(mode="after")
     def _bounded(self) -> World:
@@ -232,6 +251,10 @@ class World(Open):
         if total > limits.CARS:
             raise fault("too many e-agents", f"at most {limits.CARS} in all", "e-agents", total)
         check_period(self.rate, self.car)
+        try:
+            RuleParameters.from_mapping(self.rule_parameters)
+        except InputError as error:
+            raise fault(error.problem, error.expected or "", f"rules.{error.field}", error.value) from None
         return self
 
     @property
@@ -260,18 +283,25 @@ class Settings(World):
 
     version: Annotated[int, Field(ge=0, le=1)] = Field(description="1")
     problem_domain: Literal["dubins_traffic"] = Field(description='"dubins_traffic"')
-    rnd: RoadReference = Field(None, description="a road network description, or the path of one")
-    network: NetworkModel | None = Field(None, description="the network of each trial, instead of rnd")
-    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(1, description="number of trials")
+    rnd: RoadReference = Field(default=None, description="a road network description, or the path of one")
+    network: NetworkModel | None = Field(
+        default=None, description="the network of each trial, instead of rnd"
+    )
+    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(
+        default=1, description="number of trials"
+    )
     duration: Seconds | None = Field(
-        None, description="duration of every trial, s, instead of duration_bounds"
+        default=None, description="duration of every trial, s, instead of duration_bounds"
     )
-    duration_bounds: DurationBounds = Field([30, 90], description="[low, high], whole seconds, both included")
+    duration_bounds: DurationBounds = Field(
+        default=[30, 90], description="[low, high], whole seconds, both included"
+    )
     goals: Goals | None = Field(
-        None, description="goals of every trial, lattice points [x, y], instead of number_goals_bounds"
+        default=None,
+        description="goals of every trial, lattice points [x, y], instead of number_goals_bounds",
     )
-    number_goals_bounds: GoalBounds = Field([1, 4], description="[low, high], both included")
-    ego: EgoModel = Field(EgoModel(), description="the ego")
+    number_goals_bounds: GoalBounds = Field(default=[1, 4], description="[low, high], both included")
+    ego: EgoModel = Field(default=EgoModel(), description="the ego")
 
     @model_validator(mode="after")
     def _consistent(self) -> Settings:
@@ -291,7 +321,7 @@ class InstanceModel0(Open):
     version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
     goals: Goals = Field(description="lattice points [x, y] of intersections to visit again and again")
     rnd: RoadReference = Field(description="a road network description")
-    intersection_radius: Length = Field(1.0, description="R, m")
+    intersection_radius: Length = Field(default=1.0, description="R, m")
 
 
 INSTANCE_0_KEYS = frozenset(InstanceModel0.model_fields)
@@ -304,14 +334,17 @@ class InstanceModel(World):
     goals: Goals = Field(description="lattice points [x, y] of intersections to visit again and again")
     rnd: RoadReference = Field(description="a road network description")
     starts: dict[str, GivenHeading] = Field(
-        {}, description="start of each car by name: [x, y, cos, sin] or [x, y, theta]; left out: drawn"
+        default={},
+        description="start of each car by name: [x, y, cos, sin] or [x, y, theta]; left out: drawn",
     )
-    duration: Seconds | None = Field(None, description="duration, s; left out: drawn, 30 to 90 whole seconds")
+    duration: Seconds | None = Field(
+        default=None, description="duration, s; left out: drawn, 30 to 90 whole seconds"
+    )
     seed: Annotated[int, Field(ge=0, lt=limits.SEEDS)] | None = Field(
-        None, description="seed of all random numbers"
+        default=None, description="seed of all random numbers"
     )
     trial: Annotated[int, Field(ge=0, lt=limits.TRIALS)] | None = Field(
-        None, description="number of the trial"
+        default=None, description="number of the trial"
     )
 
     @model_validator(mode="after")

@@ -81,7 +81,7 @@ def _attempt(
     """Place cars in turn, in the first area that has room for each, until one finds none."""
     own = [area.copy() for area in areas]
     radius = 2.0 * car.body.reach + gap * (car.w / 0.3)
-    order = np.array(draws.shuffled(areas[0].lanes), dtype=np.int64) if packed else None
+    order = np.array(draws.shuffled(areas[0].count), dtype=np.int64) if packed else None
     found = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
     for pose in found.values():
         for area in own:
