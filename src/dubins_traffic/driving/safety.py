@@ -1,0 +1,69 @@
+"""The last look before a tick: no motion that could bring about a contact."""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.trig import advance
+
+GUARD = 0.01
+"""What is kept free beyond the other's worst motion, metres."""
+
+
+@jit
+def motion_is_safe(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    speed: float,
+    yaw_rate: float,
+    period: float,
+    half_length: float,
+    half_width: float,
+    rounding: float,
+    reach: float,
+    ox: float,
+    oy: float,
+    oc: float,
+    os: float,
+    o_length: float,
+    o_width: float,
+    o_rounding: float,
+    o_travel: float,
+) -> bool:
+    """Whether a motion for one tick can't touch another body, or leads away from it.
+
+    Parameters
+    ----------
+    x, y, c, s, speed, yaw_rate, period : float
+        Pose and command of the car that looks, and the tick's length.
+    half_length, half_width, rounding, reach : float
+        Its body (a rounded box) and the farthest of its points.
+    ox, oy, oc, os, o_length, o_width, o_rounding : float
+        The other body.
+    o_travel : float
+        How far any point of the other may get in the tick, 0 if it can't move.
+
+    Notes
+    -----
+    A car that stands is never at fault in a collision, and neither is one that moves away.
+    """
+    turns = abs(yaw_rate) * reach if half_length + half_width > 0.0 else 0.0
+    own = (abs(speed) + turns) * period
+    if own == 0.0:
+        return True
+    gap, _, _, _, _ = separation(
+        x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
+    )
+    if gap > own + o_travel + GUARD:
+        return True
+    least = gap
+    last = gap
+    for k in range(1, 5):
+        nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, 0.25 * k * period)
+        last, _, _, _, _ = separation(
+            nx, ny, nc, ns, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
+        )
+        least = min(least, last)
+    return least > o_travel + GUARD or (least == gap and last - gap > 0.2 * own)

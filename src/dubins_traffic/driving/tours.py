@@ -1,0 +1,219 @@
+"""Rounds: closed routes along lanes through all goals, and ways to join them.
+
+A route is a sequence of lanes, each a successor of the one before (`RoadNetwork.successors`: turning round only at
+a dead end). It is as long as its lanes together, plus what its turns cost.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, permutations
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats
+
+if TYPE_CHECKING:
+    from dubins_traffic.roads.network import RoadNetwork
+
+EXACT = 7
+"""Up to so many goals the shortest of all rounds is found; more are taken each time nearest first."""
+
+TurnCost = Callable[[int, int], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """A closed route: `lanes` in order, the first following the last; `arrivals` are the places in `lanes` of the
+    lanes that end in a goal as it is reached, `length` is in metres.
+    """
+
+    lanes: tuple[int, ...]
+    arrivals: tuple[int, ...]
+    length: float
+
+
+class LaneGraph:
+    """The lanes of a network with their lengths, successors and costs of turning, metres.
+
+    `turn_cost` (from lane, to lane) is asked once for each pair; without it turning is free.
+    """
+
+    def __init__(self, network: RoadNetwork, turn_cost: TurnCost | None = None) -> None:
+        lengths: list[float] = network.lengths.tolist()
+        self.count = network.lanes
+        self.length = [lengths[lane >> 1] for lane in range(self.count)]
+        self.end = [network.lane_ends(lane)[1] for lane in range(self.count)]
+        self.after: list[list[tuple[int, float]]] = []
+        self.before: list[list[tuple[int, float]]] = [[] for _ in range(self.count)]
+        for lane in range(self.count):
+            steps: list[tuple[int, float]] = []
+            for other in network.successors(lane):
+                turn = turn_cost(lane, other) if turn_cost is not None else 0.0
+                cost = max(0.0, self.length[other] + turn)
+                steps.append((other, cost))
+                self.before[other].append((lane, cost))
+            self.after.append(steps)
+        self.into: list[list[int]] = [[] for _ in range(len(network.intersections))]
+        for lane, v in enumerate(self.end):
+            self.into[v].append(lane)
+
+    def distances(self, target: int, penalty: TurnCost | None = None) -> list[float]:
+        """Return metres from the end of each lane to the end of the lane `target`, driving on from there."""
+        found = [inf] * self.count
+        found[target] = 0.0
+        heap = [(0.0, target)]
+        while heap:
+            far, lane = heapq.heappop(heap)
+            if far > found[lane]:
+                continue
+            for other, cost in self.before[lane]:
+                total = far + cost + (penalty(other, lane) if penalty is not None else 0.0)
+                if total < found[other]:
+                    found[other] = total
+                    heapq.heappush(heap, (total, other))
+        return found
+
+    def step(
+        self, lane: int, distances: Sequence[float], penalty: TurnCost | None = None
+    ) -> tuple[int, float]:
+        """Return the next lane toward the target of `distances`, and metres to it by way of that lane (or -1, inf).
+
+        At the target itself this begins another way round to it.
+        """
+        best, least = -1, inf
+        for other, cost in self.after[lane]:
+            total = cost + distances[other] + (penalty(lane, other) if penalty is not None else 0.0)
+            if total < least:
+                best, least = other, total
+        return best, least
+
+    def route(
+        self, lane: int, target: int, distances: Sequence[float], penalty: TurnCost | None = None
+    ) -> list[int]:
+        """Return the lanes after `lane` up to `target`: at least one, so from `target` itself once round."""
+        lanes: list[int] = []
+        while lane >= 0 and (lane != target or not lanes):
+            lane = self.step(lane, distances, penalty)[0]
+            if lane >= 0:
+                lanes.append(lane)
+        return lanes
+
+
+def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
+    """Return a short round through the intersections `goals` (numbers; duplicates count once).
+
+    Up to `EXACT` goals it is the shortest there is: for every cyclic order of the goals and every choice of the
+    lane by which each is reached. With more goals, each time the nearest one not yet visited is taken. None without
+    goals or if no round reaches them all.
+    """
+    distinct = tuple(dict.fromkeys(goals))
+    if not distinct:
+        return None
+    if len(distinct) > EXACT:
+        return _nearest_first(graph, distinct)
+    tables = [[graph.distances(lane) for lane in graph.into[goal]] for goal in distinct]
+    legs = {
+        (a, b): _leg(graph, graph.into[distinct[a]], tables[b])
+        for a in range(len(distinct))
+        for b in range(len(distinct))
+        if a != b or len(distinct) == 1
+    }
+    best, least = None, inf
+    for rest in permutations(range(1, len(distinct))):
+        order = (0, *rest)
+        whole = _chain(order, legs)
+        closing = np.diagonal(whole)
+        if float(closing.min()) < least:
+            best, least = order, float(closing.min())
+    if best is None:
+        return None
+    return _trace(graph, distinct, best, legs, tables, least)
+
+
+def _leg(graph: LaneGraph, sources: Sequence[int], tables: Sequence[Sequence[float]]) -> Floats:
+    return np.array([[graph.step(lane, table)[1] for table in tables] for lane in sources])
+
+
+def _chain(order: tuple[int, ...], legs: dict[tuple[int, int], Floats]) -> Floats:
+    total: Floats | None = None
+    for a, b in zip(order, order[1:] + order[:1], strict=True):
+        leg = legs[a, b]
+        total = leg if total is None else np.min(total[:, :, None] + leg[None, :, :], axis=1)
+    assert total is not None
+    return total
+
+
+def _trace(
+    graph: LaneGraph,
+    goals: tuple[int, ...],
+    order: tuple[int, ...],
+    legs: dict[tuple[int, int], Floats],
+    tables: Sequence[Sequence[Sequence[float]]],
+    length: float,
+) -> Round:
+    """Drive the best round of an order and note its lanes, from the first goal to itself."""
+    closed = (*order, order[0])
+    start = int(np.argmin(np.diagonal(_chain(order, legs))))
+    to_go: list[Floats] = [np.where(np.arange(len(graph.into[goals[order[0]]])) == start, 0.0, inf)]
+    for a, b in reversed(list(pairwise(closed))):
+        to_go.append(np.min(legs[a, b] + to_go[-1][None, :], axis=1))
+    to_go.reverse()
+    lanes: list[int] = []
+    arrivals: list[int] = []
+    at = start
+    for k, (a, b) in enumerate(pairwise(closed)):
+        following = int(np.argmin(legs[a, b][at] + to_go[k + 1]))
+        target = graph.into[goals[b]][following]
+        lanes += graph.route(graph.into[goals[a]][at], target, tables[b][following])
+        arrivals.append(len(lanes) - 1)
+        at = following
+    return Round(tuple(lanes), tuple(arrivals), length)
+
+
+def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
+    first = graph.into[goals[0]][0]
+    lanes: list[int] = []
+    arrivals: list[int] = []
+    length, lane = 0.0, first
+    missing = set(goals[1:])
+    while missing:
+        leg, far = _search(graph, lane, lambda other: graph.end[other] in missing)
+        if not leg:
+            return None
+        lanes += leg
+        length += far
+        lane = leg[-1]
+        arrivals.append(len(lanes) - 1)
+        missing.discard(graph.end[lane])
+    leg, far = _search(graph, lane, lambda other: other == first)
+    lanes += leg
+    arrivals.append(len(lanes) - 1)
+    return Round(tuple(lanes), tuple(arrivals), length + far) if leg else None
+
+
+def _search(graph: LaneGraph, lane: int, wanted: Callable[[int], bool]) -> tuple[list[int], float]:
+    """Return the shortest route from the end of `lane` to the end of a wanted lane, and its metres."""
+    found: dict[int, float] = {}
+    came: dict[int, int] = {}
+    heap = [(cost, other, -1) for other, cost in graph.after[lane]]
+    heapq.heapify(heap)
+    while heap:
+        far, at, source = heapq.heappop(heap)
+        if at in found:
+            continue
+        found[at] = far
+        came[at] = source
+        if wanted(at):
+            leg = [at]
+            while came[leg[-1]] >= 0:
+                leg.append(came[leg[-1]])
+            return leg[::-1], far
+        for other, cost in graph.after[at]:
+            if other not in found:
+                heapq.heappush(heap, (far + cost, other, at))
+    return [], inf
