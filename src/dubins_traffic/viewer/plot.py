@@ -27,6 +27,7 @@ SUFFIXES = (".pdf", ".png", ".svg")
 SIDE_RANGE = (4.5, 13.0)
 INCHES_PER_METRE = 0.55
 MARGIN = 0.5
+KERB = 0.03
 LABEL_POINTS = 8.0
 LEGEND_COLUMN = 1.15
 LEGEND_ROW = 0.2
@@ -143,7 +144,7 @@ class _Canvas:
 
         network, half = self.network, 0.5 * self.car.road_width
         lines = network.points[network.ends]
-        thin = max(0.35, 0.03 * self.points)
+        thin = max(0.35, KERB * self.points)
         for width, colour in (
             (2.0 * half * self.points + 2.0 * thin, palette.KERB_COLOUR),
             (2.0 * half * self.points, palette.ROAD_COLOUR),
@@ -216,25 +217,25 @@ class _Canvas:
             self.things.setdefault("obstacle", patch)
 
     def cars(self, instance: Instance, poses: Sequence[Pose], *, ghost: bool = False) -> None:
-        """Draw bodies with their headings; a `ghost` is an outline, for starts beside ends."""
+        """Draw bodies with their headings; a `ghost` is an outline, for starts beside ends.
+
+        So many cars that colours come again bear their names, and only the ego stands in the legend.
+        """
+        crowd = len(poses) > 1 + len(palette.AGENT_COLOURS)
         for index, (name, pose) in reversed(list(enumerate(zip(instance.names, poses, strict=True)))):
             colour = palette.car_colour(index)
             body = _outline(self.car.body, pose)
-            fill = "none" if ghost else colour
-            edge = colour if ghost else palette.INK_COLOUR
-            (shape,) = self.axes.fill(
-                body[:, 0],
-                body[:, 1],
-                facecolor=fill,
-                edgecolor=edge,
-                linewidth=1.0,
-                zorder=5 if ghost else 6,
-            )
+            fill, edge = ("white", colour) if ghost else (colour, palette.INK_COLOUR)
+            order = 5 if ghost else 6
+            (shape,) = self.axes.fill(*body.T, facecolor=fill, edgecolor=edge, linewidth=1.0, zorder=order)
             tip = _nose(self.car.body, pose)
-            self.axes.fill(
-                tip[:, 0], tip[:, 1], facecolor=edge if ghost else "white", edgecolor="none", zorder=7
-            )
-            if not ghost:
+            self.axes.fill(*tip.T, facecolor=edge if ghost else "white", edgecolor="none", zorder=order)
+            if ghost:
+                continue
+            if crowd:
+                above = np.array([pose.x, pose.y + self.car.body.reach + 5.0 / self.points])
+                self._text(above, name, 5.5, palette.INK_COLOUR, 9, halo=True)
+            if index == 0 or not crowd:
                 self.handles.append((name, shape))
 
     def trial(self, instance: Instance, frames: Frames) -> None:
@@ -318,8 +319,18 @@ class _Canvas:
         )
 
     def _text(
-        self, place: Floats, text: str, size: float, colour: str, order: float, *, bold: bool = False
+        self,
+        place: Floats,
+        text: str,
+        size: float,
+        colour: str,
+        order: float,
+        *,
+        bold: bool = False,
+        halo: bool = False,
     ) -> None:
+        from matplotlib.patheffects import withStroke
+
         self.axes.text(
             float(place[0]),
             float(place[1]),
@@ -330,6 +341,7 @@ class _Canvas:
             va="center",
             zorder=order,
             fontweight="bold" if bold else "normal",
+            path_effects=[withStroke(linewidth=1.4, foreground="white")] if halo else None,
             parse_math=False,
             clip_on=True,
         )

@@ -1,0 +1,230 @@
+"""The replay page in a real browser: it opens without errors, plays, scrubs, and obeys the keyboard."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.wait import WebDriverWait
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import End, Ending
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.viewer.marks import Mark
+from dubins_traffic.viewer.replay import write_replay
+from tests.synthetic import ROUGH, driven, instance, obstacles_beside
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+FLAGS = (
+    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --window-size=1280,800"
+)
+NASTY = "</script><script>window.broken = true</script>"
+PICTURE = "return document.getElementById('map').toDataURL()"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    if CHROMIUM is None or DRIVER is None:
+        reason = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def trial() -> tuple[Instance, Frames]:
+    grid = RoadNetwork.grid(3, 4)
+    return driven(
+        instance(grid, 6, 30.0, names=(NASTY, "b", "c", "d", "e"), obstacles=obstacles_beside(grid))
+    )
+
+
+@pytest.fixture
+def page(
+    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
+) -> Iterator[webdriver.Chrome]:
+    """The page of `trial`, open; whatever a test does there must leave the browser's log empty."""
+    tried, frames = trial
+    path = tmp_path / "replay.html"
+    marks = [Mark(9.0, "breach", "rule 2: ego", 0, (1.0, 1.0), since=4.0)]
+    write_replay(path, tried, frames, Ending(End.DURATION, len(frames) - 1), {"rounds": 2}, marks)
+    browser.set_window_size(1280, 800)
+    browser.get(path.as_uri())
+    WebDriverWait(browser, 20).until(
+        lambda driver: driver.execute_script("return window.replay?.ready === true")
+    )
+    yield browser
+    assert browser.get_log("browser") == []
+
+
+def ask(page: webdriver.Chrome, what: str) -> Any:
+    return page.execute_script(f"return window.replay.{what}")
+
+
+def element(page: webdriver.Chrome, name: str) -> WebElement:
+    return page.find_element(By.ID, name)
+
+
+def press(page: webdriver.Chrome, *keys: str) -> None:
+    ActionChains(page).send_keys(*keys).perform()
+
+
+def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
+    tried, _ = trial
+    assert page.title.startswith("Trial 2 of seed 7")
+    assert element(page, "ending").text == "End: duration"
+    rows = page.find_elements(By.CSS_SELECTOR, "#cars tbody tr")
+    assert [row.find_element(By.TAG_NAME, "span").text for row in rows] == list(tried.names)
+    assert len(page.find_elements(By.CSS_SELECTOR, "#goals li")) == len(tried.problem.goals)
+    assert "rule 2: ego" in element(page, "events").get_attribute("textContent")
+    assert page.execute_script("return window.broken === undefined")
+    colours = page.execute_script(
+        "const c = document.getElementById('map');"
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        "const seen = new Set(); for (let i = 0; i < d.length; i += 4) seen.add(d[i] << 16 | d[i+1] << 8 | d[i+2]);"
+        "return seen.has(0x0072b2) && seen.has(0xcdd1d7) && seen.has(0xe69f00)"
+    )
+    assert colours is True
+
+
+def test_plays_pauses_and_stops_at_the_end(page: webdriver.Chrome) -> None:
+    before = page.execute_script(PICTURE)
+    assert ask(page, "playing") is False
+    element(page, "play").click()
+    WebDriverWait(page, 10).until(lambda _: ask(page, "time") > 0.3)
+    assert ask(page, "playing") is True
+    assert float(element(page, "slider").get_property("value")) > 0.0
+    element(page, "play").click()
+    stopped = ask(page, "time")
+    assert ask(page, "playing") is False
+    assert page.execute_script(PICTURE) != before
+    assert ask(page, "time") == stopped
+    page.execute_script(
+        "const s = document.getElementById('speed'); s.value = '16'; s.dispatchEvent(new Event('change'))"
+    )
+    page.execute_script("replay.seek(28); replay.play()")
+    WebDriverWait(page, 10).until(lambda _: ask(page, "playing") is False)
+    assert ask(page, "time") == 30.0
+    assert ask(page, "frame") == 900
+
+
+def test_scrubbing_draws_the_frame_of_that_time(
+    page: webdriver.Chrome, trial: tuple[Instance, Frames]
+) -> None:
+    _, frames = trial
+    before = page.execute_script(PICTURE)
+    slider = element(page, "slider")
+    width = slider.size["width"]
+    ActionChains(page).move_to_element_with_offset(slider, int(0.25 * width), 0).click().perform()
+    frame = ask(page, "frame")
+    assert frame == pytest.approx(0.75 * 900, abs=15)
+    assert page.execute_script(PICTURE) != before
+    origin = page.execute_script("return JSON.parse(document.getElementById('data').textContent).origin")
+    for car in (0, 3):
+        pose = ask(page, f"pose({car})")
+        assert pose["x"] + origin[0] == pytest.approx(frames.x[frame, car], abs=0.02)
+        assert pose["y"] + origin[1] == pytest.approx(frames.y[frame, car], abs=0.02)
+    page.execute_script(
+        "const s = document.getElementById('slider'); s.value = 10;"
+        "s.dispatchEvent(new Event('input', {bubbles: true}))"
+    )
+    assert ask(page, "time") == pytest.approx(10.0)
+    assert slider.get_attribute("aria-valuetext") == "10.00 s of 30.00 s"
+    ask(page, "seek(99)")
+    assert ask(page, "time") == 30.0
+
+
+def test_between_frames_cars_move_evenly(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
+    _, frames = trial
+    ask(page, "seek(100.5 / 30)")
+    origin = page.execute_script("return JSON.parse(document.getElementById('data').textContent).origin")
+    assert ask(page, "pose(1)")["x"] + origin[0] == pytest.approx(frames.x[100:102, 1].mean(), abs=1e-4)
+
+
+def test_the_keyboard_does_it_all(page: webdriver.Chrome) -> None:
+    press(page, Keys.SPACE)
+    WebDriverWait(page, 10).until(lambda _: ask(page, "playing") and ask(page, "time") > 0)
+    press(page, Keys.SPACE)
+    assert ask(page, "playing") is False
+    element(page, "play").click()
+    press(page, Keys.SPACE)
+    assert ask(page, "playing") is False
+    press(page, Keys.HOME)
+    press(page, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT)
+    assert ask(page, "frame") == 2
+    ActionChains(page).key_down(Keys.SHIFT).send_keys(Keys.ARROW_RIGHT).key_up(Keys.SHIFT).perform()
+    assert ask(page, "time") == pytest.approx(1.0 + 2 / 30)
+    press(page, Keys.END)
+    assert ask(page, "frame") == 900
+    for key, name in (("f", "follow"), ("t", "trails"), ("l", "labels"), ("n", "lanes"), ("r", "sensing")):
+        before, picture = element(page, name).is_selected(), page.execute_script(PICTURE)
+        press(page, key)
+        assert element(page, name).is_selected() is not before
+        assert page.execute_script(PICTURE) != picture, name
+    press(page, ">")
+    assert element(page, "speed").get_property("value") == "2"
+
+
+def test_zooms_pans_and_fits(page: webdriver.Chrome) -> None:
+    fitted = page.execute_script(PICTURE)
+    element(page, "zoom-in").click()
+    zoomed = page.execute_script(PICTURE)
+    ActionChains(page).drag_and_drop_by_offset(element(page, "map"), 80, 40).perform()
+    assert len({fitted, zoomed, page.execute_script(PICTURE)}) == 3
+    element(page, "fit").click()
+    assert page.execute_script(PICTURE) == fitted
+
+
+def test_choosing_a_car_or_an_event_leads_there(page: webdriver.Chrome) -> None:
+    page.find_elements(By.CSS_SELECTOR, "#cars tbody button")[2].click()
+    assert element(page, "chosen").text == "b"
+    assert all(label.text.startswith("b_") for label in page.find_elements(By.CSS_SELECTOR, "#current code"))
+    press(page, Keys.ESCAPE)
+    page.execute_script("[...document.querySelectorAll('#events .breach button')][0].click()")
+    assert ask(page, "time") == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("width", [360, 820, 1280])
+def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) -> None:
+    size = {"width": width, "height": 780, "deviceScaleFactor": 2, "mobile": width < 600}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        assert page.execute_script("return document.documentElement.scrollWidth") <= width
+        assert element(page, "play").is_displayed()
+        light = page.execute_script(PICTURE)
+        element(page, "theme").click()
+        assert page.execute_script("return document.documentElement.dataset.theme") == "dark"
+        assert page.execute_script(PICTURE) != light
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_a_single_frame_and_rectangles_open_too(browser: webdriver.Chrome, tmp_path: Path) -> None:
+    tried, frames = driven(instance(ROUGH, 3, 0.0, rectangles=True, obstacles=obstacles_beside(ROUGH)))
+    assert len(frames) == 1
+    write_replay(tmp_path / "one.html", tried, frames, None)
+    browser.get((tmp_path / "one.html").as_uri())
+    assert ask(browser, "ready") is True
+    element(browser, "play").click()
+    assert ask(browser, "playing") is False
+    assert element(browser, "ending").text == "The record was cut off"
+    assert browser.get_log("browser") == []
