@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.body import Bounds, Car, DiscObstacle, PolygonObstacle, Rectangle
-from dubins_traffic.cars.motion import clip
 from dubins_traffic.simulators.embedded import Embedded
 from tests.batches import pose, scene
 
@@ -19,11 +18,23 @@ def drive(instance, ticks, *commands):
     return simulator.state, contacts
 
 
-def test_clip_bounds_speed_first_then_yaw_rate() -> None:
-    assert clip(2.0, -9.0, -0.7, 0.7, 3.0, 0.0) == (0.7, -3.0)
-    assert clip(-2.0, 1.0, -0.7, 0.7, 3.0, 0.0) == (-0.7, 1.0)
-    assert clip(0.1, 1.0, 0.4, 0.7, 3.0, 1.0) == (0.4, 0.4)
-    assert clip(0.0, 1.0, -0.7, 0.7, 3.0, 1.0) == (0.0, 0.0)
+@pytest.mark.parametrize(
+    ("bounds", "asked", "given"),
+    [
+        (Bounds(speed=0.7, yaw_rate=3.0), (2.0, -9.0), (0.7, -3.0)),
+        (Bounds(speed=0.7, yaw_rate=3.0), (-2.0, 1.0), (-0.7, 1.0)),
+        (Bounds(speed=0.7, yaw_rate=3.0, speed_min=0.0), (-2.0, 1.0), (0.0, 1.0)),
+        (Bounds(speed=0.7, yaw_rate=3.0, speed_min=0.4, turning_radius=1.0), (0.1, 1.0), (0.4, 0.4)),
+        (Bounds(speed=0.7, yaw_rate=3.0, turning_radius=1.0), (0.0, 1.0), (0.0, 0.0)),
+        (Bounds(speed=0.7, yaw_rate=3.0, turning_radius=0.1), (-0.7, -9.0), (-0.7, -3.0)),
+    ],
+)
+def test_commands_are_clipped_speed_first(bounds, asked, given) -> None:
+    simulator = Embedded()
+    simulator.reset([scene([pose(0, 0)], Car(bounds=bounds))])
+    commands = np.array([[asked]])
+    simulator.step(commands)
+    assert commands[0, 0].tolist() == list(given)
 
 
 def test_a_dubins_car_cannot_stand_or_turn_sharply() -> None:

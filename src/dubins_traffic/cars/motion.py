@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dubins_traffic.cars.near import candidates
+from dubins_traffic.cars.near import FEW, candidates
+from dubins_traffic.cars.rows import Rows, clip, look, move
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -67,22 +68,12 @@ def workspace(trials: int, cars: int) -> Workspace:
 
 
 @jit
-def clip(
-    speed: float, yaw: float, low: float, high: float, most: float, radius: float
-) -> tuple[float, float]:
-    """Return the nearest admissible speed, then the nearest yaw rate admissible at that speed."""
-    speed = min(max(speed, low), high)
-    if radius > 0.0:
-        most = min(most, abs(speed) / radius)
-    return speed, min(max(yaw, -most), most)
-
-
-@jit
 def step(
     state: State,
     commands: Floats,
     cars: CarTable,
     obstacles: ObstacleTable,
+    r: Rows,
     dt: float,
     work: Workspace,
     first: int,
@@ -93,33 +84,62 @@ def step(
     contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
     """
     work.found[0] = 0
-    trials = state.count.shape[0]
-    for b in range(first, trials):
-        n = state.count[b]
-        if work.found[0] + n > work.contact.shape[0]:
-            return b
-        fastest = 0.0
-        for i in range(n):
-            speed, yaw = clip(
-                commands[b, i, 0], commands[b, i, 1],
-                cars.speed_low[b], cars.speed_high[b], cars.yaw_rate[b], cars.turning_radius[b],
-            )  # fmt: skip
-            commands[b, i, 0] = speed
-            commands[b, i, 1] = yaw
-            fastest = max(fastest, abs(speed))
-        reach = cars.reach[b]
-        far = reach + fastest * dt + 1e-8
-        pairs = candidates(state, b, 2.0 * far, obstacles, far, work.pair, work.head, work.link, work.cell)
-        if pairs > work.pair.shape[0]:
-            return -1 - b
-        if pairs > 0:
-            resolve(state, commands, cars, obstacles, dt, work, b, pairs)
-        else:
-            for i in range(n):
-                _move(state, b, i, commands[b, i, 0], commands[b, i, 1], dt, dt)
+    trials, n = state.x.shape
+    total = trials * n
+    x, y, asked = state.x.reshape(total), state.y.reshape(total), commands.reshape(total, 2)
+    speed, yaw = state.speed.reshape(total), state.yaw_rate.reshape(total)
+    b = first
+    while b < trials:
+        last = b + r.alike[b]
+        clip(r, b, asked, speed, yaw, b * n, last * n)
+        if n <= FEW:
+            look(r, b, x, y, n, b * n, last * n)
+        begin = b
+        for k in range(b, last):
+            empty = obstacles.off[k] == obstacles.off[k + 1]
+            if n <= FEW and empty and not _any_close(r, k - b, n):
+                continue
+            if work.found[0] + n > work.contact.shape[0]:
+                _pass_on(state, cars, obstacles, dt, work, begin, k)
+                return k
+            pairs = candidates(
+                state, k, 2.0 * r.far[k], obstacles, r.far[k], work.pair, work.head, work.link, work.cell
+            )
+            if pairs > work.pair.shape[0]:
+                _pass_on(state, cars, obstacles, dt, work, begin, k)
+                return -1 - k
+            if pairs > 0:
+                _pass_on(state, cars, obstacles, dt, work, begin, k)
+                resolve(state, commands, cars, obstacles, dt, work, k, pairs)
+                part(state, cars, obstacles, work, k)
+                begin = k + 1
+        _pass_on(state, cars, obstacles, dt, work, begin, last)
+        b = last
+    return trials
+
+
+@jit
+def _any_close(r: Rows, trial: int, n: int) -> bool:
+    close = 0
+    for f in range(trial * n, trial * n + n):
+        close += r.close[f]
+    return close > 0
+
+
+@jit
+def _pass_on(
+    state: State, cars: CarTable, obstacles: ObstacleTable, dt: float, work: Workspace, first: int, last: int
+) -> None:
+    """Move the trials first..last - 1, in which nothing can meet."""
+    trials, n = state.x.shape
+    total = trials * n
+    move(
+        state.x.reshape(total), state.y.reshape(total), state.c.reshape(total), state.s.reshape(total),
+        state.speed.reshape(total), state.yaw_rate.reshape(total), dt, first * n, last * n,
+    )  # fmt: skip
+    for b in range(first, last):
         if work.touching[b] > 0:
             part(state, cars, obstacles, work, b)
-    return trials
 
 
 @jit

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.motion import Workspace, step, workspace
+from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
@@ -16,6 +17,10 @@ from dubins_traffic.protocols import Capabilities
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+
+
+ABSENT = 1e9
+"""Places of a batch that hold no car lie this far away, metres, and farther, so that nothing meets there."""
 
 
 class Embedded:
@@ -42,9 +47,12 @@ class Embedded:
             state.count[b] = counts[b]
             for n, pose in enumerate(instance.starts):
                 state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n] = pose
+            for n in range(counts[b], max(counts)):
+                state.x[b, n] = ABSENT * (n + 1)
         self.state = state
         self._work = workspace(len(instances), max(counts))
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
+        self._rows = rows(self._cars, max(counts), 1.0 / self._rate)
         self._tick = 0
         return state
 
@@ -56,7 +64,14 @@ class Embedded:
         done = 0
         while done < trials:
             reached = step(
-                self.state, commands, self._cars, self._obstacles, 1.0 / self._rate, self._work, done
+                self.state,
+                commands,
+                self._cars,
+                self._obstacles,
+                self._rows,
+                1.0 / self._rate,
+                self._work,
+                done,
             )
             if self._work.found[0]:
                 contacts = self._collect(contacts)

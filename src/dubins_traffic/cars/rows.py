@@ -1,0 +1,120 @@
+"""The common case of a tick, in loops without branches over the cars of several trials at once.
+
+Arrays are rows over all cars of a batch, trial after trial (a view of the (B, N) arrays), so that the compiler
+can work on many cars with one instruction. Nothing here knows contacts: `cars.motion` calls `move` for the trials
+in which no two bodies can meet during the tick, which is nearly all of them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.tables import CarTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.trig import advance
+
+RUN = 32
+"""Trials that are looked at together: their rows fit the processor's nearest memory."""
+
+
+class Rows(NamedTuple):
+    """Constants of a batch, one value per trial (B,), but for `alike`, `mask` and `close`.
+
+    `low`, `high`: bounds on the speed; `most`, `slack`, `curvature`: |yaw| <= min(most, slack + curvature |speed|);
+    `far`: how far from its centre a car may reach in one tick; `near`: square of the distance of the centres within
+    which two cars may then meet. `alike` (B,): how many trials
+    from this one on have the same constants, at most RUN; `mask` (N, RUN * N): 1 where the car o places on is of
+    the same trial, else 0; `close` (RUN * N,): scratch.
+    """
+
+    low: Floats
+    high: Floats
+    most: Floats
+    slack: Floats
+    curvature: Floats
+    far: Floats
+    near: Floats
+    alike: Ints
+    mask: Floats
+    close: Ints
+
+
+def rows(cars: CarTable, n: int, dt: float) -> Rows:
+    """Return the constants of a batch with `n` places for cars per trial and ticks of `dt` seconds."""
+    free = cars.turning_radius == 0.0
+    fastest = np.maximum(np.abs(cars.speed_low), np.abs(cars.speed_high))
+    far = cars.reach + fastest * dt + 1e-8
+    slack = np.where(free, cars.yaw_rate, 0.0)
+    curvature = np.where(free, 0.0, 1.0 / np.where(free, 1.0, cars.turning_radius))
+    near = 4.0 * far * far
+    constants = (cars.speed_low, cars.speed_high, cars.yaw_rate, slack, curvature, far, near)
+    place = np.arange(RUN * n) % n
+    return Rows(
+        *constants,
+        alike=_alike(np.stack(constants)),
+        mask=np.array([place + shift < n for shift in range(n)], dtype=np.float64),
+        close=np.zeros(RUN * n, dtype=np.int64),
+    )
+
+
+def _alike(columns: Floats) -> Ints:
+    trials = columns.shape[1]
+    alike = np.ones(trials, dtype=np.int64)
+    for b in range(trials - 2, -1, -1):
+        if (columns[:, b] == columns[:, b + 1]).all():
+            alike[b] = min(alike[b + 1] + 1, RUN)
+    return alike
+
+
+@jit
+def clip(r: Rows, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int) -> None:
+    """Clip the commands (B * N, 2) of the cars first..last - 1, all like those of trial b, in place.
+
+    The speed is clipped first; both also go to the rows `speed` and `yaw`.
+    """
+    low, high, most, slack, curvature = r.low[b], r.high[b], r.most[b], r.slack[b], r.curvature[b]
+    own, speed, yaw = commands[first:last], speed[first:last], yaw[first:last]
+    for f in range(last - first):
+        u = min(max(own[f, 0], low), high)
+        bound = min(most, slack + curvature * abs(u))
+        w = min(max(own[f, 1], -bound), bound)
+        own[f, 0] = u
+        own[f, 1] = w
+        speed[f] = u
+        yaw[f] = w
+
+
+@jit
+def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -> int:
+    """Set `close` for each of the cars first..last - 1 that may meet a later one of its trial; return how many."""
+    count = last - first
+    close = r.close[:count]
+    near = r.near[b]
+    for f in range(count):
+        close[f] = 0
+    for shift in range(1, n):
+        mask = r.mask[shift, : count - shift]
+        x0, y0 = x[first : last - shift], y[first : last - shift]
+        x1, y1 = x[first + shift : last], y[first + shift : last]
+        for f in range(count - shift):
+            dx = x1[f] - x0[f]
+            dy = y1[f] - y0[f]
+            close[f] |= 1 if dx * dx + dy * dy < near * mask[f] else 0
+    total = 0
+    for f in range(count):
+        total += close[f]
+    return total
+
+
+@jit
+def move(
+    x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float, first: int, last: int
+) -> None:
+    """Move the cars first..last - 1 along their arcs for `dt` seconds."""
+    x, y, c, s = x[first:last], y[first:last], c[first:last], s[first:last]
+    speed, yaw = speed[first:last], yaw[first:last]
+    for f in range(last - first):
+        x[f], y[f], c[f], s[f] = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
