@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.body import Body, Car, Disc, Obstacle
 from dubins_traffic.cars.state import Contact, Event, Frames, Pose
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.protocols import End, Ending, Sink
 from dubins_traffic.roads.network import RoadNetwork
@@ -42,7 +43,8 @@ def make_instance(
     )
     starts = tuple(Pose(1.5 + n, -0.3, 1.0, 0.0) for n in range(len(names) + 1))
     agents = tuple(EAgent("wander", name, "wander/wander") for name in names)
-    return Instance(problem, starts, ticks / rate, agents, seed=7, trial=3)
+    instance = Instance(problem, starts, ticks / rate, agents, seed=7, trial=3)
+    return instance_from_document(instance_to_document(instance))
 
 
 def make_frames(

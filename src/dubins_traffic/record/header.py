@@ -68,9 +68,9 @@ def decode(data: bytes, file: str | None = None) -> Header:
         document: Any = json.loads(data)
     except ValueError as error:
         raise RecordError("damaged header", file=file, expected="JSON") from error
-    if not isinstance(document, dict) or document.get("format") != schema.FORMAT:
+    fields = cast("dict[str, Any]", document) if isinstance(document, dict) else {}
+    if fields.get("format") != schema.FORMAT:
         raise RecordError("not a record of a trial", file=file, expected=f"an MCAP file with {schema.HEADER}")
-    fields = cast("dict[str, Any]", document)
     if fields.get("version") != schema.VERSION:
         raise RecordError(
             "unknown version of the record",
