@@ -64,7 +64,19 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
     The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is.
     """
+    return _compiled(function, inlined=False)
+
+
+def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `jit` does, and always into the caller: for small functions that take whole tables.
+
+    Handing over a table of arrays costs more than the few operations of such a function.
+    """
+    return _compiled(function, inlined=True)
+
+
+def _compiled(function: Callable[P, R], *, inlined: bool) -> Callable[P, R]:
     library = cast(Any, numba)
     library.config.CACHE_DIR = str(cache_folder())
-    compiler = library.njit(cache=True, error_model="numpy", nogil=True)
+    compiler = library.njit(cache=True, error_model="numpy", nogil=True, forceinline=inlined)
     return cast(Callable[P, R], compiler(function))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def covered(start: Floats, end: Floats, pad: float, size: float) -> tuple[Ints, 
     right = np.clip((column + 1) * size + pad - low[item, 0], 0.0, run)
     upright = run <= 0
     y0 = low[item, 1] + slope * left
-    y1 = np.where(upright, high[item, 1], low[item, 1] + slope * right)
+    y1 = cast(Floats, np.where(upright, high[item, 1], low[item, 1] + slope * right))
     bottom = np.floor((np.minimum(y0, y1) - pad) / size).astype(np.int64)
     top = np.floor((np.maximum(y0, y1) + pad) / size).astype(np.int64)
     strip, row = _spread(bottom, top)
@@ -50,7 +51,7 @@ def pairs(item: Ints, column: Ints, row: Ints) -> Iterator[tuple[Ints, Ints]]:
     order = np.lexsort((item, key))
     key, item = key[order], item[order]
     count = len(key)
-    after = np.searchsorted(key, key, side="right") - np.arange(count) - 1
+    after = cast(Ints, np.searchsorted(key, key, side="right") - np.arange(count) - 1)
     total = np.concatenate([[0], np.cumsum(after)])
     begin = 0
     while begin < count:

@@ -6,11 +6,14 @@ intersections and lanes are numbered within the network. Lane 2s runs along segm
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.roads.paving import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
+INFINITE = float("inf")
 
-@jit
+
+@jit_inline
 def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
     """Return the squared distance from a point to segment s."""
     k = t.seg_off[net] + s
@@ -29,7 +32,7 @@ def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
     return across * across
 
 
-@jit
+@jit_inline
 def cell_of(t: RoadTable, net: int, x: float, y: float) -> int:
     """Return the number of the cell that holds a point, -1 outside the box of cells."""
     u = (x - t.cell_box[net, 0]) * t.cell_box[net, 2]
@@ -40,24 +43,19 @@ def cell_of(t: RoadTable, net: int, x: float, y: float) -> int:
     return -1
 
 
-@jit
+@jit_inline
 def nearest_segment(t: RoadTable, net: int, x: float, y: float) -> tuple[int, float]:
     """Return the nearest segment and the squared distance to it; the lower number of equally near ones."""
     cell = cell_of(t, net, x, y)
-    if cell < 0:
-        best = 0
-        least = distance2(t, net, 0, x, y)
-        for s in range(1, t.seg_off[net + 1] - t.seg_off[net]):
-            d2 = distance2(t, net, s, x, y)
-            if d2 < least:
-                best = s
-                least = d2
-        return best, least
-    first = t.seg_start[cell]
-    best = t.seg_item[first]
-    least = distance2(t, net, best, x, y)
-    for k in range(first + 1, t.seg_start[cell + 1]):
-        s = t.seg_item[k]
+    first = 0
+    last = t.seg_off[net + 1] - t.seg_off[net]
+    if cell >= 0:
+        first = t.seg_start[cell]
+        last = t.seg_start[cell + 1]
+    best = 0
+    least = INFINITE
+    for k in range(first, last):
+        s = t.seg_item[k] if cell >= 0 else k
         d2 = distance2(t, net, s, x, y)
         if d2 < least:
             best = s
@@ -65,23 +63,26 @@ def nearest_segment(t: RoadTable, net: int, x: float, y: float) -> tuple[int, fl
     return best, least
 
 
-@jit
+@jit_inline
 def on_road(t: RoadTable, net: int, x: float, y: float) -> bool:
     """Whether a point lies within the roads' half width of a segment (its ends capped by discs)."""
-    limit = t.half_width[net] * t.half_width[net]
-    cell = cell_of(t, net, x, y)
-    if cell < 0:
-        for s in range(t.seg_off[net + 1] - t.seg_off[net]):
-            if distance2(t, net, s, x, y) <= limit:
-                return True
-        return False
-    for k in range(t.seg_start[cell], t.seg_start[cell + 1]):
-        if distance2(t, net, t.seg_item[k], x, y) <= limit:
-            return True
-    return False
+    u = (x - t.cell_box[net, 0]) * t.pave_scale[net]
+    v = (y - t.cell_box[net, 1]) * t.pave_scale[net]
+    nx = t.pave_dim[net, 0]
+    pave: int = MIXED
+    if u >= 0.0 and v >= 0.0 and u < nx and v < t.pave_dim[net, 1]:
+        pave = int(t.pave[t.pave_dim[net, 2] + int(v) * nx + int(u)])
+    least = INFINITE
+    if pave == ON:
+        least = 0.0
+    elif pave >= 0:
+        least = distance2(t, net, pave, x, y)
+    elif pave == MIXED:
+        _, least = nearest_segment(t, net, x, y)
+    return least <= t.half_width[net] * t.half_width[net]
 
 
-@jit
+@jit_inline
 def vertex_distance2(t: RoadTable, net: int, v: int, x: float, y: float) -> float:
     """Return the squared distance from a point to intersection v."""
     k = t.vert_off[net] + v
@@ -90,24 +91,19 @@ def vertex_distance2(t: RoadTable, net: int, v: int, x: float, y: float) -> floa
     return rx * rx + ry * ry
 
 
-@jit
+@jit_inline
 def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, float]:
     """Return the nearest intersection and the squared distance to it; the lower number of equally near ones."""
     cell = cell_of(t, net, x, y)
-    if cell < 0:
-        best = 0
-        least = vertex_distance2(t, net, 0, x, y)
-        for v in range(1, t.vert_off[net + 1] - t.vert_off[net]):
-            d2 = vertex_distance2(t, net, v, x, y)
-            if d2 < least:
-                best = v
-                least = d2
-        return best, least
-    first = t.vert_start[cell]
-    best = t.vert_item[first]
-    least = vertex_distance2(t, net, best, x, y)
-    for k in range(first + 1, t.vert_start[cell + 1]):
-        v = t.vert_item[k]
+    first = 0
+    last = t.vert_off[net + 1] - t.vert_off[net]
+    if cell >= 0:
+        first = t.vert_start[cell]
+        last = t.vert_start[cell + 1]
+    best = 0
+    least = INFINITE
+    for k in range(first, last):
+        v = t.vert_item[k] if cell >= 0 else k
         d2 = vertex_distance2(t, net, v, x, y)
         if d2 < least:
             best = v
@@ -115,7 +111,7 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
     return best, least
 
 
-@jit
+@jit_inline
 def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float]:
     """Return (s, l) of a point: metres along a lane from its start, metres left of the segment's centre line."""
     k = t.seg_off[net] + (lane >> 1)
@@ -128,7 +124,7 @@ def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> t
     return along, left
 
 
-@jit
+@jit_inline
 def lane_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
     """Return the unit vector along a lane."""
     k = t.seg_off[net] + (lane >> 1)
@@ -137,13 +133,13 @@ def lane_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
     return t.seg[k, 2], t.seg[k, 3]
 
 
-@jit
+@jit_inline
 def lane_start(t: RoadTable, net: int, lane: int) -> int:
     """Return the intersection in which a lane begins."""
     return t.ends[t.seg_off[net] + (lane >> 1), lane & 1]
 
 
-@jit
+@jit_inline
 def lane_end(t: RoadTable, net: int, lane: int) -> int:
     """Return the intersection in which a lane ends."""
     return t.ends[t.seg_off[net] + (lane >> 1), 1 - (lane & 1)]

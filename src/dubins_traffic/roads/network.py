@@ -56,7 +56,7 @@ class RoadNetwork:
     length: float
     transform: tuple[float, float, float]
     shape: tuple[int, int]
-    extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    extra: Mapping[str, Any] = field(default_factory=dict[str, Any], hash=False)
 
     def __post_init__(self) -> None:
         plain = {

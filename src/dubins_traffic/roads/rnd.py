@@ -11,9 +11,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple, TypeGuard, cast
 
 from dubins_traffic.errors import InputError
 
@@ -79,10 +79,10 @@ def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
         raise InputError(f"not JSON ({error})", file=file) from None
     if not isinstance(value, dict):
         raise InputError("not a JSON object", file=file, value=value, expected="an object {...}")
-    return value
+    return cast("dict[str, Any]", value)
 
 
-def fields(document: Mapping[str, Any]) -> Description:
+def fields(document: object) -> Description:
     """Check the fields of a description.
 
     Without `segments` the `shape` stands for the complete grid; without `shape` it is that of the segments.
@@ -94,6 +94,7 @@ def fields(document: Mapping[str, Any]) -> Description:
     """
     if not isinstance(document, Mapping):
         raise InputError("not a road network", value=document, expected="an object with segments or shape")
+    document = cast("Mapping[str, Any]", document)
     for name in ("version", "length"):
         if name not in document:
             raise InputError("missing", field=name, expected="0" if name == "version" else "a number > 0")
@@ -205,7 +206,7 @@ def checked_segments(value: object) -> tuple[Segment, ...]:
     return tuple(segments)
 
 
-def checked_extra(extra: Mapping[str, Any]) -> dict[str, Any]:
+def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the unknown keys, if JSON can hold them."""
     for key, value in extra.items():
         if not isinstance(key, str):
@@ -233,7 +234,7 @@ def write_lines(document: Mapping[str, Any]) -> str:
         if key == "segments":
             continue
         if key in FIELDS:
-            row = value if isinstance(value, list) else [value]
+            row = cast("list[Any]", value) if isinstance(value, list) else [value]
             lines.append(f"{key}: {' '.join(_json(number) for number in row)}")
         else:
             name = key if _PLAIN_KEY.fullmatch(key) else _escaped(key, "#:")
@@ -302,7 +303,7 @@ def _value(text: str) -> Any:
 def _row(value: object) -> list[Any] | None:
     if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__"):
         return None
-    return list(value)  # pyright: ignore[reportArgumentType]
+    return list(cast("Iterable[Any]", value))
 
 
 def _json(value: Any) -> str:

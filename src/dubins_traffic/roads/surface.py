@@ -9,15 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from math import ceil, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 
-CELLS_PER_SEGMENT = 4.0
+CELLS_PER_SEGMENT = 8.0
 POINTS_AT_ONCE = 1 << 15
+
+if TYPE_CHECKING:
+    from dubins_traffic.roads.paving import Paving
 
 Distance2 = Callable[[Floats, Floats, Ints], Floats]
 
@@ -56,63 +59,66 @@ class Surface:
     """
 
     def __init__(self, points: Floats, ends: Ints, tangents: Floats, lengths: Floats) -> None:
-        self._points = points
-        self._a = points[ends[:, 0]]
-        self._b = points[ends[:, 1]]
-        self._tangents = tangents
-        self._lengths = lengths
+        self.points = points
+        self.start = points[ends[:, 0]]
+        self.end = points[ends[:, 1]]
+        self.tangents = tangents
+        self.lengths = lengths
+        self.pavings: dict[float, Paving] = {}
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return the number of the nearest segment and the distance, for points (..., 2)."""
         cells = self.cells
-        return self._nearest(points, self._segment_distance2, len(self._a), cells.seg_start, cells.seg_item)
+        return self._nearest(points, self.distance2, len(self.start), cells.seg_start, cells.seg_item)
 
     def nearest_vertex(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return the number of the nearest intersection and the distance, for points (..., 2)."""
         cells = self.cells
-        count = len(self._points)
-        return self._nearest(points, self._vertex_distance2, count, cells.vert_start, cells.vert_item)
+        count = len(self.points)
+        return self._nearest(points, self.vertex_distance2, count, cells.vert_start, cells.vert_item)
 
     def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
         """Whether points (..., 2) lie within `half_width` of a segment, its ends capped by discs."""
         points = np.asarray(points, dtype=np.float64)
         s, _ = self.nearest_segment(points)
-        return self._segment_distance2(points[..., 0], points[..., 1], s) <= half_width * half_width
+        return self.distance2(points[..., 0], points[..., 1], s) <= half_width * half_width
 
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l): metres along a lane from its start, metres left of the segment's centre line."""
         points = np.asarray(points, dtype=np.float64)
         s = lane >> 1
-        rx, ry = points[..., 0] - self._a[s, 0], points[..., 1] - self._a[s, 1]
-        tx, ty = self._tangents[s, 0], self._tangents[s, 1]
+        rx, ry = points[..., 0] - self.start[s, 0], points[..., 1] - self.start[s, 1]
+        tx, ty = self.tangents[s, 0], self.tangents[s, 1]
         along, left = rx * tx + ry * ty, tx * ry - ty * rx
-        return (self._lengths[s] - along, -left) if lane & 1 else (along, left)
+        return (self.lengths[s] - along, -left) if lane & 1 else (along, left)
 
     @cached_property
     def cells(self) -> Cells:
         """The cells, made when first asked for."""
-        low, high = self._points.min(axis=0), self._points.max(axis=0)
-        margin = 0.5 * float(self._lengths.mean())
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        margin = 0.5 * float(self.lengths.mean())
         x0, y0 = (low - margin).tolist()
         width, height = (high - low + 2.0 * margin).tolist()
-        size = sqrt(width * height / (CELLS_PER_SEGMENT * len(self._lengths)))
+        size = sqrt(width * height / (CELLS_PER_SEGMENT * len(self.lengths)))
         nx, ny = ceil(width / size), ceil(height / size)
         slack = 1e-9 * (size + abs(x0) + abs(y0) + width + height)
         box = (x0, y0, size, nx, ny, slack)
-        seg = _sieve(box, self._segment_distance2, len(self._lengths))
-        vert = _sieve(box, self._vertex_distance2, len(self._points))
+        seg = _sieve(box, self.distance2, len(self.lengths))
+        vert = _sieve(box, self.vertex_distance2, len(self.points))
         return Cells(x0, y0, 1.0 / size, nx, ny, *seg, *vert)
 
-    def _segment_distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
-        rx, ry = x - self._a[s, 0], y - self._a[s, 1]
-        qx, qy = x - self._b[s, 0], y - self._b[s, 1]
-        tx, ty = self._tangents[s, 0], self._tangents[s, 1]
+    def distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
+        """Return the squared distances from points (x, y) to segments s; the three are broadcast."""
+        rx, ry = x - self.start[s, 0], y - self.start[s, 1]
+        qx, qy = x - self.end[s, 0], y - self.end[s, 1]
+        tx, ty = self.tangents[s, 0], self.tangents[s, 1]
         along, across = rx * tx + ry * ty, tx * ry - ty * rx
-        beyond = np.where(along >= self._lengths[s], qx * qx + qy * qy, across * across)
+        beyond = cast(Floats, np.where(along >= self.lengths[s], qx * qx + qy * qy, across * across))
         return np.where(along <= 0.0, rx * rx + ry * ry, beyond)
 
-    def _vertex_distance2(self, x: Floats, y: Floats, v: Ints) -> Floats:
-        rx, ry = x - self._points[v, 0], y - self._points[v, 1]
+    def vertex_distance2(self, x: Floats, y: Floats, v: Ints) -> Floats:
+        """Return the squared distances from points (x, y) to intersections v; the three are broadcast."""
+        rx, ry = x - self.points[v, 0], y - self.points[v, 1]
         return rx * rx + ry * ry
 
     def _nearest(
@@ -208,5 +214,5 @@ def _gather(start: Ints, item: Ints, order: Ints) -> tuple[Ints, Ints]:
     """Return the groups of `item` that `start` delimits, in another order."""
     count = np.diff(start)[order]
     new = np.concatenate([[0], np.cumsum(count)])
-    place = np.repeat(start[:-1][order] - new[:-1], count) + np.arange(new[-1])
+    place = cast(Ints, np.repeat(start[:-1][order] - new[:-1], count) + np.arange(new[-1]))
     return new, item[place]

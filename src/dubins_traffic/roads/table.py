@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.paving import pave
 
 
 class RoadTable(NamedTuple):
@@ -42,6 +43,12 @@ class RoadTable(NamedTuple):
         Where the candidates of each cell begin in `seg_item`, `vert_item`.
     seg_item, vert_item : arrays
         What may be nearest to a point of the cell, in ascending order.
+    pave_scale : array (K,)
+        1 / side of a cell of `pave`; these finer cells begin at x0, y0 too.
+    pave_dim : array (K, 3)
+        Columns and rows of the cells of `pave`, and the number of the first.
+    pave : array
+        What the road makes of a cell, see `roads.paving`.
     """
 
     half_width: Floats
@@ -58,6 +65,9 @@ class RoadTable(NamedTuple):
     seg_item: Ints
     vert_start: Ints
     vert_item: Ints
+    pave_scale: Floats
+    pave_dim: Ints
+    pave: Ints
 
 
 def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadTable:
@@ -71,6 +81,7 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     if not networks or len(networks) != len(half_widths):
         expected = "one half width for each of at least one network"
         raise InputError("can't pack networks", value=(len(networks), len(half_widths)), expected=expected)
+    paving = [pave(network.surface, width) for network, width in zip(networks, half_widths, strict=True)]
     cells = [network.surface.cells for network in networks]
     return RoadTable(
         half_width=np.array(half_widths, dtype=np.float64),
@@ -87,6 +98,9 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
         seg_item=np.concatenate([own.seg_item for own in cells]),
         vert_start=_starts([own.vert_start for own in cells]),
         vert_item=np.concatenate([own.vert_item for own in cells]),
+        pave_scale=np.array([own.scale for own in paving], dtype=np.float64),
+        pave_dim=_dimensions([(own.nx, own.ny) for own in paving]),
+        pave=np.concatenate([own.pave for own in paving]),
     )
 
 

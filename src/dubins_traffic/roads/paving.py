@@ -1,0 +1,67 @@
+"""Fine cells that say at a glance whether a point lies on the road."""
+
+from __future__ import annotations
+
+from math import ceil, sqrt
+from typing import Final, NamedTuple, cast
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.cells import covered
+from dubins_traffic.roads.surface import Surface
+
+OFF: Final = -1
+ON: Final = -2
+MIXED: Final = -3
+CELLS_PER_SEGMENT: Final = 256.0
+
+
+class Paving(NamedTuple):
+    """Cells over the box of `Surface.cells`: cell (cx, cy) has the number cy * nx + cx.
+
+    ``pave`` holds OFF where no point of the cell is on the road, ON where all are, else the number of the only
+    segment whose road meets the cell, or MIXED where there are several.
+    """
+
+    scale: float
+    nx: int
+    ny: int
+    pave: Ints
+
+
+def pave(surface: Surface, half_width: float) -> Paving:
+    """Return the paving of roads `half_width` metres to either side of the segments (kept for next time)."""
+    kept = surface.pavings.get(half_width)
+    if kept is None:
+        kept = surface.pavings[half_width] = _pave(surface, half_width)
+    return kept
+
+
+def _pave(surface: Surface, half_width: float) -> Paving:
+    cells = surface.cells
+    width, height = cells.nx / cells.scale, cells.ny / cells.scale
+    finest = sqrt(width * height / (CELLS_PER_SEGMENT * len(surface.lengths)))
+    side = max(0.35 * half_width, finest)
+    nx, ny = ceil(width / side), ceil(height / side)
+    slack = 1e-9 * (side + half_width + abs(cells.x0) + abs(cells.y0) + width + height)
+    origin = np.array([cells.x0, cells.y0])
+    item, cx, cy = covered(surface.start - origin, surface.end - origin, half_width + slack, side)
+    keep = (cx >= 0) & (cx < nx) & (cy >= 0) & (cy < ny)
+    item, cx, cy = item[keep], cx[keep], cy[keep]
+    x = cast(Floats, cells.x0 + (cx + 0.5) * side)
+    y = cast(Floats, cells.y0 + (cy + 0.5) * side)
+    distance: Floats = np.sqrt(surface.distance2(x, y, item))
+    reach = sqrt(0.5) * side + slack
+    keep = distance <= half_width + reach
+    number, item, x, y = (cy * nx + cx)[keep], item[keep], x[keep], y[keep]
+    paved = np.full(nx * ny, OFF, dtype=np.int64)
+    paved[number] = item
+    paved[np.bincount(number, minlength=nx * ny) > 1] = MIXED
+    whole = np.ones(len(number), dtype=np.bool_)
+    inner = max(0.0, half_width - slack)
+    for dx in (-0.5, 0.5):
+        for dy in (-0.5, 0.5):
+            whole &= surface.distance2(x + dx * side, y + dy * side, item) < inner * inner
+    paved[number[whole]] = ON
+    return Paving(1.0 / side, nx, ny, paved)
