@@ -85,7 +85,7 @@ class Configuration:
             own.pop("network", None)
             own["rnd"] = os.fspath(rnd)
             folder = None
-        settings = _settings(own, file)
+        settings = settings_of(own, file)
         try:
             network = _network(settings.rnd, folder)
             agents = plan_agents(settings.e_agents)
@@ -201,7 +201,8 @@ def pose_of(x: float, y: float, theta: float) -> Pose:
     return Pose(x, y, cosine, sine)
 
 
-def _settings(document: Mapping[str, Any], file: str | None) -> Settings:
+def settings_of(document: Mapping[str, Any], file: str | None = None) -> Settings:
+    """Return the settings of a document, without looking up its road network; InputError if one is wrong."""
     if version_of(document, file) == 0:
         parse(Settings0, document, file=file)
         known = {key: value for key, value in document.items() if key in VERSION_0_KEYS}

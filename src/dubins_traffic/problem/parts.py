@@ -266,11 +266,7 @@ def _check_rnd(value: Any) -> Any:
     raise fault("not a road network", "a road network description (an object) or the path of one")
 
 
-RoadReference = Annotated[
-    Any,
-    AfterValidator(_check_rnd),
-    WithJsonSchema({"anyOf": [{"type": "string", "minLength": 1}, {"$ref": "#/$defs/RoadNetwork"}]}),
-]
+RoadReference = Annotated[Any, AfterValidator(_check_rnd), WithJsonSchema({"type": ["string", "object"]})]
 
 
 def _check_polygon(corners: Sequence[Sequence[float]]) -> None:

@@ -1,0 +1,161 @@
+"""The JSON Schemas of the documents: generated from the models, shipped beside them.
+
+``python -m dubins_traffic.problem.schema`` writes them anew. JSON Schema says less than the reader checks: relations
+between values (a network that is planar, bounds in order) and numbers such as 3.0 where an integer is asked.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from dubins_traffic.problem.faults import Open, Strict
+from dubins_traffic.problem.kinds import KINDS, NAMES_2016
+from dubins_traffic.problem.parts import LatticePoint, Length
+from dubins_traffic.problem.settings import InstanceModel, InstanceModel0, Settings, Settings0
+from dubins_traffic.problem.trial_data import TrialDataModel
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+ID = "urn:dubins-traffic:"
+Transform = Annotated[list[float], Field(min_length=3, max_length=3)]
+Segment = Annotated[list[int], Field(min_length=4, max_length=4)]
+
+
+class RoadNetworkModel(Open):
+    """Road network description (RND), version 0. Unknown keys are kept."""
+
+    version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
+    length: Length = Field(description="metres of a lattice unit")
+    transform: Transform = Field(default=[0, 0, 0], description="rigid motion [x, y, theta], m and rad")
+    shape: LatticePoint | None = Field(
+        default=None, description="[rows, columns]; without segments: the complete grid of that shape"
+    )
+    segments: Annotated[list[Segment], Field(min_length=1)] | None = Field(
+        default=None, description="segments [x0, y0, x1, y1] between points of the integer lattice"
+    )
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """Return the schemas by name: network, configuration, instance, trial-data."""
+    return {name: build() for name, build in _DOCUMENTS.items()}
+
+
+def schema_text(schema: dict[str, Any]) -> str:
+    """Return a schema as text."""
+    return json.dumps(schema, indent=2, sort_keys=True) + "\n"
+
+
+def shipped_schema(name: str) -> dict[str, Any]:
+    """Return the shipped schema called `name`."""
+    item = files("dubins_traffic.problem") / "schemas" / f"{name}.json"
+    return json.loads(item.read_text(encoding="utf-8"))
+
+
+_ROADS_ONCE = {
+    "oneOf": [
+        {"required": ["rnd"], "not": {"required": ["network"]}},
+        {"required": ["network"], "not": {"required": ["rnd"]}},
+    ]
+}
+
+
+def _road_network() -> dict[str, Any]:
+    schema = _of(RoadNetworkModel)
+    for name in ("shape", "segments"):
+        variants = schema["properties"][name].pop("anyOf")
+        schema["properties"][name].update(variants[0])
+        del schema["properties"][name]["default"]
+    schema["anyOf"] = [{"required": ["shape"]}, {"required": ["segments"]}]
+    return schema
+
+
+def _of(model: type[Strict]) -> dict[str, Any]:
+    schema = model.model_json_schema(by_alias=True)
+    rnd = schema["properties"].get("rnd")
+    if rnd is not None:
+        reference = {"$ref": "#/$defs/RoadNetwork"}
+        instance = model in (InstanceModel0, InstanceModel)
+        rnd.update(reference if instance else {"anyOf": [{"type": "string", "minLength": 1}, reference]})
+        rnd.pop("default", None)
+    schema["title"] = model.__name__.removesuffix("Model")
+    return schema
+
+
+def _versions(
+    name: str, title: str, first: type[Strict], second: type[Strict], demands: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the schema of a document that is of version 0 or of version 1."""
+    definitions: dict[str, Any] = {"RoadNetwork": _road_network()}
+    for number, model in enumerate((first, second)):
+        schema = _of(model)
+        definitions.update(schema.pop("$defs", {}))
+        schema["properties"]["version"] = {"const": number, "description": str(number)}
+        if number and demands:
+            schema["allOf"] = demands
+        definitions[f"Version{number}"] = schema
+    if "AgentEntry" in definitions:
+        _describe_parameters(definitions)
+    choice = {"if": {"properties": {"version": {"const": 0}}}, "then": {"$ref": "#/$defs/Version0"}}
+    body = {**choice, "else": {"$ref": "#/$defs/Version1"}, "type": "object", "required": ["version"]}
+    return _complete({**body, "$defs": definitions}, name, title)
+
+
+def _describe_parameters(definitions: dict[str, Any]) -> None:
+    """Tie the parameters of an e-agent to its type."""
+    rules: list[dict[str, Any]] = []
+    for kind, model in KINDS.items():
+        schema = _of(model)
+        definitions.update(schema.pop("$defs", {}))
+        definitions[f"Parameters of {kind}"] = schema
+        names = [kind, *(name for name, ours in NAMES_2016.items() if ours == kind)]
+        reference = {"$ref": f"#/$defs/Parameters%20of%20{kind}"}
+        rules.append(
+            {
+                "if": {"properties": {"type": {"enum": names}}},
+                "then": {"properties": {"parameters": reference}},
+            }
+        )
+    definitions["AgentEntry"]["allOf"] = rules
+    known = [*KINDS, *(name for name, _ in NAMES_2016.items())]
+    for entry in ("AgentEntry0", "AgentEntry"):
+        if entry in definitions:
+            definitions[entry]["properties"]["type"]["enum"] = known
+
+
+def _trial_data() -> dict[str, Any]:
+    schema = _of(TrialDataModel)
+    parts = {name: build for name, build in _DOCUMENTS.items() if name in {"configuration", "instance"}}
+    schema["properties"]["trialconf"] = {"$ref": ID + "configuration"}
+    schema["properties"]["instances"]["items"] = {"$ref": ID + "instance"}
+    schema["$defs"] = {name: build() for name, build in parts.items()}
+    return _complete(schema, "trial-data", "Trial data")
+
+
+def _complete(schema: dict[str, Any], name: str, title: str) -> dict[str, Any]:
+    return {"$schema": DIALECT, "$id": ID + name, **schema, "title": title}
+
+
+_DOCUMENTS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "network": lambda: _complete(_road_network(), "network", "Road network description (RND)"),
+    "configuration": lambda: _versions(
+        "configuration", "Trials configuration", Settings0, Settings, [_ROADS_ONCE]
+    ),
+    "instance": lambda: _versions("instance", "Problem instance", InstanceModel0, InstanceModel, []),
+    "trial-data": _trial_data,
+}
+
+
+def _write() -> None:
+    folder = Path(__file__).parent / "schemas"
+    folder.mkdir(exist_ok=True)
+    for name, schema in schemas().items():
+        (folder / f"{name}.json").write_text(schema_text(schema), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    _write()

@@ -1,0 +1,130 @@
+"""The trial data file of 2016: the configuration and the instances of its trials, as valid JSON."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration, plan_agents, settings_of
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
+from dubins_traffic.problem.faults import Open, parse
+from dubins_traffic.problem.files import Kind, detect, parse_json, plain, read_source, write_document
+from dubins_traffic.problem.instance import Instance
+
+DATE_FORMAT = "%Y-%m-%d %H:%M:%S"
+DATE_PATTERN = r"^\d{4}-\d{2}-\d{2} \d{2}:\d{2}:\d{2}$"
+
+
+class TrialDataModel(Open):
+    """Trial data, version 0: as in 2016."""
+
+    version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
+    date: str = Field(pattern=DATE_PATTERN, description="when the trials began, YYYY-MM-DD HH:MM:SS, UTC")
+    trialconf: dict[str, Any] = Field(description="the trials configuration")
+    instances: list[dict[str, Any]] = Field(description="the problem instances, in the order of the trials")
+
+
+@dataclass(frozen=True, slots=True)
+class TrialData:
+    """A trial data file.
+
+    Parameters
+    ----------
+    date : str
+        When the trials began, ``YYYY-MM-DD HH:MM:SS``, UTC.
+    trialconf : Mapping
+        The trials configuration, a document.
+    instances : tuple of Mapping
+        The problem instances, documents, in the order of the trials.
+    extra : Mapping
+        Unknown keys, kept.
+    """
+
+    date: str
+    trialconf: Mapping[str, Any]
+    instances: tuple[Mapping[str, Any], ...]
+    extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    @staticmethod
+    def build(configuration: Configuration, instances: Sequence[Instance], date: datetime) -> TrialData:
+        """Return the data of trials: the configuration, with its network written in, and version 0 instances.
+
+        Parameters
+        ----------
+        configuration : Configuration
+            What the instances were drawn from.
+        instances : sequence of Instance
+            In the order of the trials.
+        date : datetime
+            When the trials began; naive is taken as UTC.
+        """
+        trialconf = configuration.to_document()
+        if configuration.network is not None and not isinstance(trialconf.get("rnd"), dict):
+            trialconf["rnd"] = configuration.network.to_document()
+        moment = date.astimezone(UTC) if date.tzinfo else date
+        documents = tuple(instance_to_document(instance, version=0) for instance in instances)
+        return TrialData(moment.strftime(DATE_FORMAT), trialconf, documents)
+
+    @staticmethod
+    def from_document(document: Mapping[str, Any], file: str | None = None) -> TrialData:
+        """Check `document`: its configuration and each of its instances are checked too, but a road network
+        that the configuration names by path is not looked up.
+
+        Raises
+        ------
+        InputError
+            For the first thing wrong, with its field.
+        """
+        own = plain(document, file)
+        model = parse(TrialDataModel, own, file=file)
+        try:
+            plan_agents(settings_of(model.trialconf).e_agents)
+        except InputError as error:
+            raise error.within(file=file, field="trialconf") from None
+        for k, instance in enumerate(model.instances):
+            try:
+                instance_from_document(instance)
+            except InputError as error:
+                raise error.within(file=file, field=f"instances[{k}]") from None
+        extra = {key: value for key, value in own.items() if key not in TrialDataModel.model_fields}
+        return TrialData(model.date, own["trialconf"], tuple(own["instances"]), extra)
+
+    @staticmethod
+    def read(source: str | os.PathLike[str]) -> TrialData:
+        """Return the trial data in the file at `source` (``-``: standard input).
+
+        Raises
+        ------
+        InputError
+            If there is no such file, it holds something else, or something in it is wrong.
+        """
+        found = read_source(source)
+        document = parse_json(found.text, found.name)
+        kind = detect(document, found.name)
+        if kind is not Kind.TRIAL_DATA:
+            expected = "version, date, trialconf, instances"
+            raise InputError(
+                f"not trial data but a {kind}", file=found.name, value=sorted(document), expected=expected
+            )
+        return TrialData.from_document(document, found.name)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the document."""
+        return {
+            "version": 0,
+            "date": self.date,
+            "trialconf": deepcopy(dict(self.trialconf)),
+            "instances": [deepcopy(dict(instance)) for instance in self.instances],
+            **self.extra,
+        }
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the file, whole or not at all; InputError if that can't be done."""
+        write_document(self.to_document(), path)
