@@ -12,21 +12,34 @@ import numpy as np
 from dubins_traffic.agents.kernel import decide
 from dubins_traffic.agents.plans import cycle_lanes, script_rows
 from dubins_traffic.agents.tables import (
+    AIMED,
+    BEGIN,
+    FIRST,
+    FLOATS,
     FOLLOW,
+    GAP,
+    GOAL_X,
+    INTS,
+    KIND,
     KINDS,
+    LANE,
+    LAST,
     LOOP,
+    NOBODY,
+    PARKED,
+    PLACE,
+    REPEAT,
     SCRIPTED,
     STEP,
-    Build,
-    Cast,
-    Law,
-    Memory,
+    STOP,
+    TRAIL,
+    Agents,
     workspace,
 )
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.roads.table import RoadTable, pack
@@ -40,8 +53,9 @@ WIDEST = 1.5
 """Bearing tolerances above this count as this, rad."""
 MARGIN = 0.05
 """A car that stops for others keeps at least this between the bodies, metres."""
-ANYWHERE = 1e150
-TRAIL = 12.0
+EVERYWHERE = 1e150
+NEVER = 2**62
+REMEMBERED = 12.0
 """How much of the ego's path is remembered beside the gap, metres (for w = 0.3 m)."""
 PAIRS = 64
 
@@ -67,48 +81,30 @@ class Fleet:
         trials, cars = state.x.shape
         self._roads, net = _pack_roads(instances)
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
-        law = np.zeros((trials, cars, len(Law._fields)))
-        kind = np.full((trials, cars), -1, dtype=np.int64)
-        begin = np.zeros((trials, cars), dtype=np.int64)
-        plan = np.zeros((trials, cars, 3), dtype=np.int64)
-        gap = np.zeros((trials, cars))
-        sight = np.full((trials, cars), ANYWHERE)
+        ints = np.zeros((trials, cars, INTS), dtype=np.int64)
+        ints[:, :, (KIND, TRAIL, LANE, PLACE)] = (NOBODY, -1, -1, -1)
+        floats = np.zeros((trials, cars, FLOATS))
         cycle: list[int] = []
         script: list[tuple[float, float, float]] = []
         for b, instance in enumerate(instances):
             for n, agent in enumerate(instance.e_agents, start=1):
                 given = _parameters(agent)
-                kind[b, n] = KINDS[agent.kind]
-                law[b, n] = _law(instance, agent.kind, given)
-                if kind[b, n] == LOOP:
-                    lanes = cycle_lanes(instance.problem.network, given["cycle"])
-                    plan[b, n] = (len(cycle), len(cycle) + len(lanes), 1)
-                    cycle += lanes
-                elif kind[b, n] == SCRIPTED:
-                    rows = script_rows(given["commands"], instance.problem.rate)
-                    plan[b, n] = (len(script), len(script) + len(rows), int(given["repeat"]))
-                    script += rows
-                elif kind[b, n] == FOLLOW:
-                    gap[b, n] = given["gap"]
-                    if given["sensing_only"]:
-                        sight[b, n] = instance.problem.sensing_radius
-                elif agent.kind == "parked":
-                    begin[b, n] = _vacates(given["vacates_after"], instance)
-        self._cast = Cast(
+                floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
+                _plan(instance, given, ints[b, n], agent.kind, cycle, script)
+        path, mark, last = _trails(ints, floats, min(instance.problem.car.w for instance in instances))
+        self._agents = Agents(
             net=net,
             seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
             trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-            build=_builds(instances, law),
-            law=law,
-            kind=kind,
-            begin=begin,
-            plan=plan,
-            gap=gap,
-            sight=sight,
+            build=_builds(instances, floats[:, :, STOP].max(axis=1)),
+            ints=ints,
+            floats=floats,
             cycle=np.array(cycle, dtype=np.int64),
             script=np.array(script, dtype=np.float64).reshape(len(script), 3),
+            path=path,
+            mark=mark,
+            last=last,
         )
-        self._memory = _memory(kind, gap, min(instance.problem.car.w for instance in instances))
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:  # noqa: ARG002
@@ -121,8 +117,7 @@ class Fleet:
                 state,
                 self._roads,
                 self._obstacles,
-                self._cast,
-                self._memory,
+                self._agents,
                 self._work,
                 commands,
             )
@@ -146,12 +141,30 @@ def _parameters(agent: EAgent) -> Mapping[str, Any]:
     return {**_defaults("wander"), **_defaults(agent.kind), **agent.parameters}
 
 
-def _vacates(after: float | None, instance: Instance) -> int:
-    ticks = 2**62 if after is None else math.ceil(after * instance.problem.rate - 1e-9)
-    return max(ticks, 0)
+def _plan(
+    instance: Instance,
+    given: Mapping[str, Any],
+    ints: Ints,
+    kind: str,
+    cycle: list[int],
+    script: list[tuple[float, float, float]],
+) -> None:
+    ints[KIND] = KINDS[kind]
+    if ints[KIND] == LOOP:
+        ints[FIRST] = len(cycle)
+        cycle += cycle_lanes(instance.problem.network, given["cycle"])
+        ints[LAST] = len(cycle)
+    elif ints[KIND] == SCRIPTED:
+        ints[FIRST] = len(script)
+        script += script_rows(given["commands"], instance.problem.rate)
+        ints[LAST] = len(script)
+        ints[REPEAT] = given["repeat"]
+    elif ints[KIND] == PARKED:
+        after = given["vacates_after"]
+        ints[BEGIN] = NEVER if after is None else math.ceil(after * instance.problem.rate - 1e-9)
 
 
-def _pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, np.ndarray[Any, np.dtype[np.int64]]]:
+def _pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, Ints]:
     numbers: dict[tuple[int, float], int] = {}
     networks = []
     widths: list[float] = []
@@ -166,57 +179,54 @@ def _pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, np.ndarray[An
     return pack(networks, widths), net
 
 
-def _law(instance: Instance, kind: str, given: Mapping[str, Any]) -> Law:
+def _habits(instance: Instance, kind: str, given: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return the columns of `Agents.floats` before GOAL_X."""
     car = instance.problem.car
-    slowest = max(car.bounds.speed_low, 0.0)
-    speed = max(min(given["speed"], car.bounds.speed), slowest)
+    speed = max(min(given["speed"], car.bounds.speed), car.bounds.speed_low)
     cosine, sine = sincos(min(given["bearing_tolerance"], WIDEST))
+    tangent = sine / cosine
     stop = given["stop_range"]
     if stop > 0.0:
         stop = max(stop, car.body.reach + speed * instance.problem.period + MARGIN)
-    return Law(
-        offset=given["offset"] * car.lane_width,
-        reached=given["waypoint_radius"],
-        tangent=sine / cosine,
-        miss=sine / cosine * AS_FAR_AS_2016 * car.w / 0.3,
-        stop=0.0 if kind == "scripted" else stop,
-        berth=given["ego_range"] if kind in ("wander", "parked") else -1.0,
-        speed=speed,
-        yaw_rate=min(given["yaw_rate"], car.bounds.yaw_rate),
+    sensing = kind == "follow" and given["sensing_only"]
+    return (
+        given["offset"] * car.lane_width,
+        given["waypoint_radius"],
+        tangent,
+        tangent * AS_FAR_AS_2016 * car.w / 0.3,
+        0.0 if kind == "scripted" else stop,
+        given["ego_range"] if kind in ("wander", "parked") else -1.0,
+        speed,
+        min(given["yaw_rate"], car.bounds.yaw_rate),
+        given.get("gap", 0.0),
+        instance.problem.sensing_radius if sensing else EVERYWHERE,
     )
 
 
-def _builds(instances: Sequence[Instance], law: Floats) -> Floats:
+def _builds(instances: Sequence[Instance], stop: Floats) -> Floats:
+    """Return `Agents.build`."""
     cars = pack_cars([instance.problem.car for instance in instances])
-    span = law[:, :, Law._fields.index("stop")].max(axis=1) + cars.reach
     slowest = np.maximum(cars.speed_low, 0.0)
-    columns = Build(
-        span=span,  # pyright: ignore[reportArgumentType]
-        period=np.array([instance.problem.period for instance in instances]),  # pyright: ignore[reportArgumentType]
-        slowest=slowest,  # pyright: ignore[reportArgumentType]
-        radius=np.maximum(cars.turning_radius, slowest / cars.yaw_rate),  # pyright: ignore[reportArgumentType]
-        curves=((cars.turning_radius > 0.0) | (slowest > 0.0)).astype(np.float64),  # pyright: ignore[reportArgumentType]
-        w=cars.w,  # pyright: ignore[reportArgumentType]
-        half_length=cars.half_length,  # pyright: ignore[reportArgumentType]
-        half_width=cars.half_width,  # pyright: ignore[reportArgumentType]
-        rounding=cars.rounding,  # pyright: ignore[reportArgumentType]
+    columns = (
+        stop + cars.reach,
+        np.array([instance.problem.period for instance in instances]),
+        slowest,
+        np.maximum(cars.turning_radius, slowest / cars.yaw_rate),
+        ((cars.turning_radius > 0.0) | (slowest > 0.0)).astype(np.float64),
+        cars.w,
+        cars.half_length,
+        cars.half_width,
+        cars.rounding,
     )
-    return np.ascontiguousarray(np.stack(list(columns), axis=1))
+    return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
-def _memory(kind: np.ndarray[Any, np.dtype[np.int64]], gap: Floats, w: float) -> Memory:
-    follows = kind == FOLLOW
+def _trails(ints: Ints, floats: Floats, w: float) -> tuple[Floats, Ints, Floats]:
+    """Give every car that follows a ring for the ego's path; return `Agents.path`, `mark` and `last`."""
+    follows = ints[:, :, KIND] == FOLLOW
     followers = int(follows.sum())
-    trail = np.full(kind.shape, -1, dtype=np.int64)
-    trail[follows] = np.arange(followers)
-    points = math.ceil((float(gap.max()) + TRAIL) / (STEP * w / 0.3)) + 2
-    return Memory(
-        lane=np.full(kind.shape, -1, dtype=np.int64),
-        leg=np.zeros(kind.shape, dtype=np.int64),
-        place=np.full(kind.shape, -1, dtype=np.int64),
-        goal=np.zeros((*kind.shape, 2)),
-        trail=trail,
-        path=np.zeros((followers, points, 3)),
-        mark=np.full((followers, 3), 0, dtype=np.int64) - np.array([0, 1, 0]),
-        last=np.zeros((followers, 3)),
-    )
+    ints[follows, TRAIL] = np.arange(followers)
+    points = math.ceil((float(floats[:, :, GAP].max()) + REMEMBERED) / (STEP * w / 0.3)) + 2
+    mark = np.zeros((followers, 3), dtype=np.int64)
+    mark[:, AIMED] = -1
+    return np.zeros((followers, points, 3)), mark, np.zeros((followers, 3))

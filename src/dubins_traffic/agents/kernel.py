@@ -2,49 +2,59 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dubins_traffic.agents.lanes import (
+    FAR,
     aim_for,
-    clear,
     frame,
     lane_at,
-    loop_exit,
     nearer_exit,
     place_of,
     random_exit,
     spread,
-    waypoint,
 )
 from dubins_traffic.agents.sight import look
 from dubins_traffic.agents.tables import (
+    BEGIN,
     BERTH,
     CURVES,
+    FIRST,
     FOLLOW,
+    GOAL_X,
+    GOAL_Y,
+    KIND,
+    LANE,
+    LAST,
+    LEG,
     LOOP,
     MISS,
     OFFSET,
     PERIOD,
+    PLACE,
     RADIUS,
     REACHED,
+    REPEAT,
     SCRIPTED,
     SLOWEST,
     SPEED,
     TANGENT,
     YAW_RATE,
-    Cast,
-    Memory,
+    Agents,
     W,
     Workspace,
 )
-from dubins_traffic.agents.trail import observe, on_path, track
+from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.waypoint import pursue, turn_then_drive
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.table import RoadTable
 
 AIM = 0.6
-"""How far along the lane line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""
+"""How far along the lane's line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""
+Numbers = tuple[float, float, float, float]
 BACK = -0.99
 """Cosine of the turn between two lanes below which it counts as turning round."""
 
@@ -56,8 +66,7 @@ def decide(
     state: State,
     roads: RoadTable,
     obstacles: ObstacleTable,
-    cast: Cast,
-    memory: Memory,
+    agents: Agents,
     work: Workspace,
     commands: Floats,
 ) -> int:
@@ -65,180 +74,160 @@ def decide(
 
     Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which
     is then untouched, like those after it.
-
-    Notes
-    -----
-    What happens in every tick is done here on numbers: a call that takes tables costs more than all of it.
     """
     for b in range(begin, state.count.shape[0]):
         if state.count[b] < 2:
             continue
-        if look(state, b, cast, obstacles, work) > work.pair.shape[0]:
+        build = agents.build[b]
+        ints = agents.ints[b]
+        floats = agents.floats[b]
+        if look(state, b, build, floats, obstacles, work) > work.pair.shape[0]:
             return -1 - b
-        period = cast.build[b, PERIOD]
-        curves = cast.build[b, CURVES] != 0.0
+        ego = (state.x[b, 0], state.y[b, 0], state.c[b, 0], state.s[b, 0])
         for n in range(1, state.count[b]):
-            commands[b, n, 0] = 0.0
-            commands[b, n, 1] = 0.0
-            kind = cast.kind[b, n]
-            if kind == SCRIPTED:
-                commands[b, n, 0], commands[b, n, 1] = _play(tick, b, n, cast, memory)
-                continue
+            speed = 0.0
+            yaw_rate = 0.0
+            free = tick >= ints[n, BEGIN] and work.held[n] == 0
+            pose = (state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
             seen = False
-            if kind == FOLLOW:
-                seen = observe(tick, state, b, n, cast, memory)
-            if tick < cast.begin[b, n] or work.held[n] == 1:
-                continue
-            if kind == FOLLOW and on_path(state, b, n, cast, memory):
-                commands[b, n, 0], commands[b, n, 1] = track(state, b, n, seen, cast, memory)
-                continue
-            if memory.lane[b, n] < 0:
-                _enter(state, b, n, roads, cast, memory)
-            x = state.x[b, n]
-            y = state.y[b, n]
-            if curves:
-                speed, yaw_rate = _curve(tick, state, b, n, seen, roads, cast, memory, work)
-            else:
-                dx = memory.goal[b, n, 0] - x
-                dy = memory.goal[b, n, 1] - y
-                if dx * dx + dy * dy < cast.law[b, n, REACHED] * cast.law[b, n, REACHED]:
-                    _arrive(tick, state, b, n, seen, roads, cast, memory, work)
-                speed, yaw_rate = turn_then_drive(
-                    x, y, state.c[b, n], state.s[b, n], memory.goal[b, n, 0], memory.goal[b, n, 1],
-                    cast.law[b, n, TANGENT], cast.law[b, n, MISS],
-                    cast.law[b, n, SPEED], cast.law[b, n, YAW_RATE], period,
-                )  # fmt: skip
-            dx = state.x[b, 0] - x
-            dy = state.y[b, 0] - y
-            if dx * dx + dy * dy > cast.law[b, n, BERTH] * abs(cast.law[b, n, BERTH]):
-                commands[b, n, 0] = speed
+            if ints[n, KIND] == SCRIPTED:
+                speed, yaw_rate = play(tick, n, ints, agents.script)
+                free = False
+            elif ints[n, KIND] == FOLLOW:
+                seen, free, speed, yaw_rate = follow(
+                    tick, n, pose, ego, free, build, ints, floats, agents.path, agents.mark, agents.last
+                )
+            if free:
+                dx = floats[n, GOAL_X] - pose[0]
+                dy = floats[n, GOAL_Y] - pose[1]
+                near = dx * dx + dy * dy < floats[n, REACHED] * floats[n, REACHED]
+                if near or ints[n, LANE] < 0 or build[CURVES] != 0.0:
+                    navigate(
+                        tick, n, pose, ego, seen, roads, agents.net[b], build, ints, floats, agents.cycle,
+                        work.hops, work.queue, agents.seed[b], agents.trial[b],
+                    )  # fmt: skip
+                speed, yaw_rate = steer(n, pose, ego, build, floats)
+            commands[b, n, 0] = speed
             commands[b, n, 1] = yaw_rate
     return state.count.shape[0]
 
 
 @jit
-def _play(tick: int, b: int, n: int, cast: Cast, memory: Memory) -> tuple[float, float]:
-    first = cast.plan[b, n, 0]
-    last = cast.plan[b, n, 1]
+def steer(n: int, pose: Numbers, ego: Numbers, build: Floats, floats: Floats) -> tuple[float, float]:
+    """Return (speed, yaw rate) toward the waypoint; no speed near the ego."""
+    x, y, c, s = pose
+    goal_x = floats[n, GOAL_X]
+    goal_y = floats[n, GOAL_Y]
+    yaw = floats[n, YAW_RATE]
+    if build[CURVES] != 0.0:
+        speed, yaw_rate = pursue(
+            x, y, c, s, goal_x, goal_y, floats[n, SPEED], build[SLOWEST], yaw, build[RADIUS]
+        )
+    else:
+        speed, yaw_rate = turn_then_drive(
+            x, y, c, s, goal_x, goal_y, floats[n, TANGENT], floats[n, MISS], floats[n, SPEED], yaw, build[PERIOD]
+        )  # fmt: skip
+    dx = ego[0] - x
+    dy = ego[1] - y
+    if dx * dx + dy * dy <= floats[n, BERTH] * abs(floats[n, BERTH]):
+        speed = 0.0
+    return speed, yaw_rate
+
+
+@jit
+def play(tick: int, n: int, ints: Ints, script: Floats) -> tuple[float, float]:
+    """Return (speed, yaw rate) of a script in a tick."""
+    first = ints[n, FIRST]
+    last = ints[n, LAST]
     if first == last:
         return 0.0, 0.0
-    total = int(cast.script[last - 1, 0])
-    if total == 0 or (tick >= total and cast.plan[b, n, 2] == 0):
+    total = int(script[last - 1, 0])
+    if total == 0 or (tick >= total and ints[n, REPEAT] == 0):
         return 0.0, 0.0
     tick = tick % total
-    row = memory.place[b, n]
-    if row < first or (row > first and cast.script[row - 1, 0] > tick):
+    row = ints[n, PLACE]
+    if row < first or (row > first and script[row - 1, 0] > tick):
         row = first
-    while cast.script[row, 0] <= tick:
+    while script[row, 0] <= tick:
         row += 1
-    memory.place[b, n] = row
-    return cast.script[row, 1], cast.script[row, 2]
+    ints[n, PLACE] = row
+    return script[row, 1], script[row, 2]
 
 
 @jit
-def _enter(state: State, b: int, n: int, roads: RoadTable, cast: Cast, memory: Memory) -> None:
-    """Take the lane of the nearest segment that leads along the heading, and drive to its end."""
-    net = cast.net[b]
-    lane = lane_at(roads, net, state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-    memory.lane[b, n] = lane
-    memory.leg[b, n] = 1 if cast.build[b, CURVES] == 0.0 else -1
-    goal_x, goal_y = waypoint(roads, net, lane, cast.law[b, n, OFFSET], 0.0, True)
-    memory.goal[b, n, 0] = goal_x
-    memory.goal[b, n, 1] = goal_y
-    if cast.kind[b, n] == LOOP:
-        memory.place[b, n] = place_of(lane, cast.plan[b, n, 0], cast.plan[b, n, 1], cast.cycle)
+def navigate(
+    tick: int, n: int, pose: Numbers, ego: Numbers, seen: bool, roads: RoadTable, net: int,
+    build: Floats, ints: Ints, floats: Floats, cycle: Ints, hops: Ints, queue: Ints, seed: Any, trial: int,
+) -> None:  # fmt: skip
+    """Set the waypoint of a car that begins to drive on lanes, has reached its waypoint, or can't turn in place.
 
-
-@jit
-def _exit(
-    tick: int,
-    state: State,
-    b: int,
-    n: int,
-    seen: bool,
-    roads: RoadTable,
-    cast: Cast,
-    memory: Memory,
-    work: Workspace,
-) -> int:
-    """Return the lane to take at the end of the present one: round the loop, toward the ego, or any."""
-    net = cast.net[b]
-    lane = memory.lane[b, n]
-    if cast.kind[b, n] == LOOP:
-        return loop_exit(roads, net, lane, b, n, cast, memory, work)
-    if seen:
-        clear(roads, net, work.hops)
-        goal = lane_at(roads, net, state.x[b, 0], state.y[b, 0], state.c[b, 0], state.s[b, 0])
-        spread(roads, net, work.hops, work.queue, aim_for(goal, work.hops, work.queue, 0))
-        return nearer_exit(roads, net, lane, work.hops)
-    return random_exit(roads, net, lane, cast.seed[b], cast.trial[b], n, tick)
-
-
-@jit
-def _arrive(
-    tick: int,
-    state: State,
-    b: int,
-    n: int,
-    seen: bool,
-    roads: RoadTable,
-    cast: Cast,
-    memory: Memory,
-    work: Workspace,
-) -> None:
-    """Set the next waypoint: the end of the next lane, or first its start when that leads back."""
-    net = cast.net[b]
-    lane = memory.lane[b, n]
-    to_end = True
-    if memory.leg[b, n] == 1:
-        taken = _exit(tick, state, b, n, seen, roads, cast, memory, work)
-        to_end = taken != lane ^ 1
-        lane = taken
-    memory.lane[b, n] = lane
-    memory.leg[b, n] = 1 if to_end else 0
-    goal_x, goal_y = waypoint(roads, net, lane, cast.law[b, n, OFFSET], 0.0, to_end)
-    memory.goal[b, n, 0] = goal_x
-    memory.goal[b, n, 1] = goal_y
-
-
-@jit
-def _curve(
-    tick: int,
-    state: State,
-    b: int,
-    n: int,
-    seen: bool,
-    roads: RoadTable,
-    cast: Cast,
-    memory: Memory,
-    work: Workspace,
-) -> tuple[float, float]:
-    """Drive along the lines of lanes on arcs, for cars that can't turn in place.
-
-    The next lane is chosen before the end of the present one, and taken where the arc between the two lines begins.
+    A car begins with the lane of the nearest segment that leads along its heading. Its waypoint is the end of the
+    lane; when the lane leads back, first its start. A car that can't turn in place chooses its next lane before
+    the end of the present one and takes it where the arc between their two lines begins; its waypoint is a point
+    of the lane's line ahead.
     """
-    net = cast.net[b]
-    offset = cast.law[b, n, OFFSET]
-    radius = cast.build[b, RADIUS]
-    lane = memory.lane[b, n]
-    x0, y0, tx, ty, length = frame(roads, net, lane)
-    progress = (state.x[b, n] - x0) * tx + (state.y[b, n] - y0) * ty
-    if memory.leg[b, n] < 0 and progress >= length - 2.0 * (offset + radius):
-        memory.leg[b, n] = _exit(tick, state, b, n, seen, roads, cast, memory, work)
-    coming = memory.leg[b, n]
-    if coming >= 0:
-        _, _, ux, uy, _ = frame(roads, net, coming)
-        along = tx * ux + ty * uy
-        half = (tx * uy - ty * ux) / (1.0 + along) if along > BACK else 0.0
-        if progress >= length + offset * half - radius * abs(half):
-            lane = coming
-            memory.lane[b, n] = lane
-            memory.leg[b, n] = -1
-            x0, y0, tx, ty, length = frame(roads, net, lane)
-            progress = (state.x[b, n] - x0) * tx + (state.y[b, n] - y0) * ty
-    progress += max(AIM * cast.build[b, W] / 0.3, 2.0 * radius)
-    goal_x, goal_y = waypoint(roads, net, lane, offset, progress, False)
-    return pursue(
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], goal_x, goal_y,
-        cast.law[b, n, SPEED], cast.build[b, SLOWEST], cast.law[b, n, YAW_RATE], radius,
-    )  # fmt: skip
+    x, y, c, s = pose
+    curves = build[CURVES] != 0.0
+    began = ints[n, LANE] < 0
+    if began:
+        ints[n, LANE] = lane_at(roads, net, x, y, c, s)
+        ints[n, LEG] = -1 if curves else 1
+        ints[n, PLACE] = place_of(ints[n, LANE], ints[n, FIRST], ints[n, LAST], cycle)
+    lane = ints[n, LANE]
+    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    ahead = length - (x - x0) * tx - (y - y0) * ty
+    if curves:
+        leaves = ints[n, LEG] < 0 and ahead <= 2.0 * (floats[n, OFFSET] + build[RADIUS])
+    else:
+        leaves = ints[n, LEG] == 1 and not began
+    coming = -1
+    if leaves:
+        coming = choose(tick, n, lane, ego, seen, roads, net, ints, cycle, hops, queue, seed, trial)
+    if curves:
+        if leaves:
+            ints[n, LEG] = coming
+        coming = ints[n, LEG]
+        if coming >= 0:
+            _, _, ux, uy, _ = frame(roads.seg[roads.seg_off[net] + (coming >> 1)], coming)
+            along = tx * ux + ty * uy
+            half = (tx * uy - ty * ux) / (1.0 + along) if along > BACK else 0.0
+            if ahead <= build[RADIUS] * abs(half) - floats[n, OFFSET] * half:
+                ints[n, LANE] = coming
+                ints[n, LEG] = -1
+    elif leaves:
+        ints[n, LANE] = coming
+        ints[n, LEG] = 0 if coming == lane ^ 1 else 1
+    elif not began:
+        ints[n, LEG] = 1
+    lane = ints[n, LANE]
+    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    progress = length if ints[n, LEG] == 1 else 0.0
+    if curves:
+        progress = (x - x0) * tx + (y - y0) * ty + max(AIM * build[W] / 0.3, 2.0 * build[RADIUS])
+    floats[n, GOAL_X] = x0 + progress * tx + floats[n, OFFSET] * ty
+    floats[n, GOAL_Y] = y0 + progress * ty - floats[n, OFFSET] * tx
+
+
+@jit
+def choose(
+    tick: int, n: int, lane: int, ego: Numbers, seen: bool, roads: RoadTable, net: int,
+    ints: Ints, cycle: Ints, hops: Ints, queue: Ints, seed: Any, trial: int,
+) -> int:  # fmt: skip
+    """Return the lane to take at the end of `lane`: round the cycle or to it, toward the ego if seen, or any."""
+    if ints[n, PLACE] >= 0:
+        ints[n, PLACE] = ints[n, PLACE] + 1 if ints[n, PLACE] + 1 < ints[n, LAST] else ints[n, FIRST]
+        return cycle[ints[n, PLACE]]
+    v = roads.vert_off[net] + roads.ends[roads.seg_off[net] + (lane >> 1), 1 - (lane & 1)]
+    if ints[n, KIND] != LOOP and not seen:
+        return random_exit(roads.arms, roads.degree, v, lane, seed, trial, n, tick)
+    for k in range(hops.shape[0]):
+        hops[k] = FAR
+    count = 0
+    if seen:
+        count = aim_for(lane_at(roads, net, ego[0], ego[1], ego[2], ego[3]), hops, queue, count)
+    for k in range(ints[n, FIRST], ints[n, LAST]):
+        count = aim_for(cycle[k], hops, queue, count)
+    spread(roads, net, hops, queue, count)
+    taken = nearer_exit(roads.arms, roads.degree, v, lane, hops)
+    ints[n, PLACE] = place_of(taken, ints[n, FIRST], ints[n, LAST], cycle)
+    return taken

@@ -10,12 +10,12 @@ from dubins_traffic.agents.tables import (
     ROUNDING,
     SPAN,
     STOP,
-    Cast,
     Workspace,
 )
 from dubins_traffic.cars.near import candidates
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import nearest_in_box, separation
 from dubins_traffic.kernels.compile import jit
 
@@ -66,34 +66,37 @@ def sees(
 
 
 @jit
-def look(state: State, b: int, cast: Cast, obstacles: ObstacleTable, work: Workspace) -> int:
-    """Set `held[n]` to 1 for each e-agent of trial b that sees something nearer than it stops at, else to 0.
+def look(
+    state: State, b: int, build: Floats, floats: Floats, obstacles: ObstacleTable, work: Workspace
+) -> int:
+    """Set `held[n]` to 1 for each car of trial b that sees something nearer than it stops at, else to 0.
 
-    Returns the number of pairs that had to be looked at; if it exceeds the room for pairs, nothing was decided.
+    `build` and `floats` are the trial's rows of `Agents`. Returns the number of pairs that had to be looked at; if
+    it exceeds the room for pairs, nothing was decided.
     """
-    span = cast.build[b, SPAN]
+    span = build[SPAN]
     found = candidates(state, b, span, obstacles, span, work.pair, work.head, work.link, work.cell)
     if found > work.pair.shape[0]:
         return found
     for n in range(state.count[b]):
         work.held[n] = 0
-    p = cast.build[b, HALF_LENGTH]
-    q = cast.build[b, HALF_WIDTH]
-    r = cast.build[b, ROUNDING]
+    p = build[HALF_LENGTH]
+    q = build[HALF_WIDTH]
+    r = build[ROUNDING]
     for k in range(found):
         i = work.pair[k, 0]
         j = work.pair[k, 1]
         if j < 0:
             row = obstacles.part[-1 - j]
             if sees(
-                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], cast.law[b, i, STOP],
+                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], floats[i, STOP],
                 row[0], row[1], row[2], row[3], row[4], row[5], row[6],
             ):  # fmt: skip
                 work.held[i] = 1
             continue
         for _ in range(2):
             if work.held[i] == 0 and sees(
-                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], cast.law[b, i, STOP],
+                state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], floats[i, STOP],
                 state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r,
             ):  # fmt: skip
                 work.held[i] = 1

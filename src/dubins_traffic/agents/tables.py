@@ -1,6 +1,7 @@
 """The e-agents of a batch as arrays for kernels: what they are, what they remember, room to work in.
 
-Arrays over cars are (B, N), the ego's entries unused.
+A call that takes many arrays costs more to compile and to make than what happens in it, so that the numbers of one
+car stand together in a row, and functions take rows.
 """
 
 from __future__ import annotations
@@ -14,99 +15,70 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 
 WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
 KINDS = {"wander": WANDER, "loop": LOOP, "follow": FOLLOW, "parked": PARKED, "scripted": SCRIPTED}
+NOBODY = -1
+
+KIND, BEGIN, FIRST, LAST, REPEAT, TRAIL, LANE, LEG, PLACE = range(9)
+INTS = 9
+"""Columns of `Agents.ints`.
+
+KIND: NOBODY where there's no e-agent. BEGIN: the tick at which the car begins to drive. FIRST, LAST: its rows of
+`cycle` or `script` are FIRST to LAST - 1. REPEAT: 1 if its script repeats. TRAIL: its row of `path`, `mark` and
+`last`, or -1. It remembers LANE: the lane driven, -1 before the first; LEG: for cars that turn in place 0 toward
+the start of the lane and 1 toward its end, for others the lane to come, -1 until it is chosen; PLACE: the row of its
+cycle or script, -1 when not on it.
+"""
+
+OFFSET, REACHED, TANGENT, MISS, STOP, BERTH, SPEED, YAW_RATE, GAP, SIGHT, GOAL_X, GOAL_Y = range(12)
+FLOATS = 12
+"""Columns of `Agents.floats`: metres, m/s, rad/s.
+
+OFFSET: how far right of the centre line it drives. REACHED: when a waypoint counts as reached. TANGENT and MISS: the
+bearing tolerance (see `driving.waypoint`). STOP: it stands while a surface in sight is nearer. BERTH: it does not
+drive while the ego's centre is within; negative: never mind. SPEED, YAW_RATE: how fast it drives and turns. GAP:
+kept behind the ego. SIGHT: from where the ego is seen. It remembers GOAL_X, GOAL_Y: the waypoint.
+"""
+
+SPAN, PERIOD, SLOWEST, RADIUS, CURVES, W, HALF_LENGTH, HALF_WIDTH, ROUNDING = range(9)
+"""Columns of `Agents.build`: metres, seconds, m/s.
+
+SPAN: no two bodies matter to each other whose centres are farther apart. PERIOD: of a tick. SLOWEST: smallest
+speed. RADIUS: of the tightest turn. CURVES: 1 if the cars can't turn in place, else 0. W. Then the body as a rounded
+box.
+"""
+
+WRITTEN, AIMED, SEEN = range(3)
+"""Columns of `Agents.mark`: points of the ego's path written so far, the one driven to (-1: not on the path), and the
+tick at which the ego was last seen."""
 
 STEP = 0.1
 """Metres between two remembered points of the ego's path (for w = 0.3 m)."""
 
 
-class Law(NamedTuple):
-    """How one e-agent drives: metres, m/s, rad/s.
-
-    `offset`: how far right of the centre line; `reached`: when a waypoint counts as reached; `tangent` and `miss`:
-    the bearing tolerance (see `driving.waypoint`); `stop`: it stands while a surface in sight is nearer; `berth`:
-    it does not drive while the ego's centre is within; `speed`, `yaw_rate`: how fast it drives and turns.
-    """
-
-    offset: float
-    reached: float
-    tangent: float
-    miss: float
-    stop: float
-    berth: float
-    speed: float
-    yaw_rate: float
-
-
-class Build(NamedTuple):
-    """What the cars of one trial are, and its tick: metres, m/s, seconds.
-
-    `span`: no two bodies matter to each other whose centres are farther apart; `period`: of a tick; `slowest`:
-    smallest speed; `radius`: of the tightest turn; `curves`: 1 if the cars can't turn in place, else 0; `w`; the
-    body as a rounded box.
-    """
-
-    span: float
-    period: float
-    slowest: float
-    radius: float
-    curves: float
-    w: float
-    half_length: float
-    half_width: float
-    rounding: float
-
-
-OFFSET, REACHED, TANGENT, MISS, STOP, BERTH, SPEED, YAW_RATE = range(len(Law._fields))
-SPAN, PERIOD, SLOWEST, RADIUS, CURVES, W, HALF_LENGTH, HALF_WIDTH, ROUNDING = range(len(Build._fields))
-
-
-class Cast(NamedTuple):
-    """What the e-agents of a batch are. Nothing in it changes during a batch.
+class Agents(NamedTuple):
+    """The e-agents of a batch.
 
     `net` (B,): number of the road network; `seed` (B,) uint64 and `trial` (B,): of the random numbers; `build`
-    (B, 9) and `law` (B, N, 8): rows of `Build` and `Law`; `kind` (B, N): -1 for no e-agent; `begin` (B, N): tick
-    at which the car begins to drive; `plan` (B, N, 3): first and last + 1 row of its part of `cycle` or `script`,
-    and 1 if it repeats; `gap` and `sight` (B, N): metres kept behind the ego, and from which the ego is seen;
-    `cycle` (M,): lanes in order; `script` (M, 3): tick of the plan at which the step ends, speed, yaw rate.
+    (B, 9), `ints` (B, N, 9) and `floats` (B, N, 12): columns as above; `cycle` (M,): lanes in order; `script`
+    (M, 3): tick of the script at which the step ends, speed, yaw rate. Of the ego's path, for every car that
+    follows: `path` (F, M, 3), a ring of x, y and distance driven; `mark` (F, 3): columns as above; `last` (F, 3):
+    the ego's position when last seen and the distance driven to there.
     """
 
     net: Ints
     seed: npt.NDArray[np.uint64]
     trial: Ints
     build: Floats
-    law: Floats
-    kind: Ints
-    begin: Ints
-    plan: Ints
-    gap: Floats
-    sight: Floats
+    ints: Ints
+    floats: Floats
     cycle: Ints
     script: Floats
-
-
-class Memory(NamedTuple):
-    """What the e-agents of a batch remember from tick to tick.
-
-    `lane` (B, N): the lane driven, -1 before the first; `leg` (B, N): for cars that turn in place, 0 toward the
-    lane's start and 1 toward its end, for others the lane to come (-1: not chosen); `place` (B, N): row of the
-    plan, -1 when not on it; `goal` (B, N, 2): the waypoint. Of the ego's path, per car that follows (`trail` (B, N)
-    is its row, -1 for none): `path` (F, M, 3) a ring of x, y and distance driven; `mark` (F, 2): points written,
-    and the point being driven to (-1: not on the path); `last` (F, 3): the ego's position when last seen and the
-    distance driven to it.
-    """
-
-    lane: Ints
-    leg: Ints
-    place: Ints
-    goal: Floats
-    trail: Ints
     path: Floats
     mark: Ints
     last: Floats
 
 
 class Workspace(NamedTuple):
-    """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), flags, a queue of lanes."""
+    """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), who must stand, lanes."""
 
     pair: Ints
     head: Ints
@@ -119,12 +91,12 @@ class Workspace(NamedTuple):
 
 def workspace(cars: int, pairs: int, lanes: int) -> Workspace:
     """Return scratch for trials of up to `cars` cars, `pairs` pairs of neighbours and `lanes` lanes."""
-    size = 1
-    while size < 2 * cars:
-        size *= 2
+    buckets = 64
+    while buckets < 2 * cars:
+        buckets *= 2
     return Workspace(
         pair=np.zeros((pairs, 2), dtype=np.int64),
-        head=np.zeros(size, dtype=np.int64),
+        head=np.zeros(buckets, dtype=np.int64),
         link=np.zeros(cars, dtype=np.int64),
         cell=np.zeros((cars, 2), dtype=np.int64),
         held=np.zeros(cars, dtype=np.int64),
