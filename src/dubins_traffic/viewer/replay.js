@@ -4,6 +4,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const SWITCHES = { f: "follow", t: "trails", l: "labels", n: "lanes", r: "sensing" };
 const PANEL_PERIOD = 100;
 const KEY_PAN = 60;
+const VIEW_WIDTHS = 8;
 
 const trial = new Trial(JSON.parse(find("data").textContent));
 const state = { time: trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
@@ -99,13 +100,21 @@ function setSpeed(speed) {
 function fit() {
   state.fitted = true;
   const [stage, toggles, buttons] = ["stage", "toggles", "zoom"].map((id) => find(id).getBoundingClientRect());
-  const narrow = stage.width < 600;
+  const inRow = buttons.width > buttons.height;
   map.fit({
-    above: narrow ? buttons.bottom - stage.top : 0,
-    right: narrow ? 0 : stage.right - buttons.left,
+    above: inRow ? buttons.bottom - stage.top : 0,
+    right: inRow ? 0 : stage.right - buttons.left,
     below: stage.bottom - toggles.top,
   });
   draw();
+}
+
+// Come near a car that is to be followed, unless somebody has chosen how near.
+function approach() {
+  if (!state.fitted) return;
+  state.fitted = false;
+  const { camera } = map;
+  camera.scale = Math.max(camera.scale, Math.min(camera.width, camera.height) / (VIEW_WIDTHS * trial.width));
 }
 
 function zoom(factor, px, py) {
@@ -143,6 +152,7 @@ function listenToControls() {
     show[name] = find(name).checked;
     find(name).addEventListener("change", () => {
       show[name] = find(name).checked;
+      if (name === "follow" && show.follow) approach();
       draw();
     });
   }

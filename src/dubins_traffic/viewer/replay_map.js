@@ -111,25 +111,36 @@ class MapView {
   }
 
   draw(time, chosen, show) {
-    const { context: c, camera, ratio, trial } = this;
+    const { context: c, camera, trial } = this;
     if (show.follow) Object.assign(camera, (({ x, y }) => ({ x, y }))(trial.pose(chosen, time)));
     c.setTransform(1, 0, 0, 1, 0, 0);
     c.fillStyle = this.colours.ground;
     c.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    const zoom = camera.scale * ratio;
-    const [px, py] = camera.toScreen(0, 0);
-    c.setTransform(zoom, 0, 0, -zoom, px * ratio, py * ratio);
     this.pixel = 1 / camera.scale;
+    this.inMetres();
     this.drawRoads(show.lanes);
     this.drawGoals(time);
+    this.inPixels();
+    if (show.labels) this.drawPlaces();
+    this.inMetres();
     this.drawObstacles();
     if (show.trails) trial.cars.forEach((_, index) => this.drawTrail(trial.cars.length - 1 - index, time));
     if (show.sensing) this.drawSensing(chosen, time);
     this.drawContacts(time);
     for (let car = trial.cars.length - 1; car >= 0; car -= 1) this.drawCar(car, time, car === chosen);
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    if (show.labels) this.drawLabels(time, chosen);
+    this.inPixels();
+    if (show.labels) this.drawNames(time, chosen);
     this.drawScale();
+  }
+
+  inMetres() {
+    const zoom = this.camera.scale * this.ratio;
+    const [px, py] = this.camera.toScreen(0, 0);
+    this.context.setTransform(zoom, 0, 0, -zoom, px * this.ratio, py * this.ratio);
+  }
+
+  inPixels() {
+    this.context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
   }
 
   drawRoads(lanes) {
@@ -202,7 +213,7 @@ class MapView {
       const to = Math.max(0, Math.round(frame - reach * (1 - (step + 1) / TRAIL_STEPS)));
       const last = step === TRAIL_STEPS - 1;
       if (to <= from && !last) continue;
-      c.globalAlpha = 0.75 * ((step + 1) / TRAIL_STEPS) ** 1.3;
+      c.globalAlpha = 0.9 * ((step + 1) / TRAIL_STEPS) ** 1.3;
       c.beginPath();
       for (let place = from; place <= to; place += 1) c.lineTo(trial.x[base + place], trial.y[base + place]);
       if (last) c.lineTo(pose.x, pose.y);
@@ -304,7 +315,7 @@ class MapView {
     c.fillText(words, px, py);
   }
 
-  drawLabels(time, chosen) {
+  drawPlaces() {
     const { trial, camera, colours } = this;
     const goals = new Set(trial.goals.vertices);
     const small = camera.scale * trial.width;
@@ -316,7 +327,6 @@ class MapView {
         : { size: Math.min(12, 0.28 * small), colour: colours.faint };
       if (look.size >= 8) this.text(trial.lattice[vertex].join(","), px, py, look);
     });
-    this.drawNames(time, chosen);
   }
 
   // Names above their cars, else below or beside; where many crowd, only those that find room.
