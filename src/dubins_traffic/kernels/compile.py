@@ -62,7 +62,9 @@ def cache_folder() -> Path:
 def jit(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` on first use, without fast-math and without exceptions on division.
 
-    The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is.
+    The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is. Kernels
+    don't allocate, so references to arrays are not counted (`_nrt`): each call would else count every array of
+    the tables it is given up and down, which takes longer than most kernels do.
     """
     return _compiled(function, inlined=False)
 
@@ -78,5 +80,5 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
 def _compiled(function: Callable[P, R], *, inlined: bool) -> Callable[P, R]:
     library = cast(Any, numba)
     library.config.CACHE_DIR = str(cache_folder())
-    compiler = library.njit(cache=True, error_model="numpy", nogil=True, forceinline=inlined)
+    compiler = library.njit(cache=True, error_model="numpy", nogil=True, forceinline=inlined, _nrt=False)
     return cast(Callable[P, R], compiler(function))
