@@ -283,8 +283,8 @@ class _Canvas:
         entries = [*reversed(self.handles), *self.things.items()]
         width = max(self.box.width * self.scale, 4.0)
         height = self.box.height * self.scale
-        columns = min(len(entries), max(1, int(width / LEGEND_COLUMN)))
-        rows = -(-len(entries) // columns) if entries else 0
+        rows = -(-len(entries) // max(1, int(width / LEGEND_COLUMN)))
+        columns = -(-len(entries) // max(1, rows))
         left, right, top, bottom = 0.6, 0.18, 0.4, 0.5 + LEGEND_ROW * rows
         whole = (width + left + right, height + top + bottom)
         self.figure.set_size_inches(*whole)
