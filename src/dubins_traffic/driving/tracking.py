@@ -58,11 +58,8 @@ def locate(
     for _ in range(6):
         now, left = project(path, row, sigma, x, y)
         length = path[row, LENGTH]
-        if path[row, PIVOT] != 0.0:
-            done = now >= length - REACHED and abs(left) < 0.1
-        else:
-            done = now >= length
-        if done:
+        early = REACHED if path[row, PIVOT] != 0.0 else 0.0
+        if now >= length - early:
             travelled += length - sigma
             row = next_row(row, first, end, loop)
             sigma = 0.0
@@ -102,7 +99,6 @@ def steer(
     speed: float,
     yaw_most: float,
     radius: float,
-    period: float,
 ) -> tuple[float, float, bool]:
     """Return (speed, yaw rate, turns) of the arc through a point, or of a turn in place toward it.
 

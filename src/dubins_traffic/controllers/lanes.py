@@ -1,0 +1,217 @@
+"""The controller `lanes`: the shortest round through the goals in the right lane, with regard for other cars.
+
+Planning is plain Python and rare: once at the start, and when the way has been blocked for long. What happens every
+tick is the compiled law `controllers.lanes_law`.
+"""
+
+from __future__ import annotations
+
+from math import hypot, inf
+
+import numpy as np
+
+from dubins_traffic.cars.state import Command, Observation, Pose
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.controllers import lanes_law as law
+from dubins_traffic.controllers.lanes_law import Desk, decide
+from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
+from dubins_traffic.driving.paths import FIELDS, PathMaker
+from dubins_traffic.driving.tours import LaneGraph, Round, find_round
+from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
+from dubins_traffic.problem.instance import Problem
+
+FOLLOW = 1.3
+"""Gap kept behind cars, centre to centre, metres: the e-agent of 2016 stands while the ego is within 1 m."""
+DETOUR = 80.0
+"""How many metres a detour may be longer than the way past a place that was found blocked."""
+FORGET = 60.0
+"""Seconds after which a blocked place is tried again."""
+TURN_ROUND = 3.0
+"""What turning round on the road counts, metres."""
+
+
+class Lanes:
+    """Drives the shortest round through the goals in the right lane; follows cars and waits at intersections.
+
+    Notes
+    -----
+    The round is the shortest closed route along lanes (`driving.tours.find_round`), in whatever order of the goals
+    that needs; goals that the car can't reach on the road, having too large a turning radius, are left out. It is
+    joined where that is nearest. Without goals, or if none can be reached, the car stands.
+
+    The car keeps 1.3 m behind others. It waits outside the disc of an intersection of three or more roads, or of a
+    dead end, while a car that has moved within the last second is in it. It backs up from a car that it waits for and
+    that stands within 1.06 m of it. What has stood in its way for some seconds it passes where there is room on the
+    road, else it takes another route, and turns round on the road if that is the only way. A last look before
+    every tick rules out all motions that could bring about a contact, whatever the others do.
+
+    With ``speed_min > 0`` a car can't stop: it drives its round as slowly as it may where it ought to wait, and
+    collisions can't be ruled out. With a turning radius and reverse, it turns on the spot by shuttling.
+    """
+
+    def __init__(self) -> None:
+        self._desk: Desk | None = None
+
+    def start(self, problem: Problem) -> None:
+        """Find the round."""
+        self._problem = problem
+        self._network = problem.network
+        self._maker = PathMaker(problem)
+        self._graph = LaneGraph(problem.network, self._maker.turn_cost)
+        self._round = self._find_round()
+        arrivals = self._round.arrivals[:8] if self._round is not None else ()
+        self._arrivals = tuple(dict.fromkeys(arrivals))
+        self._blocked: dict[int, float] = {}
+        self._closed: dict[int, float] = {}
+        self._desk = None
+
+    def act(self, observation: Observation) -> Command:
+        """Drive on."""
+        if self._round is None:
+            return Command(0.0, 0.0)
+        desk = self._desk
+        if desk is None:
+            desk = self._desk = self._furnish(observation.pose)
+        ego, others = desk.ego[0], desk.others[0]
+        ego[:] = observation.pose
+        others[:, O_SEEN] = 0.0
+        for car in observation.others:
+            others[car.index - 1, :O_STILL] = (*car.pose, *car.twist)
+            others[car.index - 1, O_SEEN] = 1.0
+        decide(desk)
+        if desk.blocker[0] != NOBODY:
+            self._detour(observation, int(desk.blocker[0]))
+        speed, yaw_rate = desk.command[0].tolist()
+        return Command(speed, yaw_rate)
+
+    def _find_round(self) -> Round | None:
+        goals = self._problem.goal_vertices
+        found = find_round(self._graph, goals)
+        if found is None or found.length < IMPOSSIBLE:
+            return found
+        alone = {goal: find_round(self._graph, (goal,)) for goal in set(goals)}
+        lengths = {goal: found.length if found is not None else inf for goal, found in alone.items()}
+        found = find_round(self._graph, [goal for goal in goals if lengths[goal] < IMPOSSIBLE])
+        return found if found is not None and found.length < IMPOSSIBLE else None
+
+    def _furnish(self, pose: Pose) -> Desk:
+        problem = self._problem
+        car = pack_cars([problem.car])
+        obstacles = pack_obstacles([problem.obstacles])
+        row = np.zeros((1, law.CAR_FIELDS))
+        reach = float(car.reach[0])
+        row[0] = (
+            car.half_length[0],
+            car.half_width[0],
+            car.rounding[0],
+            reach,
+            car.speed_low[0],
+            car.speed_high[0],
+            car.yaw_rate[0],
+            car.turning_radius[0],
+            problem.intersection_radius,
+            problem.period,
+            max(FOLLOW, 2.0 * reach + 0.5),
+        )
+        desk = Desk(
+            path=np.zeros((1, FIELDS)),
+            span=np.zeros((1, 3), dtype=np.int64),
+            row=np.zeros(1, dtype=np.int64),
+            memory=np.zeros((1, law.MEMORY_FIELDS)),
+            ego=np.zeros((1, 4)),
+            others=np.zeros((1, len(problem.e_agents), OTHER_FIELDS)),
+            car=row,
+            part=obstacles.part,
+            part_off=obstacles.off,
+            sample=np.zeros((SAMPLES, SAMPLE_FIELDS)),
+            command=np.zeros((1, 2)),
+            blocker=np.full(1, NOBODY, dtype=np.int64),
+        )
+        return self._plan(desk, pose, 0.0)
+
+    def _plan(self, desk: Desk, pose: Pose, time: float) -> Desk:
+        """Return the desk with the cheapest way from `pose` to the round as its path."""
+        tours = self._round
+        assert tours is not None
+        best = (inf, 0, 0.0, 0.0, -1)
+        tables = [
+            self._graph.distances(tours.lanes[place], lambda lane, other: self._penalty(lane, other, time))
+            for place in self._arrivals
+        ]
+        for lane, progress, left, cost in self._entries(pose, time):
+            for k in range(len(tables)):
+                total = cost + tables[k][lane]
+                if total < best[0]:
+                    best = (total, lane, progress, left, k)
+        _, lane, progress, left, k = best
+        place = self._arrivals[k]
+        target = tours.lanes[place]
+        approach = [lane]
+        if lane != target:
+            approach += self._graph.route(
+                lane, target, tables[k], lambda one, other: self._penalty(one, other, time)
+            )
+        lanes = [*approach, *tours.lanes[place + 1 :], *tours.lanes[: place + 1]]
+        path = self._maker.path(lanes, progress, len(approach))
+        memory = np.zeros((1, law.MEMORY_FIELDS))
+        memory[0, law.BEGIN] = memory[0, law.LEFT] = left
+        memory[0, law.RAMP] = 0.2 + 0.8 * abs(left)
+        memory[0, law.UNTIL] = memory[0, law.RAMP]
+        span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
+        return desk._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
+
+    def _entries(self, pose: Pose, time: float) -> list[tuple[int, float, float, float]]:
+        """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""
+        network, w = self._network, self._problem.car.w
+        point = np.array((pose.x, pose.y))
+        segment = int(network.nearest_segment(point)[0])
+        vertex, far = network.nearest_intersection(point)
+        free = can_pivot(self._problem.car)
+        lanes = {2 * segment: False, 2 * segment + 1: False}
+        if float(far) < self._problem.intersection_radius:
+            lanes |= dict.fromkeys(network.arms(int(vertex)), True)
+        entries: list[tuple[int, float, float, float]] = []
+        for lane, out in lanes.items():
+            s, left = (float(value) for value in network.lane_coordinates(lane, point))
+            length = self._graph.length[lane]
+            tx, ty = network.tangents[lane >> 1].tolist()
+            along = (pose.c * tx + pose.s * ty) * (-1.0 if lane & 1 else 1.0)
+            cost = length - s + (0.0 if along > 0.3 else TURN_ROUND if free else IMPOSSIBLE)
+            cost += self._standing_cost(lane, time)
+            if not out and length - s < self._longest_turn(lane):
+                cost += 20.0
+            if abs(left + w) > 2.5 * w or s < -self._problem.intersection_radius:
+                cost += 50.0
+            entries.append((lane, min(s, length), left + w, cost))
+        return entries
+
+    def _longest_turn(self, lane: int) -> float:
+        return max(self._maker.turn(lane, other).before for other in self._network.successors(lane))
+
+    def _standing_cost(self, lane: int, time: float) -> float:
+        return DETOUR if self._blocked.get(lane, -1.0) > time else 0.0
+
+    def _penalty(self, lane: int, other: int, time: float) -> float:
+        closed = self._closed.get(self._graph.end[lane], -1.0) > time
+        return self._standing_cost(other, time) + (DETOUR if closed else 0.0)
+
+    def _detour(self, observation: Observation, blocker: int) -> None:
+        """Note where the way is blocked, and plan again."""
+        desk = self._desk
+        assert desk is not None
+        x, y = desk.others[0, blocker, :2] if blocker >= 0 else desk.part[-1 - blocker, :2]
+        until = observation.time + FORGET
+        point = np.array((float(x), float(y)))
+        vertex, far = self._network.nearest_intersection(point)
+        pose = observation.pose
+        if float(far) < self._problem.intersection_radius + self._problem.car.body.reach:
+            self._closed[int(vertex)] = until
+        else:
+            segment = int(self._network.nearest_segment(point)[0])
+            tx, ty = self._network.tangents[segment].tolist()
+            _, left = self._network.lane_coordinates(2 * segment, point)
+            ahead = (point[0] - pose.x) * tx + (point[1] - pose.y) * ty
+            self._blocked[2 * segment + (1 if float(left) > 0.0 else 0)] = until
+            if hypot(point[0] - pose.x, point[1] - pose.y) < 3.0:
+                self._blocked[2 * segment + (0 if ahead > 0.0 else 1)] = until
+        self._desk = self._plan(desk, pose, observation.time)
