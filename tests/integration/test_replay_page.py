@@ -30,16 +30,17 @@ FLAGS = (
     "--disable-component-update --disable-sync --window-size=1280,800"
 )
 NASTY = "</script><script>window.broken = true</script>"
+REASON = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
 PICTURE = "return document.getElementById('map').toDataURL()"
+
+if (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true":
+    pytest.skip(REASON, allow_module_level=True)
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
     if CHROMIUM is None or DRIVER is None:
-        reason = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
+        pytest.fail(REASON)
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
