@@ -139,8 +139,8 @@ def test_less_than_a_second_off_the_road_is_free() -> None:
 
 
 def test_time_off_the_road_until_the_last_sample_is_free() -> None:
-    assert score(still(AT_00, 10) + still(OFF, 3000), goals=[(0, 0)]) == 24 * 10
-    assert score(still(OFF, 90) + still(AT_00, 10) + still(OFF, 3000), goals=[(0, 0)]) == 24 * 10 / 3.0
+    assert score(still(AT_00, 10) + still(OFF, 300), goals=[(0, 0)]) == 24 * 10
+    assert score(still(OFF, 90) + still(AT_00, 10) + still(OFF, 300), goals=[(0, 0)]) == 24 * 10 / 3.0
 
 
 def test_the_road_has_no_rounded_ends() -> None:

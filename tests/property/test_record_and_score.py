@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -60,12 +61,13 @@ def test_scores_do_not_depend_on_the_blocks(trial: tuple[Instance, Frames], size
     instance, frames = trial
     results = []
     for size in {*sizes, len(frames)}:
-        scorer = Scorer()
-        scorer.begin(instance)
-        for block in blocks(frames, size):
-            scorer.frames(block)
-        scorer.end(Ending(End.DURATION, len(frames) - 1))
-        results.append(scorer.result())
+        with patch("dubins_traffic.scoring.score._BLOCK", size):
+            scorer = Scorer()
+            scorer.begin(instance)
+            for block in blocks(frames, size):
+                scorer.frames(block)
+            scorer.end(Ending(End.DURATION, len(frames) - 1))
+            results.append(scorer.result())
     assert all(result == results[0] for result in results)
 
 

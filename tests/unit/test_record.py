@@ -174,6 +174,16 @@ def test_a_record_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
         RecordWriter(tmp_path).begin(INSTANCE)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_named() -> None:
+    writer = RecordWriter("/dev/full", overwrite=True)
+    with pytest.raises(InputError, match="/dev/full: can't be written: No space left"):
+        writer.begin(INSTANCE)
+    with pytest.raises(InputError, match="/dev/full"):
+        writer.close()
+    writer.close()
+
+
 def foreign(path: Path, topic: str = "/x", message: bytes = b"{}") -> None:
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType.NONE)

@@ -105,6 +105,7 @@ MESSAGES: Final[dict[str, tuple[str, str]]] = {
 
 CONTACT: Final = struct.Struct("<Id2i6d4B")
 
+HEADER_NAME: Final = "dubins_traffic/Trial"
 _STRING = {"type": "string"}
 _NUMBER = {"type": "number"}
 
@@ -126,7 +127,7 @@ def header_schema() -> dict[str, object]:
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dubins_traffic/Trial",
+        "title": HEADER_NAME,
         "description": "What was run: the version 1 instance document, seeds, versions, bounds, names of the cars.",
         "type": "object",
         "properties": properties,

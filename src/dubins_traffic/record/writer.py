@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
 
 from dubins_traffic.cars.state import Contact, Event, Frames
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.protocols import Ending
 from dubins_traffic.record import header, schema, wall
-
-_NEVER_BY_SIZE = 1 << 62
+from dubins_traffic.record.mcap_file import McapFile, Message
+from dubins_traffic.record.sink import Ending
 
 
 class RecordWriter:
@@ -43,7 +42,6 @@ class RecordWriter:
         self._file: BinaryIO | None = None
         self._cars = 0
         self._rate = 1.0
-        self._log_time = 0
 
     def begin(self, instance: Instance) -> None:
         """Make the file and write its header.
@@ -57,100 +55,109 @@ class RecordWriter:
         self._cars = len(instance.names)
         self._rate = instance.problem.rate
         self._file = self._open()
-        self._writer = Writer(self._file, chunk_size=_NEVER_BY_SIZE, compression=CompressionType.NONE)
-        self._writer.start(profile="", library=f"dubins-traffic record {schema.VERSION}")
+        with self._written():
+            self._mcap = McapFile(self._file, library=f"dubins-traffic record {schema.VERSION}")
         description = json.dumps(schema.header_schema()).encode()
-        number = self._writer.register_schema("dubins_traffic/Trial", "jsonschema", description)
-        self._channel = {schema.HEADER: self._writer.register_channel(schema.HEADER, "json", number)}
+        form = (schema.HEADER_NAME, "jsonschema", description)
+        self._channel = {schema.HEADER: self._mcap.register(schema.HEADER, "json", form)}
         for topic, (name, definition) in schema.MESSAGES.items():
-            number = self._writer.register_schema(name, "ros1msg", definition.encode())
-            self._channel[topic] = self._writer.register_channel(topic, "ros1", number)
-        self._add(schema.HEADER, 0, message)
-        self._writer.flush()
+            form = (name, "ros1msg", definition.encode())
+            self._channel[topic] = self._mcap.register(topic, "ros1", form)
+        self._chunk({schema.HEADER: [Message(0, 0, message)]})
 
     def frames(self, frames: Frames) -> None:
         """Write a block of frames as one chunk and flush it to the file."""
-        ticks = range(frames.first, frames.first + len(frames))
-        for tick, message in zip(ticks, encode_frames(frames, self._cars), strict=True):
-            self._add(schema.FRAMES, schema.log_time(tick, self._rate), message, tick)
-        for tick, message in encode_labels(frames, self._cars):
-            self._add(schema.LABELS, schema.log_time(tick, self._rate), message, tick)
-        for contact in frames.contacts:
-            self._add(schema.CONTACTS, round(contact.time * 1e9), encode_contact(contact), contact.tick)
-        for event in frames.events:
-            self._add(schema.EVENTS, schema.log_time(event.tick, self._rate), encode_event(event), event.tick)
-        self._writer.flush()
+        self._chunk(
+            {
+                schema.FRAMES: encode_frames(frames, self._cars),
+                schema.LABELS: encode_labels(frames, self._cars),
+                schema.CONTACTS: [encode_contact(contact) for contact in frames.contacts],
+                schema.EVENTS: [encode_event(event, self._rate) for event in frames.events],
+            }
+        )
 
     def end(self, ending: Ending) -> None:
         """Write the end of the trial and the index, and close the file."""
         message = schema.pack_strings(ending.end.value, ending.ticks, ending.detail)
-        self._add(schema.END, max(self._log_time, schema.log_time(ending.ticks, self._rate)), message)
-        self._writer.finish()
+        self._chunk({schema.END: [Message(schema.log_time(ending.ticks, self._rate), 0, message)]})
+        with self._written():
+            self._mcap.finish()
         self.close()
 
     def close(self) -> None:
         """Close the file as it stands; without an end it stays a record that was cut off."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        file, self._file = self._file, None
+        if file is not None:
+            with self._written():
+                file.close()
 
     def _open(self) -> BinaryIO:
-        try:
+        with self._written():
             file = self.path.open("wb" if self._overwrite else "xb")
+            wall.sidecar(self.path).unlink(missing_ok=True)
+            return file
+
+    @contextmanager
+    def _written(self) -> Generator[None, None, None]:
+        """Turn what the operating system refuses into an error that names the file."""
+        try:
+            yield
         except FileExistsError as error:
-            raise InputError(
-                "the file exists", file=str(self.path), expected="a new name, or leave to overwrite"
-            ) from error
+            expected = "a new name, or leave to overwrite"
+            raise InputError("the file exists", file=str(self.path), expected=expected) from error
         except OSError as error:
             raise InputError(f"can't be written: {error.strerror}", file=str(self.path)) from error
-        wall.sidecar(self.path).unlink(missing_ok=True)
-        return file
 
-    def _add(self, topic: str, log_time: int, message: bytes, sequence: int = 0) -> None:
-        self._log_time = max(self._log_time, log_time)
-        self._writer.add_message(self._channel[topic], log_time, message, log_time, sequence)
+    def _chunk(self, messages: dict[str, list[Message]]) -> None:
+        with self._written():
+            self._mcap.chunk({self._channel[topic]: group for topic, group in messages.items()})
 
 
-def encode_frames(frames: Frames, cars: int) -> Iterator[bytes]:
-    """Yield each frame of a block as a ``dubins_traffic/Frame``."""
+def encode_frames(frames: Frames, cars: int) -> list[Message]:
+    """Return each frame of a block as a ``dubins_traffic/Frame``."""
     rows = np.empty(len(frames), dtype=schema.frame_dtype(cars))
-    rows["tick"] = np.arange(frames.first, frames.first + len(frames))
-    rows["time"] = frames.time
     for name in schema.FRAME_FIELDS:
         rows[f"{name}_length"] = cars
         rows[name] = getattr(frames, name)
-    return _split(rows)
+    return _messages(rows, np.arange(frames.first, frames.first + len(frames)), frames.rate)
 
 
-def encode_labels(frames: Frames, cars: int) -> Iterator[tuple[int, bytes]]:
-    """Yield (tick, ``dubins_traffic/Labels``) for the first frame of a block and for each where a label changes."""
-    columns = [np.asarray(getattr(frames, name)) for name in schema.LABEL_FIELDS]
+def encode_labels(frames: Frames, cars: int) -> list[Message]:
+    """Return a ``dubins_traffic/Labels`` for the first frame of a block and for each where a label changes."""
+    columns = [getattr(frames, name) for name in schema.LABEL_FIELDS]
     changed = np.zeros(len(frames), dtype=bool)
     changed[:1] = True
     for column in columns:
         changed[1:] |= (column[1:] != column[:-1]).any(axis=1)
     at = np.flatnonzero(changed)
     rows = np.empty(len(at), dtype=schema.labels_dtype(cars))
-    rows["tick"] = at + frames.first
-    rows["time"] = frames.time[at]
     for name, column in zip(schema.LABEL_FIELDS, columns, strict=True):
         rows[f"{name}_length"] = cars
         rows[name] = column[at]
-    return zip((at + frames.first).tolist(), _split(rows), strict=True)
+    return _messages(rows, at + frames.first, frames.rate)
 
 
-def encode_contact(contact: Contact) -> bytes:
+def encode_contact(contact: Contact) -> Message:
     """Return a contact as a ``dubins_traffic/Contact``."""
     c = contact
     point = (c.x, c.y, c.nx, c.ny)
-    return schema.CONTACT.pack(c.tick, c.time, c.car, c.other, *point, *c.closing, *c.moved, *c.at_fault)
+    data = schema.CONTACT.pack(c.tick, c.time, c.car, c.other, *point, *c.closing, *c.moved, *c.at_fault)
+    return Message(round(c.time * 1e9), c.tick, data)
 
 
-def encode_event(event: Event) -> bytes:
+def encode_event(event: Event, rate: float) -> Message:
     """Return an event as a ``dubins_traffic/Event``."""
-    return schema.pack_strings(event.tick, event.kind, event.car, event.detail)
+    data = schema.pack_strings(event.tick, event.kind, event.car, event.detail)
+    return Message(schema.log_time(event.tick, rate), event.tick, data)
 
 
-def _split(rows: np.ndarray) -> Iterator[bytes]:
+def _messages(rows: np.ndarray, ticks: np.ndarray, rate: float) -> list[Message]:
+    """Fill in tick and time of `rows` and return each as a message."""
+    rows["tick"] = ticks
+    rows["time"] = ticks / rate
     data, size = rows.tobytes(), rows.dtype.itemsize
-    return (data[i : i + size] for i in range(0, len(data), size))
+    starts = range(0, len(data), size)
+    return [
+        Message(schema.log_time(tick, rate), tick, data[at : at + size])
+        for tick, at in zip(ticks.tolist(), starts, strict=True)
+    ]

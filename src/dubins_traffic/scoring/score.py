@@ -10,14 +10,17 @@ from typing import Any
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
-from dubins_traffic.record.reader import Record, replay
+from dubins_traffic.record.reader import Record
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.record.wall import Wall
+from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+
+_BLOCK = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +85,10 @@ class Score:
 
 
 class Scorer:
-    """A sink that holds all metrics of one trial."""
+    """A sink that holds all metrics of one trial.
+
+    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut.
+    """
 
     def __init__(self) -> None:
         self._icra2016 = Icra2016()
@@ -97,17 +103,21 @@ class Scorer:
         self._instance = instance
         self._ending: Ending | None = None
         self._count = 0
+        self._shown = 0
+        self._waiting: list[Frames] = []
         for metric in self._metrics:
             metric.begin(instance)
 
     def frames(self, frames: Frames) -> None:
-        """Show a block of frames to all metrics."""
+        """Take a block of frames."""
         self._count += len(frames)
-        for metric in self._metrics:
-            metric.frames(frames)
+        self._waiting.append(frames)
+        if self._count - self._shown >= _BLOCK:
+            self._show()
 
     def end(self, ending: Ending) -> None:
         """Keep the named end of the trial."""
+        self._show()
         self._ending = ending
         for metric in self._metrics:
             metric.end(ending)
@@ -126,6 +136,7 @@ class Scorer:
         wall : Wall, optional
             What was measured on the wall clock.
         """
+        self._show()
         visits = self._visiting.result()
         return Score(
             trial=self._instance.trial,
@@ -144,6 +155,14 @@ class Scorer:
             min_clearance_m=self._clearance.result(),
             time_to_begin_s=None if wall is None else wall.time_to_begin_s,
         )
+
+    def _show(self) -> None:
+        if self._waiting:
+            block = joined(self._waiting)
+            self._waiting = []
+            self._shown = self._count
+            for metric in self._metrics:
+                metric.frames(block)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,5 +184,8 @@ class ScoreSheet:
 def score(record: Record) -> Score:
     """Score a record: the same numbers as a `Scorer` that saw the trial; also of one that was cut off."""
     scorer = Scorer()
-    replay(record, [scorer])
+    scorer.begin(record.instance)
+    scorer.frames(record.frames)
+    if record.ending is not None:
+        scorer.end(record.ending)
     return scorer.result(controller=record.controller, record=record.file, wall=record.wall)
