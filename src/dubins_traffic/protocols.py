@@ -66,7 +66,7 @@ class Controller(Protocol):
         """Learn the problem; the wall-clock time of this call is the *time to begin*."""
         ...
 
-    def act(self, observation: Observation) -> Command | tuple[float, float]:
+    def act(self, observation: Observation) -> Command | tuple[float, float] | None:
         """Choose speed (m/s) and yaw rate (rad/s) for the coming tick. None gives up."""
         ...
 

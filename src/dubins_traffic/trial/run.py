@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 from time import perf_counter
 from types import FrameType
 
@@ -18,7 +18,9 @@ from dubins_traffic.trial.trial import Trial
 
 
 class _TooLateError(Exception):
-    pass
+    def __init__(self, deadline: float) -> None:
+        self.deadline = deadline
+        super().__init__(deadline)
 
 
 def run(trial: Trial, controller: Controller, deadline: float | None = None) -> tuple[Ending, Wall]:
@@ -31,7 +33,8 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
     begin: float | None = None
     try:
         started = perf_counter()
-        controller.start(trial.instance.problem)
+        with _Answerable(trial):
+            controller.start(trial.instance.problem)
         begin = perf_counter() - started
         _drive(trial, controller, deadline, latencies)
     except (KeyboardInterrupt, SystemExit):
@@ -39,12 +42,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
         raise
     except ControllerError as error:
         trial.end(End(error.reason), error.detail)
-    except _TooLateError:
-        trial.end(End.DEADLINE, f"act took more than {deadline} s at tick {trial.tick}")
-    except Exception as error:  # a controller may raise anything; its trial names it
-        trial.end(End.CONTROLLER_FAULT, f"{type(error).__name__}: {error} at tick {trial.tick}")
-    ending = trial.end(End.DURATION)
-    ending = _close(controller, ending)
+    ending = _close(controller, trial.end(End.DURATION))
     return ending, measured(begin, _summary(latencies), reproducible=ending.end is not End.DEADLINE)
 
 
@@ -53,31 +51,57 @@ def _drive(trial: Trial, controller: Controller, deadline: float | None, latenci
     advance = trial.advance
     while trial.ending is None:
         observation = trial.observation
-        started = perf_counter()
-        if deadline is None:
-            command = act(observation)
-        else:
-            with _alarm(deadline):
+        with _Answerable(trial):
+            started = perf_counter()
+            if deadline is None:
                 command = act(observation)
-        elapsed = perf_counter() - started
+            else:
+                with _alarm(deadline):
+                    command = act(observation)
+            elapsed = perf_counter() - started
         latencies.append(elapsed)
         if deadline is not None and elapsed > deadline:
-            raise _TooLateError
+            raise _late(trial, deadline)
         if command is None:
             trial.end(End.GAVE_UP, f"the controller gave up at tick {trial.tick}")
         else:
             advance(command)
 
 
+class _Answerable:
+    """Whatever the controller raises in the body is its fault, and becomes the named end of its trial."""
+
+    __slots__ = ("_trial",)
+
+    def __init__(self, trial: Trial) -> None:
+        self._trial = trial
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _traceback: object
+    ) -> None:
+        if isinstance(error, _TooLateError):
+            raise _late(self._trial, error.deadline) from None
+        if isinstance(error, Exception):
+            detail = f"{type(error).__name__}: {error} at tick {self._trial.tick}"
+            raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
+
+
+def _late(trial: Trial, deadline: float) -> ControllerError:
+    return ControllerError(End.DEADLINE.value, f"act took more than {deadline} s at tick {trial.tick}")
+
+
 @contextlib.contextmanager
-def _alarm(seconds: float) -> Iterator[None]:
+def _alarm(seconds: float) -> Generator[None]:
     """Raise _TooLateError in the body after `seconds`, where the platform and thread allow it."""
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
 
     def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise _TooLateError
+        raise _TooLateError(seconds)
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, seconds)

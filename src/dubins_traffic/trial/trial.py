@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -128,7 +128,7 @@ class Trial:
 
     def _checked(self, command: object) -> tuple[float, float]:
         try:
-            speed, yaw = command  # type: ignore[misc]  # what is no pair is refused just below
+            speed, yaw = cast("tuple[float, float]", command)  # what is no pair is refused just below
             speed, yaw = float(speed), float(yaw)
         except (TypeError, ValueError) as error:
             detail = f"a command is two numbers (speed, yaw rate): got {command!r:.80}"
