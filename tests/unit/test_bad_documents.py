@@ -158,9 +158,9 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
     ("ends on what", base(end_on_collision=1), "end_on_collision", "1", "true or false"),
     ("unknown rule", base(rules={"speed_limit": 1}), "rules.speed_limit", "1", "still_speed"),
     ("rule of the wrong type", base(rules={"tickets": 1.5}), "rules.tickets", "1.5", "an integer"),
-    ("rules too tight a network", base(rules=True, intersection_radius=1.4), "rnd", "3.0", "at least 3.654"),
+    ("rules on short roads", base(rules=True, intersection_radius=1.2), "rnd.segments[0]", "3.0", "at least 3.254"),
     ("rules without sight", base(rules=True, sensing_radius=2), "sensing_radius", "2.0", "at least 3.354"),
-    ("rules with small discs", base(rules=True, intersection_radius=0.5), "intersection_radius", "0.5", "0.87"),
+    ("rules with small discs", base(rules=True, intersection_radius=0.5), "intersection_radius", "0.5", "2.9 w = 0.87"),
     ("start of two numbers", base(ego={"start": [0, 0]}), "ego.start", "[0, 0]", "[x, y, theta]"),
     ("start far away", base(ego={"start": [0, 1e300, 0]}), "ego.start", "1e+300", "none above"),
     (

@@ -60,6 +60,11 @@ class Follow(Strict):
     gap: Distance = Field(default=1.0, description="distance kept behind the ego, along its path, m")
     speed: Speed = Field(default=0.5, description="largest speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
+    patience: Seconds | None = Field(
+        2.0,
+        description="seconds it stands for others before it drives on past those that are not in its way, and turns "
+        "round if its way stays barred; null: it stands for ever",
+    )
     sensing_only: bool = Field(
         default=False, description="whether it sees the ego within the sensing radius only"
     )

@@ -6,7 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, create_model, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
 
 from dubins_traffic.cars.body import (
     Body,
@@ -48,6 +56,8 @@ class RectangleModel(Strict):
 
 class BodyModel(Strict):
     """The body that collides: a disc or a rectangle."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     disc: DiscModel | None = Field(default=None, description="a round body")
     rectangle: RectangleModel | None = Field(default=None, description="a rectangular body")
@@ -180,6 +190,8 @@ class PolygonModel(Strict):
 
 class ObstacleModel(Strict):
     """A static obstacle: a disc or a polygon."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     disc: DiscObstacleModel | None = Field(default=None, description="a disc")
     polygon: PolygonModel | None = Field(default=None, description="a simple polygon, convex or not")

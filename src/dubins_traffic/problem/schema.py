@@ -113,11 +113,15 @@ def _describe_parameters(definitions: dict[str, Any]) -> None:
         definitions.update(schema.pop("$defs", {}))
         definitions[f"Parameters of {kind}"] = schema
         names = [kind, *(name for name, ours in NAMES_2016.items() if ours == kind)]
-        reference = {"$ref": f"#/$defs/Parameters%20of%20{kind}"}
+        reference: dict[str, Any] = {
+            "properties": {"parameters": {"$ref": f"#/$defs/Parameters%20of%20{kind}"}}
+        }
+        if schema.get("required"):
+            reference["required"] = ["parameters"]
         rules.append(
             {
                 "if": {"properties": {"type": {"enum": names}}},
-                "then": {"properties": {"parameters": reference}},
+                "then": reference,
             }
         )
     definitions["AgentEntry"]["allOf"] = rules

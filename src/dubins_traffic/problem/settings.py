@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from dubins_traffic.cars.body import Obstacle
 from dubins_traffic.errors import InputError
@@ -181,6 +181,8 @@ class GridNetwork(Strict):
 
 class NetworkModel(Strict):
     """The road network of each trial, if it is not fixed: random or a grid."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     random: RandomNetwork | None = Field(default=None, description="a random planar network")
     grid: GridNetwork | None = Field(default=None, description="a grid with segments removed")
