@@ -50,18 +50,22 @@ def _check_each(segments: Sequence[Segment]) -> None:
                 raise _fault(segments, s, problem, f"at most {LARGEST_DEGREE} roads at a point")
 
 
-def _check_planar(segment: Ints) -> None:
-    """Refuse segments that meet elsewhere than at common ends."""
+def meetings(segment: Ints) -> Ints:
+    """Return the pairs (K, 2) of segments (S, 4) that meet elsewhere than at a common end; the lower number first."""
     start, end = segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64)
     size = max(1.0, float(np.abs(end - start).max(axis=1).mean()))
-    worst: tuple[int, int] | None = None
+    found: list[Ints] = []
     for i, j in pairs(*covered(start, end, 0.0, size)):
-        bad = _meet(segment[i], segment[j])
-        if bad.any():
-            found = min(zip(j[bad].tolist(), i[bad].tolist(), strict=True))
-            worst = found if worst is None else min(worst, found)
-    if worst is not None:
-        later, earlier = worst
+        bad = (i != j) & _meet(segment[i], segment[j])
+        found.append(np.stack([np.minimum(i, j), np.maximum(i, j)], axis=-1)[bad])
+    return np.unique(np.concatenate(found), axis=0) if found else np.empty((0, 2), dtype=np.int64)
+
+
+def _check_planar(segment: Ints) -> None:
+    """Refuse segments that meet elsewhere than at common ends."""
+    found = meetings(segment)
+    if len(found):
+        earlier, later = min(found.tolist(), key=lambda pair: (pair[1], pair[0]))
         rows = [(int(a), int(b), int(c), int(d)) for a, b, c, d in segment]
         problem = f"{_how(segment[earlier], segment[later])} segments[{earlier}]"
         raise _fault(rows, later, problem, "roads that meet at common ends only")

@@ -1,0 +1,121 @@
+"""Room to judge rules 2 and 3: how far apart segments and intersections must be (RULES, *Ground*)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.cells import covered, pairs
+from dubins_traffic.roads.network import RoadNetwork
+
+LEAST_RADIUS = 2.9
+"""R is at least this many w."""
+SEGMENT_SLACK = 0.5
+ROUNDING = 1e-9
+
+
+class Clearances(NamedTuple):
+    """Least metres: length of a segment, between intersections, from an intersection to a segment beside it."""
+
+    length: float
+    apart: float
+    aside: float
+
+
+class Tight(NamedTuple):
+    """What falls short: segments (K,), pairs of intersections (K, 2), intersections and segments (K, 2)."""
+
+    short: Ints
+    close: Ints
+    beside: Ints
+
+
+def clearances(radius: float, reach: float, w: float, slack: float = SEGMENT_SLACK) -> Clearances:
+    """Return what RULES demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`."""
+    both = radius + reach
+    return Clearances(2.0 * both + slack, 2.0 * both, both + 2.0 * w)
+
+
+def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
+    """Return the places where segments between `points` (V, 2) with `ends` (S, 2) fall short of `least`."""
+    a, b = points[ends[:, 0]], points[ends[:, 1]]
+    short = np.flatnonzero(_norm(b - a) < least.length - ROUNDING)
+    count = len(ends)
+    wide = max(least.apart, least.aside)
+    size = max(wide, float(np.abs(b - a).mean()))
+    rows = covered(np.concatenate([a, points]), np.concatenate([b, points]), 0.5 * wide, size)
+    close: list[Ints] = []
+    beside: list[Ints] = []
+    for first, second in pairs(*rows):
+        low, high = np.minimum(first, second), np.maximum(first, second)
+        apart = (low >= count) & (low < high)
+        couple = np.stack([low[apart], high[apart]], axis=-1) - count
+        gap = _norm(points[couple[:, 0]] - points[couple[:, 1]])
+        close.append(couple[gap < least.apart - ROUNDING])
+        mixed = (low < count) & (high >= count)
+        s, v = low[mixed], high[mixed] - count
+        loose = (ends[s] != v[:, None]).all(axis=1)
+        s, v = s[loose], v[loose]
+        far = distances(points[v], a[s], b[s])
+        beside.append(np.stack([v, s], axis=-1)[far < least.aside - ROUNDING])
+    return Tight(short, _distinct(close), _distinct(beside))
+
+
+def clearance_faults(
+    network: RoadNetwork, radius: float, reach: float, w: float, slack: float = SEGMENT_SLACK
+) -> list[InputError]:
+    """Return why rules 2 and 3 are not defined on a network, each fault with its place; empty if they are.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+        The network.
+    radius : float
+        R, the intersection radius, metres.
+    reach : float
+        rho, from a body's centre to its farthest point, metres.
+    w : float
+        Nominal width of a car, metres.
+    slack : float
+        Metres that a segment must be longer than the discs and bodies at its ends.
+    """
+    least = clearances(radius, reach, w, slack)
+    points, ends, names = network.points, network.ends, network.intersections
+    faults: list[InputError] = []
+    if radius < LEAST_RADIUS * w - ROUNDING:
+        expected = f"at least {LEAST_RADIUS} w = {LEAST_RADIUS * w:.6g} m"
+        faults.append(InputError("too small", field="intersection_radius", value=radius, expected=expected))
+    found = tight(points, ends, least)
+    for s in found.short.tolist():
+        faults.append(_fault("too short", s, float(network.lengths[s]), least.length))
+    for v, other in found.close.tolist():
+        s = int(np.flatnonzero((ends == v).any(axis=1))[0])
+        gap = float(_norm(points[v] - points[other]))
+        problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
+        faults.append(_fault(problem, s, gap, least.apart))
+    for v, s in found.beside.tolist():
+        gap = float(distances(points[v], points[ends[s, 0]], points[ends[s, 1]]))
+        faults.append(_fault(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside))
+    return faults
+
+
+def distances(p: Floats, a: Floats, b: Floats) -> Floats:
+    """Return the distances from points p to segments from a to b, each (..., 2)."""
+    step, away = b - a, p - a
+    along = (away * step).sum(axis=-1) / (step * step).sum(axis=-1)
+    return _norm(away - np.clip(along, 0.0, 1.0)[..., None] * step)
+
+
+def _norm(vectors: Floats) -> Floats:
+    return np.sqrt((vectors * vectors).sum(axis=-1))
+
+
+def _distinct(rows: list[Ints]) -> Ints:
+    return np.unique(np.concatenate(rows), axis=0) if rows else np.empty((0, 2), dtype=np.int64)
+
+
+def _fault(problem: str, s: int, value: float, least: float) -> InputError:
+    return InputError(problem, field=f"segments[{s}]", value=value, expected=f"at least {least:.6g} m")
