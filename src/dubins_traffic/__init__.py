@@ -1,1 +1,130 @@
-"""The benchmark "Traffic network of Dubins cars"."""
+"""The benchmark "Traffic network of Dubins cars".
+
+The public names below are loaded when they are first used, so that importing the package stays quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.many import Job, run_trials
+    from dubins_traffic.campaign.plan import Plan, plan
+    from dubins_traffic.campaign.single import Result, Trial, run_trial
+    from dubins_traffic.campaign.sources import load, load_record
+    from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
+    from dubins_traffic.cars.state import Command, Contact, Frames, Observation, Pose, SensedCar, Twist
+    from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
+    from dubins_traffic.problem.configuration import Configuration, load_config
+    from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
+    from dubins_traffic.problem.draw import draw
+    from dubins_traffic.problem.instance import EAgent, Instance, Problem
+    from dubins_traffic.protocols import Controller, End, Ending, Simulator, Sink
+    from dubins_traffic.record.reader import Record
+    from dubins_traffic.record.writer import RecordWriter
+    from dubins_traffic.roads.generate import generate as generate_network
+    from dubins_traffic.roads.network import RoadNetwork
+    from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
+    from dubins_traffic.viewer.plot import write_plot
+    from dubins_traffic.viewer.replay import write_replay
+
+_PLACES = {
+    "campaign.many": ("Job", "run_trials"),
+    "campaign.plan": ("Plan", "plan"),
+    "campaign.single": ("Result", "Trial", "run_trial"),
+    "campaign.sources": ("load", "load_record"),
+    "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
+    "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
+    "errors": ("ControllerError", "DubinsTrafficError", "InputError", "RecordError"),
+    "problem.configuration": ("Configuration", "load_config"),
+    "problem.document": ("instance_from_document", "instance_to_document", "load_instance"),
+    "problem.draw": ("draw",),
+    "problem.instance": ("EAgent", "Instance", "Problem"),
+    "protocols": ("Controller", "End", "Ending", "Simulator", "Sink"),
+    "record.reader": ("Record",),
+    "record.writer": ("RecordWriter",),
+    "roads.generate": ("generate_network=generate",),
+    "roads.network": ("RoadNetwork",),
+    "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
+    "viewer.plot": ("write_plot",),
+    "viewer.replay": ("write_replay",),
+}
+_NAMES = {
+    entry.partition("=")[0]: (place, entry.rpartition("=")[2])
+    for place in _PLACES
+    for entry in _PLACES[place]
+}
+
+__version__: str
+
+__all__ = [
+    "Bounds",
+    "Car",
+    "Command",
+    "Configuration",
+    "Contact",
+    "Controller",
+    "ControllerError",
+    "Disc",
+    "DiscObstacle",
+    "DubinsTrafficError",
+    "EAgent",
+    "End",
+    "Ending",
+    "Frames",
+    "InputError",
+    "Instance",
+    "Job",
+    "Observation",
+    "Plan",
+    "PolygonObstacle",
+    "Pose",
+    "Problem",
+    "Record",
+    "RecordError",
+    "RecordWriter",
+    "Rectangle",
+    "Result",
+    "RoadNetwork",
+    "Score",
+    "ScoreSheet",
+    "Scorer",
+    "SensedCar",
+    "Simulator",
+    "Sink",
+    "Trial",
+    "Twist",
+    "__version__",
+    "draw",
+    "generate_network",
+    "instance_from_document",
+    "instance_to_document",
+    "load",
+    "load_config",
+    "load_instance",
+    "load_record",
+    "plan",
+    "run_trial",
+    "run_trials",
+    "score",
+    "write_plot",
+    "write_replay",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("dubins-traffic")
+    if name not in _NAMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    place, attribute = _NAMES[name]
+    value = getattr(import_module(f"{__name__}.{place}"), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

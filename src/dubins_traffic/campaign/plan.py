@@ -1,0 +1,162 @@
+"""From a configuration, an instance or a record to the jobs that run its trials, and what is left of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from dubins_traffic.campaign.many import Job
+from dubins_traffic.campaign.single import Result
+from dubins_traffic.campaign.sources import load
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.scoring.score import ScoreSheet
+
+DEFAULT_CONTROLLER = "lanes"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be run: `jobs`, in order; what they are drawn from, if from a configuration; and since when."""
+
+    jobs: tuple[Job, ...]
+    configuration: Configuration | None
+    data: Path | None = None
+    began: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+    def conclude(self, results: Iterable[Result]) -> ScoreSheet:
+        """Return the scores of finished trials in their order, and write the trial data file if one was asked for.
+
+        Raises
+        ------
+        InputError
+            If the file can't be written.
+        """
+        done = sorted(results, key=lambda result: (result.instance.trial, str(result.record)))
+        if done and self.data is not None and self.configuration is not None:
+            instances = [result.instance for result in done]
+            TrialData.build(self.configuration, instances, self.began).write(self.data)
+        return ScoreSheet(tuple(result.score for result in done))
+
+
+def plan(
+    source: str | os.PathLike[str],
+    controller: str | None = None,
+    *,
+    trials: int | None = None,
+    repeat: int = 1,
+    seed: int | None = None,
+    rnd: str | os.PathLike[str] | None = None,
+    data: str | os.PathLike[str] | None = None,
+    overwrite_data: bool = False,
+    records: str | os.PathLike[str] | None = None,
+    deadline: float | None = None,
+) -> Plan:
+    """Return what is to be run, checked as far as can be before anything runs.
+
+    Parameters
+    ----------
+    source : path or str
+        A trials configuration (file or shipped name), an instance or a record, told by content.
+    controller : str, optional
+        A built-in name, ``module:Class`` or ``path/to/file.py:Class``; by default `lanes`, and for a record its own.
+    trials : int, optional
+        How many trials of a configuration, from number 0; by default as many as it says.
+    repeat : int
+        How many times each trial is run.
+    seed : int, optional
+        Of a configuration, or of an instance that has none; 0 by default.
+    rnd : path, optional
+        A road network description instead of the configuration's.
+    data : path, optional
+        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+    records : path, optional
+        Folder for the records, made if missing: ``trial-0000.mcap`` for trial 0; with `repeat`,
+        ``trial-0000-0000.mcap`` for its first run. Records of the same names are replaced.
+    deadline : float, optional
+        Wall-clock seconds within which each `act` must answer.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong; then nothing has been written.
+    """
+    found = load(source, rnd=rnd, seed=seed or 0)
+    if controller is None:
+        controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
+    controllers.load(controller)
+    _check_deadline(deadline)
+    if isinstance(found, RoadNetwork):
+        expected = "a trials configuration, a problem instance or a record"
+        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    if isinstance(found, Configuration):
+        configuration = found
+        jobs = _drawn(found, controller, found.number_trials if trials is None else trials, seed or 0)
+    else:
+        configuration = None
+        instance = found.instance if isinstance(found, Record) else found
+        other_seed = None if seed == instance.seed else seed
+        _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
+        jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
+    target = None if data is None else _data_file(Path(data), overwrite_data)
+    folder = None if records is None else _folder(Path(records))
+    several = [(job, f"-{run:04d}" if repeat > 1 else "") for job in jobs for run in range(repeat)]
+    return Plan(
+        tuple(_complete(job, suffix, folder, deadline) for job, suffix in several), configuration, target
+    )
+
+
+def _drawn(configuration: Configuration, controller: str, trials: int, seed: int) -> list[Job]:
+    """Return a job per trial; the first is drawn here, so that a configuration that can't be is refused early."""
+    jobs = [Job(trial, seed, controller, configuration=configuration) for trial in range(trials)]
+    if jobs:
+        jobs[0] = replace(jobs[0], instance=draw(configuration, seed, 0))
+    return jobs
+
+
+def _complete(job: Job, suffix: str, folder: Path | None, deadline: float | None) -> Job:
+    record = None if folder is None else folder / f"trial-{job.trial:04d}{suffix}.mcap"
+    return replace(job, record=record, overwrite=True, deadline=deadline)
+
+
+def _refuse(source: str, options: dict[str, object]) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(
+                "belongs to a configuration; this is one trial", file=source, field=name, value=value
+            )
+
+
+def _check_deadline(deadline: float | None) -> None:
+    if deadline is not None and not 0 < deadline < float("inf"):
+        raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
+
+
+def _data_file(path: Path, overwrite: bool) -> Path:
+    if path.exists() and not overwrite:
+        raise InputError("exists", file=str(path), expected="a new file; -F overwrites")
+    if path.is_dir() or not path.parent.is_dir():
+        problem = "a folder" if path.is_dir() else "its folder does not exist"
+        raise InputError(problem, file=str(path), expected="a file to write")
+    return path
+
+
+def _folder(folder: Path) -> Path:
+    expected = "a folder that can be written, or a place for one"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"can't hold records ({error.strerror})", file=str(folder), expected=expected
+        ) from None
+    if not os.access(folder, os.W_OK):
+        raise InputError("can't hold records (no permission)", file=str(folder), expected=expected)
+    return folder

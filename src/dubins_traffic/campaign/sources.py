@@ -1,0 +1,101 @@
+"""Whatever a path may hold: a road network, a trials configuration, an instance or a record."""
+
+from __future__ import annotations
+
+import os
+import sys
+from io import BufferedReader
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration, find_source
+from dubins_traffic.problem.document import instance_from_document
+from dubins_traffic.problem.files import (
+    MCAP_MAGIC,
+    STANDARD_INPUT,
+    Kind,
+    detect,
+    is_record,
+    is_text_network,
+    parse_json,
+)
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record import reader
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+
+
+def load(
+    source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None = None, seed: int = 0
+) -> RoadNetwork | Configuration | Instance | Record:
+    """Return what is at `source`, told by its content.
+
+    Parameters
+    ----------
+    source : path or str
+        A file, the name of a shipped configuration, or ``-`` for standard input.
+    rnd : path, optional
+        A road network description that overrides that of a configuration.
+    seed : int
+        For what an instance does not give and is therefore drawn.
+
+    Raises
+    ------
+    InputError
+        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything but
+        a configuration.
+    """
+    found = _load(source, rnd, seed)
+    if rnd is not None and not isinstance(found, Configuration):
+        raise InputError(
+            "a road network can replace that of a configuration only",
+            file=os.fspath(source),
+            field="--rnd",
+            value=os.fspath(rnd),
+            expected="a trials configuration",
+        )
+    return found
+
+
+def load_record(source: str | os.PathLike[str]) -> Record:
+    """Return the record at `source`, a file or ``-`` for standard input.
+
+    Raises
+    ------
+    RecordError
+        If it can't be read or is no record.
+    """
+    if os.fspath(source) == STANDARD_INPUT:
+        return reader.from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT)
+    return reader.read(os.fspath(source))
+
+
+def _load(
+    source: str | os.PathLike[str], rnd: str | os.PathLike[str] | None, seed: int
+) -> RoadNetwork | Configuration | Instance | Record:
+    if _holds_record(source):
+        return load_record(source)
+    found = find_source(source)
+    if is_text_network(found.text):
+        return RoadNetwork.from_text(found.text, found.name)
+    document = parse_json(found.text, found.name)
+    kind = detect(document, found.name)
+    match kind:
+        case Kind.NETWORK:
+            return RoadNetwork.from_document(document, found.name)
+        case Kind.CONFIGURATION:
+            return Configuration.from_document(document, found.name, found.folder, rnd)
+        case Kind.INSTANCE:
+            return instance_from_document(document, found.name, seed)
+        case _:
+            raise InputError(
+                f"holds {kind}",
+                file=found.name,
+                expected="a road network, a trials configuration, a problem instance or a record",
+            )
+
+
+def _holds_record(source: str | os.PathLike[str]) -> bool:
+    if os.fspath(source) != STANDARD_INPUT:
+        return is_record(source)
+    stream = sys.stdin.buffer
+    return isinstance(stream, BufferedReader) and stream.peek(len(MCAP_MAGIC)).startswith(MCAP_MAGIC)

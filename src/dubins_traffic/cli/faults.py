@@ -1,0 +1,64 @@
+"""What becomes of an error: one line for people, an exit status for machines."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import Final
+
+import typer
+
+from dubins_traffic.errors import DubinsTrafficError
+
+OK: Final = 0
+FAILED: Final = 1
+WRONG_INPUT: Final = 2
+INTERRUPTED: Final = 130
+
+PROGRAM: Final = "dubins-traffic"
+
+
+def conclude(error: BaseException, *, debug: bool) -> int:
+    """Tell the user about `error` on standard error and return the exit status.
+
+    Parameters
+    ----------
+    error : BaseException
+        What a command raised.
+    debug : bool
+        Whether to show the traceback before.
+
+    Returns
+    -------
+    int
+        2 where the input is wrong, 130 after Ctrl-C, 0 where the reader of our output had enough, 1 otherwise.
+    """
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    if debug:
+        traceback.print_exception(error)
+    text, status = _verdict(error)
+    print(f"{PROGRAM}: {_one_line(text)}", file=sys.stderr)
+    return status
+
+
+def _verdict(error: BaseException) -> tuple[str, int]:
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", INTERRUPTED
+    if isinstance(error, DubinsTrafficError):
+        return str(error), WRONG_INPUT
+    if isinstance(error, typer.TyperException):
+        return error.format_message(), WRONG_INPUT
+    if isinstance(error, OSError) and error.strerror:
+        names = [
+            os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)
+        ]
+        return ": ".join([*names, error.strerror]), WRONG_INPUT
+    hint = f"`{PROGRAM} --debug ...` shows where; please report it"
+    return f"unexpected {type(error).__name__}: {error} ({hint})", FAILED
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,68 @@
+"""The command `dubins-traffic`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import convert, faults, instance, listing, network, plot, replay, run, score
+
+app = typer.Typer(
+    name=faults.PROGRAM,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit status: 0 all went well; 1 a trial ended by a fault, or something unexpected; 2 wrong input.",
+)
+
+
+@app.callback(invoke_without_command=True)
+def _options(  # pyright: ignore[reportUnusedFunction]
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False,
+    debug: Annotated[  # noqa: ARG001
+        bool, typer.Option("--debug", help="Show the traceback of an error. Stands before the command.")
+    ] = False,
+) -> None:
+    """The benchmark [b]Traffic network of Dubins cars[/b]: draw problems, run trials, score and show them.
+
+    CONFIG may be a file or the name of a shipped configuration, such as [b]demo[/b]; `-` reads standard input.
+    """
+    if version:
+        from importlib.metadata import version as installed
+
+        print(f"{faults.PROGRAM} {installed(faults.PROGRAM)}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+        raise typer.Exit(faults.WRONG_INPUT)
+
+
+app.command("network", epilog=network.EXAMPLES)(network.network)
+app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
+app.command("run", epilog=run.EXAMPLES)(run.run)
+app.command("score", epilog=score.EXAMPLES)(score.score)
+app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
+app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
+app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
+app.command("list", epilog=listing.EXAMPLES)(listing.listing)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What follows the program's name; without it, those of this process.
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
+        sys.stdout.flush()
+    except (Exception, KeyboardInterrupt) as error:
+        return faults.conclude(error, debug="--debug" in arguments)
+    return int(status or faults.OK)

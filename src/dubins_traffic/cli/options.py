@@ -1,0 +1,78 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.errors import InputError
+
+
+def examples(*lines: str) -> str:
+    """Return the foot of a help text: `lines` as commands, each on its own line."""
+    keep_line_breaks = "\b"
+    return "\n".join([keep_line_breaks, "[b]Examples[/b]", *(f"$ dubins-traffic {line}" for line in lines)])
+
+
+def shipped(incomplete: str) -> Sequence[str]:
+    """Complete the name of a shipped configuration."""
+    from dubins_traffic.problem.configuration import shipped_names
+
+    return [name for name in shipped_names() if name.startswith(incomplete)]
+
+
+def controllers(incomplete: str) -> Sequence[str]:
+    """Complete the name of a built-in controller."""
+    from dubins_traffic.controllers.registry import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
+Config = Annotated[
+    str,
+    typer.Argument(
+        metavar="CONFIG",
+        help="A trials configuration: a file, the name of a shipped one, or `-`.",
+        show_default=False,
+        autocompletion=shipped,
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", metavar="S", min=0, help="What all random numbers follow from.")]
+Output = Annotated[
+    str | None,
+    typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
+Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
+
+
+def write(text: str, output: str | None) -> None:
+    """Print `text`, or write it to the file `output`, whole or not at all."""
+    if output is None or output == "-":
+        sys.stdout.write(text)
+        return
+    from dubins_traffic.roads.files import write_text
+
+    write_text(output, text)
+
+
+def beside(file: str, suffix: str) -> str:
+    """Return the name of an output that was not given: `file` with another suffix.
+
+    Raises
+    ------
+    InputError
+        If `file` is standard input, which has no name.
+    """
+    if file == "-":
+        raise InputError("missing", file="--output", expected=f"a file to write, such as out{suffix}")
+    return str(Path(file).with_suffix(suffix))
+
+
+def tell(output: str) -> None:
+    """Say which file has been written."""
+    print(output)

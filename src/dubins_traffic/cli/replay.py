@@ -1,0 +1,30 @@
+"""`dubins-traffic replay`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import options
+
+EXAMPLES = options.examples("replay out/trial-0.mcap", "replay out/trial-0.mcap -o trial.html")
+
+
+def replay(
+    record: options.Record,
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE.html", help="The page.", show_default="RECORD.html"),
+    ] = None,
+) -> None:
+    """Make one self-contained page that replays a trial in a browser: play, pause, scrub, speed, trails."""
+    from dubins_traffic.campaign.sources import load_record
+    from dubins_traffic.cli.tables import summary
+    from dubins_traffic.scoring.score import score
+    from dubins_traffic.viewer.replay import write_replay
+
+    found = load_record(record)
+    output = output or options.beside(record, ".html")
+    write_replay(output, found.instance, found.frames, found.ending, summary(score(found)))
+    options.tell(output)

@@ -1,0 +1,134 @@
+"""`dubins-traffic run`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import InputError
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.single import Result
+
+EXAMPLES = options.examples(
+    "run demo",
+    "run demo --controller simple --trials 20 --jobs 2 --records out",
+    "run my-trials.json --controller my_controller.py:MyController -f data.json",
+    "run out/trial-0003.mcap --controller simple --json",
+)
+FAULTS = ("controller_fault", "agent_fault", "deadline")
+"""Ends of a trial that make the exit status 1."""
+
+
+def run(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="CONFIG|INSTANCE|RECORD",
+            help="A trials configuration (file or shipped name), an instance or a record; told by its content.",
+            show_default=False,
+            autocompletion=options.shipped,
+        ),
+    ],
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            "--controller",
+            metavar="C",
+            help="A built-in name, module:Class or path/to/file.py:Class.",
+            show_default="lanes; of a record its own",
+            autocompletion=options.controllers,
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
+        ),
+    ] = None,
+    repeat: Annotated[
+        int, typer.Option("--repeat", metavar="N", min=1, help="How many times each trial is run.")
+    ] = 1,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed", metavar="S", min=0, help="What all random numbers follow from.", show_default="0"
+        ),
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")] = 1,
+    rnd: Annotated[
+        str | None,
+        typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's."),
+    ] = None,
+    data: Annotated[
+        str | None,
+        typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
+    ] = None,
+    data_over: Annotated[
+        str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")
+    ] = None,
+    records: Annotated[
+        str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
+    ] = None,
+    deadline: Annotated[
+        float | None,
+        typer.Option(
+            "--deadline", metavar="SECONDS", help="End a trial whose controller takes longer to act."
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
+    from dubins_traffic.campaign.many import run_trials
+    from dubins_traffic.campaign.plan import plan
+    from dubins_traffic.cli.tables import show
+
+    if data is not None and data_over is not None:
+        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
+    todo = plan(
+        source,
+        controller,
+        trials=trials,
+        repeat=repeat,
+        seed=seed,
+        rnd=rnd,
+        data=data or data_over,
+        overwrite_data=data is None,
+        records=records,
+        deadline=deadline,
+    )
+    results: list[Result] = []
+    try:
+        with _progress(len(todo.jobs)) as advance:
+            for result in run_trials(todo.jobs, jobs):
+                results.append(result)
+                advance()
+    finally:
+        if results:
+            show(todo.conclude(results), json=json)
+    failed = [result for result in results if result.ending.end in FAULTS]
+    for result in failed:
+        ending = result.ending
+        print(
+            f"{faults.PROGRAM}: trial {result.instance.trial}: {ending.end}: {ending.detail}", file=sys.stderr
+        )
+    if failed:
+        raise typer.Exit(faults.FAILED)
+
+
+@contextmanager
+def _progress(trials: int) -> Generator[Callable[[], object]]:
+    """Show how many of the trials are done, on standard error and only to people."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), "trials", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("trials", total=trials)
+        yield lambda: progress.advance(task)

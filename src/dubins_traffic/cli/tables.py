@@ -1,0 +1,71 @@
+"""Scores as tables for people, and as JSON for machines."""
+
+from __future__ import annotations
+
+import json as json_text
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from dubins_traffic.scoring.score import Score, ScoreSheet
+
+
+CELLS: dict[str, Callable[[Score], str]] = {
+    "end": lambda score: (score.end or "cut off").replace("_", " "),
+    "ICRA 2016": lambda score: f"{score.icra2016:g}",
+    "rounds": lambda score: str(score.rounds),
+    "goals visited": lambda score: f"{score.goals_visited:.0%}",
+    "collisions": lambda score: str(len(score.collisions)),
+    "at fault": lambda score: str(sum(collision.at_fault for collision in score.collisions)),
+    "off road": lambda score: f"{score.driven.off_road_s:.1f} s",
+    "distance": lambda score: f"{score.driven.distance_m:.1f} m",
+    "least gap": lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m",
+}
+"""What is shown of a score: heading and cell."""
+
+
+def show(sheet: ScoreSheet, *, json: bool) -> None:
+    """Print scores on standard output: JSON for machines, else a table."""
+    if json:
+        print(json_text.dumps(sheet.to_json(), indent=2))
+        return
+    from rich.console import Console
+
+    Console().print(score_table(sheet))
+
+
+def summary(score: Score) -> dict[str, str]:
+    """Return what a replay page shows of a score."""
+    return {
+        "controller": score.controller or "-",
+        **{heading: cell(score) for heading, cell in CELLS.items()},
+    }
+
+
+def score_table(sheet: ScoreSheet) -> Table:
+    """Return a table with one row a trial, and the sum of ICRA 2016 at its foot."""
+    from rich import box
+    from rich.table import Table
+
+    names = sorted({score.controller or "-" for score in sheet.trials})
+    table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left")
+    table.add_column("trial", footer="sum", justify="right", no_wrap=True)
+    if len(names) > 1:
+        table.add_column("controller", overflow="fold")
+    else:
+        table.title = f"controller [b]{names[0]}[/b]"
+    for heading in CELLS:
+        footer = f"{sheet.icra2016_sum:g}" if heading == "ICRA 2016" else ""
+        align = "left" if heading == "end" else "right"
+        table.add_column(_narrow(heading), footer=footer, justify=align, no_wrap=True)
+    for score in sheet.trials:
+        leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
+        table.add_row(*leading, *(cell(score) for cell in CELLS.values()))
+    return table
+
+
+def _narrow(text: str) -> str:
+    """Return words below one another, so that a table fits 80 columns."""
+    return text.replace(" ", "\n")
