@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
@@ -121,7 +121,7 @@ def label_frame(
             _forget(b, n, roads, rules, labels, memory)
 
 
-@jit
+@jit_inline
 def _locate(
     b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
 ) -> None:
@@ -196,7 +196,7 @@ def _locate(
         _enter_in_lane(b, n, lane, memory)
 
 
-@jit
+@jit_inline
 def _entry(
     b: int,
     tick: int,
@@ -226,7 +226,7 @@ def _entry(
     return bits
 
 
-@jit
+@jit_inline
 def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memory: Memory) -> int:
     """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
     trail = memory.trail

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction
 from dubins_traffic.roads.table import RoadTable
 
@@ -30,7 +30,7 @@ def lane_away(t: RoadTable, net: int, v: int, x: float, y: float) -> int:
     return best
 
 
-@jit
+@jit_inline
 def lane_state(
     t: RoadTable,
     net: int,
