@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide
-from dubins_traffic.agents.plans import cycle_lanes, script_rows
 from dubins_traffic.agents.tables import (
     AIMED,
     BEGIN,
@@ -27,9 +26,11 @@ from dubins_traffic.agents.tables import (
     LOOP,
     NOBODY,
     PARKED,
+    PATIENCE,
     PLACE,
     REPEAT,
     SCRIPTED,
+    SINCE,
     STEP,
     STOP,
     TRAIL,
@@ -41,11 +42,13 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.roads.table import RoadTable, pack
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import EAgent, Instance
+    from dubins_traffic.roads.network import RoadNetwork
 
 AS_FAR_AS_2016 = 3.5
 """Up to this far from its waypoint (metres, for w = 0.3 m) a car keeps the bearing tolerance of 2016."""
@@ -82,7 +85,7 @@ class Fleet:
         self._roads, net = _pack_roads(instances)
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         ints = np.zeros((trials, cars, INTS), dtype=np.int64)
-        ints[:, :, (KIND, TRAIL, LANE, PLACE)] = (NOBODY, -1, -1, -1)
+        ints[:, :, (KIND, PATIENCE, TRAIL, LANE, PLACE, SINCE)] = (NOBODY, -1, -1, -1, -1, -1)
         floats = np.zeros((trials, cars, FLOATS))
         cycle: list[int] = []
         script: list[tuple[float, float, float]] = []
@@ -150,6 +153,8 @@ def _plan(
     script: list[tuple[float, float, float]],
 ) -> None:
     ints[KIND] = KINDS[kind]
+    patience = given["patience"]
+    ints[PATIENCE] = -1 if patience is None else math.ceil(patience * instance.problem.rate - 1e-9)
     if ints[KIND] == LOOP:
         ints[FIRST] = len(cycle)
         cycle += cycle_lanes(instance.problem.network, given["cycle"])
@@ -166,7 +171,7 @@ def _plan(
 
 def _pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, Ints]:
     numbers: dict[tuple[int, float], int] = {}
-    networks = []
+    networks: list[RoadNetwork] = []
     widths: list[float] = []
     net = np.zeros(len(instances), dtype=np.int64)
     for b, instance in enumerate(instances):
@@ -230,3 +235,16 @@ def _trails(ints: Ints, floats: Floats, w: float) -> tuple[Floats, Ints, Floats]
     mark = np.zeros((followers, 3), dtype=np.int64)
     mark[:, AIMED] = -1
     return np.zeros((followers, points, 3)), mark, np.zeros((followers, 3))
+
+
+def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:
+    """Return (tick at which it ends, speed, yaw rate) of commands given as [seconds, speed, yaw rate].
+
+    A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9).
+    """
+    rows: list[tuple[float, float, float]] = []
+    time = 0.0
+    for seconds, speed, yaw_rate in commands:
+        time += seconds
+        rows.append((float(math.ceil(time * rate - 1e-9)), float(speed), float(yaw_rate)))
+    return rows

@@ -17,15 +17,16 @@ WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
 KINDS = {"wander": WANDER, "loop": LOOP, "follow": FOLLOW, "parked": PARKED, "scripted": SCRIPTED}
 NOBODY = -1
 
-KIND, BEGIN, FIRST, LAST, REPEAT, TRAIL, LANE, LEG, PLACE = range(9)
-INTS = 9
+KIND, BEGIN, FIRST, LAST, REPEAT, PATIENCE, TRAIL, LANE, LEG, PLACE, SINCE = range(11)
+INTS = 11
 """Columns of `Agents.ints`.
 
 KIND: NOBODY where there's no e-agent. BEGIN: the tick at which the car begins to drive. FIRST, LAST: its rows of
-`cycle` or `script` are FIRST to LAST - 1. REPEAT: 1 if its script repeats. TRAIL: its row of `path`, `mark` and
+`cycle` or `script` are FIRST to LAST - 1. REPEAT: 1 if its script repeats. PATIENCE: ticks that it stands for others
+before it looks only at the way ahead; negative: for ever. TRAIL: its row of `path`, `mark` and
 `last`, or -1. It remembers LANE: the lane driven, -1 before the first; LEG: for cars that turn in place 0 toward
 the start of the lane and 1 toward its end, for others the lane to come, -1 until it is chosen; PLACE: the row of its
-cycle or script, -1 when not on it.
+cycle or script, -1 when not on it; SINCE: the tick since which it must stand, -1 if it need not.
 """
 
 OFFSET, REACHED, TANGENT, MISS, STOP, BERTH, SPEED, YAW_RATE, GAP, SIGHT, GOAL_X, GOAL_Y = range(12)
@@ -46,6 +47,11 @@ speed. RADIUS: of the tightest turn. CURVES: 1 if the cars can't turn in place, 
 box.
 """
 
+SEES, BARRED, TIGHT, WEARY = 1, 2, 4, 8
+"""What holds a car, bits of `Workspace.held`: something is nearer than the car stops at; in its way; too near to turn
+in place. BARRED and TIGHT are looked at only for cars whose patience can end; WEARY: it ended, and the car is barred.
+"""
+
 WRITTEN, AIMED, SEEN = range(3)
 """Columns of `Agents.mark`: points of the ego's path written so far, the one driven to (-1: not on the path), and the
 tick at which the ego was last seen."""
@@ -58,7 +64,7 @@ class Agents(NamedTuple):
     """The e-agents of a batch.
 
     `net` (B,): number of the road network; `seed` (B,) uint64 and `trial` (B,): of the random numbers; `build`
-    (B, 9), `ints` (B, N, 9) and `floats` (B, N, 12): columns as above; `cycle` (M,): lanes in order; `script`
+    (B, 9), `ints` (B, N, 11) and `floats` (B, N, 12): columns as above; `cycle` (M,): lanes in order; `script`
     (M, 3): tick of the script at which the step ends, speed, yaw rate. Of the ego's path, for every car that
     follows: `path` (F, M, 3), a ring of x, y and distance driven; `mark` (F, 3): columns as above; `last` (F, 3):
     the ego's position when last seen and the distance driven to there.
@@ -78,7 +84,7 @@ class Agents(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), who must stand, lanes."""
+    """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), why cars must stand, lanes."""
 
     pair: Ints
     head: Ints

@@ -55,14 +55,15 @@ def turn_then_drive(
     ahead = c * dx + s * dy
     left = c * dy - s * dx
     if ahead > 0.0 and abs(left) <= min(tangent * ahead, miss):
-        return min(speed, ahead / period), 0.0
+        return speed if speed * period <= ahead else ahead / period, 0.0
     if ahead <= 0.0 and left == 0.0:
         if ahead == 0.0:
             return 0.0, 0.0
         return 0.0, -yaw_rate
     turn = yaw_rate
     if ahead > 0.0:
-        turn = min(turn, abs(left) / (sqrt(ahead * ahead + left * left) * period))
+        whole = period * sqrt(ahead * ahead + left * left)
+        turn = yaw_rate if yaw_rate * whole <= abs(left) else abs(left) / whole
     return 0.0, turn if left > 0.0 else -turn
 
 

@@ -38,6 +38,11 @@ class Wander(Strict):
     )
     stop_range: Distance = Field(default=0.5, description="it stops while a laser return is below this, m")
     ego_range: Distance = Field(default=1.0, description="it does not drive while the ego is within this, m")
+    patience: Seconds | None = Field(
+        default=None,
+        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
+        "its way stays barred; null: it stands for ever, as in 2016",
+    )
 
 
 class Loop(Strict):
@@ -52,6 +57,11 @@ class Loop(Strict):
     speed: Speed = Field(default=0.5, description="speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     stop_range: Distance = Field(default=0.5, description="gap to what is ahead at which it stops, m")
+    patience: Seconds | None = Field(
+        default=2.0,
+        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
+        "its way stays barred; null: it stands for ever",
+    )
 
 
 class Follow(Strict):
@@ -61,9 +71,9 @@ class Follow(Strict):
     speed: Speed = Field(default=0.5, description="largest speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     patience: Seconds | None = Field(
-        2.0,
-        description="seconds it stands for others before it drives on past those that are not in its way, and turns "
-        "round if its way stays barred; null: it stands for ever",
+        default=2.0,
+        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
+        "its way stays barred; null: it stands for ever",
     )
     sensing_only: bool = Field(
         default=False, description="whether it sees the ego within the sensing radius only"
@@ -77,6 +87,11 @@ class Parked(Strict):
         default=30.0, description="seconds until it drives off; null: never"
     )
     speed: Speed = Field(default=0.5, description="speed once it drives, m/s")
+    patience: Seconds | None = Field(
+        default=2.0,
+        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
+        "its way stays barred; null: it stands for ever",
+    )
 
 
 class Scripted(Strict):
