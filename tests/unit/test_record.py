@@ -1,11 +1,15 @@
+import contextlib
 import json
 import multiprocessing
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from dubins_traffic.cars.state import Frames
@@ -18,6 +22,7 @@ from tests.recordings import REALS, WHOLE, blocks, feed, make_instance, random_f
 
 INSTANCE = make_instance(ticks=75)
 FRAMES = random_frames(INSTANCE, seed=1, count=76)
+WHOLE_FILE = Path(__file__).parents[1] / "golden" / "data" / "record-1.mcap"
 
 
 @pytest.fixture
@@ -174,6 +179,17 @@ def test_a_record_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
         RecordWriter(tmp_path).begin(INSTANCE)
 
 
+def header(**changed: object) -> bytes:
+    document = {
+        "format": "dubins-traffic record",
+        "version": 1,
+        "package": "0",
+        "libraries": {},
+        "controller": None,
+    }
+    return json.dumps({**document, "instance": {}, **changed}).encode()
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_a_full_disk_is_named() -> None:
     writer = RecordWriter("/dev/full", overwrite=True)
@@ -218,7 +234,11 @@ def test_what_is_no_record_is_refused(tmp_path: Path, data: bytes, told: str) ->
         ("/trial", b"[1]", "not a record of a trial"),
         ("/trial", b"{", "damaged header"),
         ("/trial", b'{"format": "dubins-traffic record", "version": 2}', "version: unknown version"),
-        ("/trial", b'{"format": "dubins-traffic record", "version": 1}', "instance: missing"),
+        ("/trial", b'{"format": "dubins-traffic record", "version": 1}', "package: missing"),
+        ("/trial", header(libraries=3), "libraries: missing from the header or of a wrong type: got 3"),
+        ("/trial", header(instance=[]), "instance: missing"),
+        ("/trial", header(controller=1), "controller: missing"),
+        ("/trial", header(instance={"version": 1}), "instance"),
     ],
 )
 def test_other_mcap_files_are_refused(tmp_path: Path, topic: str, message: bytes, told: str) -> None:
@@ -232,6 +252,27 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none.mcap"):
         with pytest.raises(RecordError, match="can't be read"):
             read(path)
+
+
+def test_a_contact_of_an_unknown_car_is_refused(tmp_path: Path) -> None:
+    stranger = replace(FRAMES.contacts[0], other=3)
+    feed(INSTANCE, replace(FRAMES, contacts=(stranger,)), RecordWriter(tmp_path / "a.mcap"))
+    with pytest.raises(RecordError, match="unknown car"):
+        read(tmp_path / "a.mcap")
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(
+    changes=st.lists(st.tuples(st.floats(0, 0.999), st.integers(0, 255)), min_size=1, max_size=4),
+    end=st.floats(0, 2),
+)
+def test_damage_anywhere_is_refused_or_read(changes: list[tuple[float, int]], end: float) -> None:
+    data = bytearray(WHOLE_FILE.read_bytes())
+    for place, value in changes:
+        data[int(place * len(data))] = value
+    with contextlib.suppress(RecordError):
+        record = from_bytes(bytes(data[: int(end * len(data))]) if end < 1 else bytes(data))
+        assert len(record.frames) <= 40
 
 
 def test_a_damaged_block_is_noticed(path: Path) -> None:

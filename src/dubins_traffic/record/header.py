@@ -79,12 +79,16 @@ def decode(data: bytes, file: str | None = None) -> Header:
             value=fields.get("version"),
             expected=str(schema.VERSION),
         )
+    for name, kind in (("package", str), ("libraries", dict), ("instance", dict), ("controller", str | None)):
+        if name not in fields or not isinstance(fields[name], kind):
+            value = fields.get(name)
+            raise RecordError(
+                "missing from the header or of a wrong type", file=file, field=name, value=value
+            )
     try:
         instance = instance_from_document(fields["instance"])
-        versions = {"dubins-traffic": str(fields["package"]), **fields["libraries"]}
-        return Header(instance, fields["controller"], versions)
-    except KeyError as error:
-        raise RecordError("missing from the header", file=file, field=str(error.args[0])) from error
     except InputError as error:
         placed = error.within(field="instance")
         raise RecordError(f"{placed.field}: {placed.problem}", file=file, expected=placed.expected) from error
+    versions = {"dubins-traffic": fields["package"], **fields["libraries"]}
+    return Header(instance, fields["controller"], versions)

@@ -158,6 +158,9 @@ def _assemble(head: Header, chunks: Iterator[list[tuple[str, bytes]]], file: str
                 tuple(_event(data) for data in by_topic.get(schema.EVENTS, [])),
             )
         )
+    cars = len(head.instance.names)
+    if any(max(c.car, c.other) >= cars or c.car < 0 for block in blocks for c in block.contacts):
+        raise ValueError("a contact of an unknown car")
     blocks = [block for block in blocks if block.frames or block.contacts or block.events]
     frames = _frames(head.instance, blocks)
     parts: list[Frames] = []
