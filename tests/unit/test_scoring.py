@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -246,3 +248,12 @@ def test_the_sheet_sums_the_scores() -> None:
     assert sheet.icra2016_sum == 24 * 8
     assert sheet.to_json() == {"trials": [score.to_json() for score in scores], "icra2016_sum": 192.0}
     assert ScoreSheet(()).to_json() == {"trials": [], "icra2016_sum": 0.0}
+
+
+def test_scoring_a_record_does_not_load_the_compiler() -> None:
+    code = "import sys, dubins_traffic.scoring.score, dubins_traffic.record.export; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True
+    ).stdout.split()
+    assert "dubins_traffic.record.reader" in loaded
+    assert not {"numba", "pyarrow", "matplotlib", "typer", "rich"} & set(loaded)
