@@ -35,7 +35,7 @@ class ObstacleLanes(NamedTuple):
 
 
 def place_obstacles(table: ObstacleTable, roads: RoadTable, nets: Ints) -> ObstacleLanes:
-    """Return the parts of obstacles that reach the strip of each segment (progress within it, 2w to each side)."""
+    """Return the parts of obstacles beside each segment, of those obstacles that reach 2w of its centre line."""
     base: list[int] = []
     start: list[int] = [0]
     parts: list[Floats] = []
@@ -47,7 +47,9 @@ def place_obstacles(table: ObstacleTable, roads: RoadTable, nets: Ints) -> Obsta
             continue
         base.append(len(start) - 1)
         for segment in roads.seg[roads.seg_off[net] : roads.seg_off[net + 1]]:
-            part, reaches = _on_segment(table.part[own], segment, float(roads.half_width[net]))
+            part, reaches = _on_segment(
+                table.part[own], table.owner[own], segment, float(roads.half_width[net])
+            )
             parts.append(part[reaches])
             owners.append(table.owner[own][reaches])
             start.append(start[-1] + int(reaches.sum()))
@@ -59,7 +61,9 @@ def place_obstacles(table: ObstacleTable, roads: RoadTable, nets: Ints) -> Obsta
     )
 
 
-def _on_segment(part: Floats, segment: Floats, half_width: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _on_segment(
+    part: Floats, owner: Ints, segment: Floats, half_width: float
+) -> tuple[Floats, npt.NDArray[np.bool_]]:
     x, y, c, s, half_length, _, rounding, _ = part.T
     ax, ay, tx, ty, length = segment[:5]
     rows = np.empty((len(part), 5))
@@ -69,9 +73,11 @@ def _on_segment(part: Floats, segment: Floats, half_width: float) -> tuple[Float
         rows[:, column] = px * tx + py * ty
         rows[:, column + 1] = py * tx - px * ty
     rows[:, 4] = rounding
-    along = (rows[:, 0], rows[:, 2])
-    across = (rows[:, 1], rows[:, 3])
-    reaches = (np.maximum(*along) + rounding >= 0.0) & (np.minimum(*along) - rounding <= length)
-    reaches &= np.maximum(*across) + rounding > -half_width
-    reaches &= np.minimum(*across) - rounding < half_width
+    along = np.minimum(rows[:, 0], rows[:, 2]) - rounding, np.maximum(rows[:, 0], rows[:, 2]) + rounding
+    across = np.minimum(rows[:, 1], rows[:, 3]) - rounding, np.maximum(rows[:, 1], rows[:, 3]) + rounding
+    reaches = (along[1] >= 0.0) & (along[0] <= length)
+    for number in np.unique(owner[reaches]):
+        own = reaches & (owner == number)
+        if across[1][own].max() <= -half_width or across[0][own].min() >= half_width:
+            reaches[own] = False
     return rows, reaches

@@ -70,6 +70,9 @@ QUEUE: Final = 2
 CROSSERS: Final = 3
 HEADS: Final = 4
 
+GRAIN = 1e-9
+"""Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
+
 
 class RuleTable(NamedTuple):
     """The rules of each trial: `real` (B, REALS) float64 and `whole` (B, WHOLES) int64, columns as named above.
@@ -160,8 +163,8 @@ def pack_rules(
         cross = radius + rounding
         approach = cross + own.approach_distance
         queue = cross + own.queue_distance
-        stop = own.still_speed * own.stop_time
-        stand = own.still_speed * own.stand_time
+        stop = own.still_speed * own.stop_time + GRAIN
+        stand = own.still_speed * own.stand_time + GRAIN
         real[b, RADIUS] = radius
         real[b, HALF_LENGTH] = cars.half_length[b]
         real[b, HALF_WIDTH] = cars.half_width[b]
