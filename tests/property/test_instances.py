@@ -2,7 +2,7 @@
 
 import json
 import re
-from math import hypot
+from math import floor, hypot
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.starts import TIGHT
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.weave import most_segments
 from tests.roadnets import networks
 
 quick = settings(max_examples=40, deadline=None, derandomize=True)
@@ -132,6 +133,54 @@ def test_starts_are_clear_of_obstacles(network: RoadNetwork, seed: int, data: st
     for shape in shapes:
         assert shape.distance(Point(pose.x, pose.y)) >= 0.177 - 1e-4
     assert instance_from_document(json.loads(json.dumps(instance_to_document(instance)))) == instance
+
+
+@quick
+@given(st.integers(6, 40), st.floats(0, 1), st.integers(0, 8), seeds)
+def test_random_networks_have_room_for_rules_and_cars(
+    intersections: int, share: float, agents: int, seed: int
+) -> None:
+    least, most = intersections - 1, most_segments(intersections)
+    wanted = {
+        "intersections": intersections,
+        "segments": least + round(share * (most - least)),
+        "rigid_motion": True,
+    }
+    document = {
+        "version": 1,
+        "problem_domain": "dubins_traffic",
+        "network": {"random": wanted},
+        "e-agents": [{"type": "wander", "count": agents}],
+        "rules": True,
+    }
+    instance = draw(load_config(document), seed)
+    network = instance.problem.network
+    assert len(network.intersections) == intersections
+    assert len(network.segments) == wanted["segments"]
+    for n in range(agents + 1):
+        nearest_lane(instance, n)
+    between, disc = clearances(instance)
+    assert between >= TIGHT
+    assert disc >= 0.0
+    assert draw(load_config(document), seed, 1).problem.network != network
+
+
+@quick
+@given(st.integers(2, 5), st.integers(2, 5), st.floats(0, 1), seeds)
+def test_grids_lose_the_share_of_segments_asked_for(
+    rows: int, columns: int, removed: float, seed: int
+) -> None:
+    grid = {"rows": rows, "columns": columns, "removed": removed, "length": 4}
+    document = {"version": 1, "problem_domain": "dubins_traffic", "network": {"grid": grid}}
+    whole = len(RoadNetwork.grid(rows, columns).segments)
+    spare = whole - (rows * columns - 1)
+    if floor(removed * whole + 1e-9) > spare:
+        with pytest.raises(InputError, match=r"network\.grid\.removed"):
+            draw(load_config(document), seed)
+    else:
+        network = draw(load_config(document), seed).problem.network
+        assert len(network.segments) == whole - floor(removed * whole + 1e-9)
+        assert network.length == 4.0
 
 
 def test_drawn_starts_reach_all_of_the_free_lanes() -> None:

@@ -14,6 +14,8 @@ from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
 from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.starts import Ground, Wish, draw_starts
+from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
+from dubins_traffic.roads.generate import random_network, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
 
 
@@ -174,4 +176,39 @@ def _ego_start(network: RoadNetwork, configuration: Configuration) -> Pose | Non
 
 
 def _draw_network(configuration: Configuration, draws: Draws) -> RoadNetwork:
-    raise InputError("random networks can't be drawn yet", field="network")
+    """Return the network of one trial, with room for the rules of a configuration that asks for a random one."""
+    settings, car = configuration.settings, configuration.car
+    network = settings.network
+    if network is None:
+        raise InputError("missing", field="network", expected="random or grid")
+    if network.grid is not None:
+        grid = network.grid
+        try:
+            return thinned_grid(
+                draws,
+                grid.rows,
+                grid.columns,
+                grid.removed,
+                length=grid.length,
+                rigid_motion=grid.rigid_motion,
+            )
+        except InputError as error:
+            raise error.within(field="network.grid") from None
+    wanted = network.random
+    if wanted is None:
+        raise InputError("missing", field="network", expected="random or grid")
+    slack = settings.rule_parameters.get("segment_slack", SEGMENT_SLACK)
+    try:
+        return random_network(
+            draws,
+            wanted.intersections,
+            wanted.segments,
+            minimum_angle=wanted.min_angle,
+            w=car.w,
+            radius=max(settings.radius, LEAST_RADIUS * car.w),
+            reach=car.body.reach,
+            slack=slack,
+            rigid_motion=wanted.rigid_motion,
+        )
+    except InputError as error:
+        raise error.within(field="network.random") from None

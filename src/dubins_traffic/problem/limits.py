@@ -26,7 +26,7 @@ GOALS = 100_000
 RAYS = 100_000
 """Most rays of a laser."""
 INTERSECTIONS = 100_000
-"""Most intersections of a network that is drawn, rows times columns of a grid."""
+"""Most intersections of a grid in a configuration, rows times columns."""
 OBSTACLES = 10_000
 """Most static obstacles."""
 CORNERS = 1_000

@@ -23,6 +23,8 @@ from dubins_traffic.problem.parts import (
     RoadReference,
     Rules,
 )
+from dubins_traffic.roads.generate import MOST_INTERSECTIONS
+from dubins_traffic.roads.weave import most_segments
 from dubins_traffic.spec.parameters import RuleParameters
 
 NAME = r"^[A-Za-z][A-Za-z0-9_/]*$"
@@ -138,10 +140,10 @@ class AgentEntry(Open):
 class RandomNetwork(Strict):
     """A random planar network, another one in each trial."""
 
-    intersections: Annotated[int, Field(ge=2, le=limits.INTERSECTIONS)] = Field(
+    intersections: Annotated[int, Field(ge=2, le=MOST_INTERSECTIONS)] = Field(
         description="number of intersections N"
     )
-    segments: Annotated[int, Field(ge=1, le=2 * limits.INTERSECTIONS)] = Field(
+    segments: Annotated[int, Field(ge=1, le=2 * MOST_INTERSECTIONS)] = Field(
         description="number of segments, N - 1 up to floor(2N - 2 sqrt N)"
     )
     min_angle: Annotated[float, Field(gt=0, le=math.pi)] = Field(
@@ -152,7 +154,7 @@ class RandomNetwork(Strict):
     @model_validator(mode="after")
     def _possible(self) -> RandomNetwork:
         n = self.intersections
-        most = 2 * n - math.isqrt(4 * n - 1) - 1
+        most = most_segments(n)
         if not n - 1 <= self.segments <= most:
             raise fault(
                 "not a number of segments",
