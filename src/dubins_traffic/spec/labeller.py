@@ -11,6 +11,7 @@ from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Contact, Labels, Pose, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
 from dubins_traffic.spec.fault import with_fault
@@ -26,6 +27,9 @@ from dubins_traffic.spec.tables import (
     Memory,
     pack_rules,
 )
+
+SLACK = 1e-9
+"""Metres by which rounding may fall short of a demand on the roads."""
 
 
 class Judged(Protocol):
@@ -113,7 +117,7 @@ class Labeller:
             [problem.intersection_radius for problem in problems],
             [problem.rate for problem in problems],
             nets,
-            [bool(problem.rules) for problem in problems],
+            _judged3(problems),
             cars,
         )
         obstacles = pack_obstacles([problem.obstacles for problem in problems])
@@ -186,3 +190,21 @@ def _distinct_roads(problems: Sequence[Judged]) -> tuple[list[int], list[RoadNet
             widths.append(problem.car.lane_width)
         nets.append(numbers[key])
     return nets, networks, widths
+
+
+def _judged3(problems: Sequence[Judged]) -> list[bool]:
+    """Tell of each problem whether it asks for the rules and rule 3 is defined there (RULES, *Ground*)."""
+    known: dict[tuple[int, float, float, float, float], bool] = {}
+    judged: list[bool] = []
+    for problem in problems:
+        if not problem.rules:
+            judged.append(False)
+            continue
+        parameters = RuleParameters.from_mapping(problem.rules)
+        radius, reach = problem.intersection_radius, problem.car.body.reach
+        key = (id(problem.network), radius, reach, problem.car.w, parameters.segment_slack)
+        if key not in known:
+            known[key] = not clearance_faults(problem.network, *key[1:])
+        sees = problem.sensing_radius >= 2.0 * (radius + reach + parameters.sensing_slack) - SLACK
+        judged.append(known[key] and sees)
+    return judged
