@@ -52,10 +52,11 @@ def pairs(item: Ints, column: Ints, row: Ints) -> Iterator[tuple[Ints, Ints]]:
     key, item = key[order], item[order]
     count = len(key)
     after = cast(Ints, np.searchsorted(key, key, side="right") - np.arange(count) - 1)
-    total = np.concatenate([[0], np.cumsum(after)])
+    total = cast(Ints, np.concatenate([[0], np.cumsum(after)]))
     begin = 0
     while begin < count:
-        stop = int(np.searchsorted(total, total[begin] + PAIRS_AT_ONCE, side="right")) - 1
+        full = int(total[begin]) + PAIRS_AT_ONCE
+        stop = int(np.searchsorted(total, full, side="right")) - 1
         stop = min(max(stop, begin + 1), count)
         near = np.repeat(np.arange(begin, stop), after[begin:stop])
         step = np.arange(len(near)) - np.repeat(total[begin:stop] - total[begin], after[begin:stop])

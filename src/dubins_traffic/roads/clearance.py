@@ -91,12 +91,12 @@ def clearance_faults(
     found = tight(points, ends, least)
     for s in found.short.tolist():
         faults.append(_fault("too short", s, float(network.lengths[s]), least.length))
-    for v, other in found.close.tolist():
+    for v, other in _couples(found.close):
         s = int(np.flatnonzero((ends == v).any(axis=1))[0])
         gap = float(_norm(points[v] - points[other]))
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
         faults.append(_fault(problem, s, gap, least.apart))
-    for v, s in found.beside.tolist():
+    for v, s in _couples(found.beside):
         gap = float(distances(points[v], points[ends[s, 0]], points[ends[s, 1]]))
         faults.append(_fault(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside))
     return faults
@@ -115,6 +115,10 @@ def _norm(vectors: Floats) -> Floats:
 
 def _distinct(rows: list[Ints]) -> Ints:
     return np.unique(np.concatenate(rows), axis=0) if rows else np.empty((0, 2), dtype=np.int64)
+
+
+def _couples(rows: Ints) -> list[tuple[int, int]]:
+    return [(int(row[0]), int(row[1])) for row in rows]
 
 
 def _fault(problem: str, s: int, value: float, least: float) -> InputError:

@@ -20,7 +20,7 @@ from dubins_traffic.errors import InputError
 Segment = tuple[int, int, int, int]
 
 LARGEST_POINT = 1_000_000
-LARGEST_GRID = 1_000_000
+LARGEST_GRID = 100_000
 LENGTHS = (1e-3, 1e6)
 WORLD = 1e6
 TURNS = 1e5
@@ -117,6 +117,9 @@ def fields(document: object) -> Description:
 
 def grid_segments(rows: int, columns: int) -> tuple[Segment, ...]:
     """Return the segments of the complete grid in the order of 2016."""
+    if not 2 <= rows * columns <= LARGEST_GRID:
+        expected = f"between 2 and {LARGEST_GRID} intersections"
+        raise InputError("not the shape of a grid", field="shape", value=[rows, columns], expected=expected)
     segments: list[Segment] = []
     for x in range(columns - 1):
         for y in range(rows - 1):

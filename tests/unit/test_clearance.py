@@ -1,0 +1,41 @@
+import pytest
+
+from dubins_traffic.roads.clearance import clearance_faults, clearances
+from dubins_traffic.roads.network import RoadNetwork
+
+STILL = (0.0, 0.0, 0.0)
+
+
+def _faults(network: RoadNetwork, radius: float = 1.0) -> list[str]:
+    return [str(fault) for fault in clearance_faults(network, radius, 0.177, 0.3)]
+
+
+def test_what_the_rules_demand() -> None:
+    assert clearances(1.0, 0.177, 0.3) == pytest.approx((2.854, 2.354, 1.777))
+
+
+def test_the_grids_of_2016_have_room() -> None:
+    assert _faults(RoadNetwork.grid(3, 4)) == []
+    assert _faults(RoadNetwork.grid(3, 4, 2.854)) == []
+
+
+def test_faults_name_the_place() -> None:
+    short = RoadNetwork(((0, 0, 1, 0), (1, 0, 4, 0)), 2.5, STILL, (1, 5))
+    assert _faults(short) == ["segments[0]: too short: got 2.5; expected at least 2.854 m"]
+    close = RoadNetwork(
+        ((0, 0, 40, 0), (40, 0, 40, 40), (40, 40, 0, 40), (0, 40, 0, 20)), 0.1, STILL, (41, 41)
+    )
+    assert _faults(close) == [
+        "segments[3]: too short: got 2.0; expected at least 2.854 m",
+        "segments[0]: intersections [0, 0] and [0, 20] are too close: got 2.0; expected at least 2.354 m",
+        "segments[3]: intersections [0, 20] and [0, 40] are too close: got 2.0; expected at least 2.354 m",
+    ]
+    hook = ((0, 0, 80, 0), (80, 0, 80, 40), (80, 40, 40, 40), (40, 40, 40, 15))
+    beside = RoadNetwork(hook, 0.1, STILL, (41, 81))
+    assert _faults(beside) == [
+        "segments[3]: too short: got 2.5; expected at least 2.854 m",
+        "segments[0]: intersection [40, 15] is too close to the road: got 1.5; expected at least 1.777 m",
+    ]
+    assert _faults(RoadNetwork.grid(3, 4), radius=0.8) == [
+        "intersection_radius: too small: got 0.8; expected at least 2.9 w = 0.87 m"
+    ]
