@@ -110,8 +110,8 @@ def run_trial(
         writer = RecordWriter(record, controller=name, overwrite=overwrite)
     first = () if writer is None else (writer,)
     try:
-        trial = Trial(instance, sinks=(*first, scorer, *sinks))
-        ending, measured = run(trial, driver, deadline)
+        with Trial(instance, sinks=(*first, scorer, *sinks)) as trial:
+            ending, measured = run(trial, driver, deadline)
     finally:
         if writer is not None:
             writer.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Self, cast
 
 import numpy as np
 
@@ -125,6 +125,17 @@ class Trial:
             self.ending = Ending(end, self._tick, detail)
             self._buffer.end(self.ending)
         return self.ending
+
+    def close(self) -> None:
+        """End the trial as `reset` if it is running, and free the simulator; `with` does so by itself."""
+        self.end(End.RESET)
+        self._simulator.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
 
     def _checked(self, command: object) -> tuple[float, float]:
         try:
