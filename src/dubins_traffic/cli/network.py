@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import options
+from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "network --grid 3 4",
@@ -37,13 +38,23 @@ def network(
         typer.Option("--grid", metavar="ROWS COLS", help="The complete grid.", show_default="3 4"),
     ] = None,
     seed: options.Seed = 0,
-    format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,  # noqa: A002
+    format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
     output: options.Output = None,
 ) -> None:
     """Print a road network: a grid, or one drawn at random."""
-    from dubins_traffic.errors import InputError
     from dubins_traffic.roads.generate import generate
     from dubins_traffic.roads.network import RoadNetwork
 
-    if grid is not None and (intersections is not None or segments is not None):
-        raise InputError("two networks at once", file="--grid", expected="either --grid or --intersections")
+    if intersections is None and segments is None:
+        rows, columns = grid or (3, 4)
+        made = RoadNetwork.grid(rows, columns)
+    elif grid is not None:
+        raise InputError(
+            "two networks at once", file="--grid", value=grid, expected="--grid or --intersections, not both"
+        )
+    elif intersections is None or segments is None:
+        missing = "--intersections" if intersections is None else "--segments"
+        raise InputError("missing", file=missing, expected="both --intersections and --segments")
+    else:
+        made = generate(intersections, segments, seed)
+    options.write(made.to_json() if format is Format.JSON else made.to_text(), output)

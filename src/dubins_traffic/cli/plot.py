@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import options
+from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "plot grid.json",
@@ -35,7 +36,6 @@ def plot(
 ) -> None:
     """Draw a network, an instance or a recorded trial."""
     from dubins_traffic.campaign.sources import load
-    from dubins_traffic.errors import InputError
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.viewer.plot import write_plot
 

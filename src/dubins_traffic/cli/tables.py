@@ -50,7 +50,7 @@ def score_table(sheet: ScoreSheet) -> Table:
     from rich.table import Table
 
     names = sorted({score.controller or "-" for score in sheet.trials})
-    table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left")
+    table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left", show_edge=False)
     table.add_column("trial", footer="sum", justify="right", no_wrap=True)
     if len(names) > 1:
         table.add_column("controller", overflow="fold")

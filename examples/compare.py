@@ -1,0 +1,103 @@
+"""Run the same trials with several controllers and print their score sheets side by side.
+
+python examples/compare.py demo demo-output --controllers lanes simple --trials 3
+
+Leaves all records, and a picture and a replay page of the first trial of the first controller, and prints where.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+import dubins_traffic as dt
+
+
+def points(value: float) -> str:
+    """Return a score of ICRA 2016 in few characters."""
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+ROWS: dict[str, Callable[[dt.Score], str]] = {
+    "end": lambda score: score.end or "cut off",
+    "ICRA 2016": lambda score: points(score.icra2016),
+    "rounds": lambda score: str(score.rounds),
+    "goals visited": lambda score: f"{score.goals_visited:.0%}",
+    "collisions": lambda score: str(len(score.collisions)),
+    "  at fault": lambda score: str(sum(collision.at_fault for collision in score.collisions)),
+    "off road, s": lambda score: f"{score.driven.off_road_s:.1f}",
+    "standing": lambda score: f"{score.driven.standing_share:.0%}",
+    "distance, m": lambda score: f"{score.driven.distance_m:.1f}",
+    "least gap, m": lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f}",
+}
+
+
+def side_by_side(sheets: dict[str, dt.ScoreSheet]) -> Table:
+    """Return a table with one column per controller and trial."""
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
+    table.add_column("\ntrial", no_wrap=True)
+    for number, (controller, sheet) in enumerate(sheets.items()):
+        if number:
+            table.add_column("│\n│")
+        for place, score in enumerate(sheet.trials):
+            title = "" if place else f"[bold]{controller}[/bold]"
+            table.add_column(f"{title}\n{score.trial}", justify="right", overflow="fold")
+        table.add_column("\nsum", justify="right", style="bold")
+    for heading, cell in ROWS.items():
+        cells = [heading]
+        for number, sheet in enumerate(sheets.values()):
+            total = points(sheet.icra2016_sum) if heading == "ICRA 2016" else ""
+            cells += ["│"] * bool(number) + [cell(score) for score in sheet.trials] + [total]
+        table.add_row(*cells)
+    return table
+
+
+def compare(configuration: str, output: Path, controllers: Sequence[str], trials: int, seed: int) -> None:
+    """Run the trials, print the table and the paths of what is left."""
+    sheets: dict[str, dt.ScoreSheet] = {}
+    for controller in controllers:
+        name = Path(controller).name.replace(":", "-")
+        plan = dt.plan(configuration, controller, trials=trials, seed=seed, records=output / name)
+        print(f"{controller}: {len(plan.jobs)} trials ...", file=sys.stderr)
+        sheets[name] = plan.conclude(dt.run_trials(plan.jobs))
+    Console().print(side_by_side(sheets))
+    for sheet in sheets.values():
+        for score in sheet.trials:
+            print(score.record)
+    record = dt.load_record(next(iter(sheets.values())).trials[0].record or "")
+    picture, page = output / "picture.png", output / "replay.html"
+    dt.write_plot(picture, record)
+    score = dt.score(record)
+    summary = {heading.strip(): cell(score) for heading, cell in ROWS.items()}
+    dt.write_replay(page, record.instance, record.frames, record.ending, summary)
+    print(f"{picture}  (trial {score.trial} of {score.controller})")
+    print(f"{page}  (the same trial, to open in a browser)")
+
+
+def main() -> int:
+    """Read the command line and compare."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("configuration", help="a file or the name of a shipped configuration")
+    parser.add_argument("output", type=Path, help="folder for what is left")
+    parser.add_argument("--controllers", nargs="+", default=["lanes", "simple"])
+    parser.add_argument("--trials", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    try:
+        compare(given.configuration, given.output, given.controllers, given.trials, given.seed)
+    except dt.DubinsTrafficError as error:
+        print(f"compare: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,67 @@
+"""Importing the package and asking for help are quick and load nothing heavy."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import dubins_traffic
+
+HEAVY = ("numba", "llvmlite", "matplotlib", "pyarrow", "scipy", "mcap")
+LIMIT = 0.4
+COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
+
+
+def modules_after(code: str) -> set[str]:
+    code = f"import sys\n{code}\nprint(*sys.modules, sep='\\n', file=sys.stderr)"
+    ran = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return {name.partition(".")[0] for name in ran.stderr.split()}
+
+
+def quickest(arguments: list[str], times: int = 7) -> float:
+    """Return the shortest of some runs, so that a busy machine does not count."""
+    best = float("inf")
+    for _ in range(times):
+        began = time.perf_counter()
+        subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
+        best = min(best, time.perf_counter() - began)
+    return best
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import dubins_traffic",
+        "from dubins_traffic.cli.main import main; main(['--help'])",
+        "from dubins_traffic.cli.main import main; main(['run', '--help'])",
+        "from dubins_traffic.cli.main import main; main(['list', 'agents'])",
+        "from dubins_traffic.cli.main import main; main(['network', '--grid', '3', '4'])",
+        "from dubins_traffic.cli.main import main; main(['instance', 'demo'])",
+    ],
+)
+def test_no_heavy_library_is_loaded(code):
+    assert modules_after(code).isdisjoint(HEAVY)
+
+
+def test_numpy_is_not_loaded_by_the_import_alone():
+    assert "numpy" not in modules_after("import dubins_traffic")
+
+
+@pytest.mark.parametrize("arguments", [[sys.executable, "-c", "import dubins_traffic"], [COMMAND, "--help"]])
+def test_start_up_is_quick(arguments):
+    assert quickest(arguments) < LIMIT
+
+
+def test_every_public_name_can_be_had():
+    for name in dubins_traffic.__all__:
+        assert getattr(dubins_traffic, name) is not None
+    assert set(dubins_traffic.__all__) <= set(dir(dubins_traffic))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = dubins_traffic.nonsense
