@@ -29,7 +29,7 @@ from dubins_traffic.kernels.compile import jit
 Numbers = tuple[float, float, float, float]
 JUMP = 0.5
 """An ego that comes back into sight farther than this from where it was lost has left its path, metres."""
-JOIN = 0.5
+JOIN = 0.75
 """A car begins to follow when it comes this near to the ego's path, metres (for w = 0.3 m)."""
 AHEAD = 0.25
 """It drives to the point of the path about this far ahead, metres (for w = 0.3 m)."""
