@@ -15,6 +15,8 @@ from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.rnd import Segment, extent
 
 LARGEST_DEGREE = 4
+OFF_LATTICE = 0.37
+"""Moves the borders of cells off the lattice, so that roads along it lie in few cells."""
 
 
 def check(segments: Sequence[Segment], shape: tuple[int, int]) -> None:
@@ -55,7 +57,7 @@ def meetings(segment: Ints) -> Ints:
     start, end = segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64)
     size = max(1.0, float(np.abs(end - start).max(axis=1).mean()))
     found: list[Ints] = []
-    for i, j in pairs(*covered(start, end, 0.0, size)):
+    for i, j in pairs(*covered(start + OFF_LATTICE, end + OFF_LATTICE, 0.0, size)):
         bad = (i != j) & _meet(segment[i], segment[j])
         found.append(np.stack([np.minimum(i, j), np.maximum(i, j)], axis=-1)[bad])
     return np.unique(np.concatenate(found), axis=0) if found else np.empty((0, 2), dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -77,6 +77,10 @@ class RoadNetwork:
                 value=self.length,
                 expected=f"at most {rnd.WORLD:g} metres",
             )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave behind, when pickled, what can be worked out again."""
+        return {own.name: getattr(self, own.name) for own in fields(self)}
 
     @classmethod
     def grid(

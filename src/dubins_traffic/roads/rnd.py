@@ -140,6 +140,8 @@ def extent(segments: Sequence[Segment]) -> tuple[int, int]:
 
 def is_integer(value: object) -> TypeGuard[int]:
     """Whether `value` is a whole number (2.0 is one, True is not)."""
+    if type(value) is int:
+        return True
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return isinstance(value, Integral) or (math.isfinite(value) and float(value).is_integer())
