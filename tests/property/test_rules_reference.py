@@ -18,7 +18,7 @@ from dubins_traffic.spec.propositions import NAMES
 from tests.rules_reference import Reference
 from tests.rules_scripts import KITE, STAR, TURNED_STAR, flags, instance, label, moved, on_lane, wander
 
-GRID = RoadNetwork.grid(2, 3)
+GRID = RoadNetwork.grid(2, 3, 3.5)
 BOX = Car(body=Rectangle(0.5, 0.26))
 
 

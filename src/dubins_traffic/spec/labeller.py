@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from dubins_traffic.cars.body import Car, Obstacle
-from dubins_traffic.cars.state import Contact, Labels, Pose, State
+from dubins_traffic.cars.state import NONE, Contact, Labels, Pose, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
@@ -18,12 +18,16 @@ from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.frame import label_frame
 from dubins_traffic.spec.obstacles import place_obstacles
 from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.propositions import STOPPED
 from dubins_traffic.spec.tables import (
+    FORFEITS,
     LATERAL,
     PROGRESS,
+    RANK,
     REACH,
     STAND_TICKS,
     STOP_TICKS,
+    TICKET,
     Memory,
     pack_rules,
 )
@@ -171,6 +175,21 @@ class Labeller:
     def reach(self) -> Floats:
         """Largest lateral coordinate of the bodies, metres, (B, N); 0 without lane state."""
         return self.memory.measure[:, :, REACH]
+
+    @property
+    def tickets(self) -> Ints:
+        """Ticks of the cars' tickets, (B, N); -1 for a car that has not stopped at a crossing."""
+        return np.where(self.labels.bits & STOPPED, self.memory.mark[:, :, TICKET], NONE)
+
+    @property
+    def forfeits(self) -> Ints:
+        """New tickets of the cars in their present wait, (B, N)."""
+        return np.where(self.labels.bits & STOPPED, self.memory.mark[:, :, FORFEITS], 0)
+
+    @property
+    def places(self) -> Ints:
+        """Places of the cars in the order of the crossing ahead, 0 first, (B, N); -1 without a ticket."""
+        return self.memory.mark[:, :, RANK]
 
     def _label(self, state: State) -> None:
         label_frame(self._tick, state, self._roads, self._obstacles, self._rules, self.labels, self.memory)
