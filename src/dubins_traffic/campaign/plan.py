@@ -19,6 +19,7 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.simulators import registry as simulators
 
 DEFAULT_CONTROLLER = "lanes"
 
@@ -106,6 +107,8 @@ def plan(
         other_seed = None if seed == instance.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
+    if jobs and jobs[0].instance is not None:
+        _check_simulator(os.fspath(source), jobs[0].instance.simulator)
     target = None if data is None else _data_file(Path(data), overwrite_data)
     folder = None if records is None else _folder(Path(records))
     several = [(job, f"-{run:04d}" if repeat > 1 else "") for job in jobs for run in range(repeat)]
@@ -133,6 +136,13 @@ def _refuse(source: str, options: dict[str, object]) -> None:
             raise InputError(
                 "belongs to a configuration; this is one trial", file=source, field=name, value=value
             )
+
+
+def _check_simulator(source: str, name: str) -> None:
+    try:
+        simulators.load(name).close()
+    except InputError as error:
+        raise error.within(file=source) from None
 
 
 def _check_deadline(deadline: float | None) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import typer
@@ -19,15 +21,15 @@ INTERRUPTED: Final = 130
 PROGRAM: Final = "dubins-traffic"
 
 
-def conclude(error: BaseException, *, debug: bool) -> int:
+def conclude(error: BaseException, arguments: Sequence[str]) -> int:
     """Tell the user about `error` on standard error and return the exit status.
 
     Parameters
     ----------
     error : BaseException
         What a command raised.
-    debug : bool
-        Whether to show the traceback before.
+    arguments : sequence of str
+        The command line; with ``--debug`` in it, the traceback is shown before.
 
     Returns
     -------
@@ -37,20 +39,20 @@ def conclude(error: BaseException, *, debug: bool) -> int:
     if isinstance(error, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
-    if debug:
+    if "--debug" in arguments:
         traceback.print_exception(error)
-    text, status = _verdict(error)
+    text, status = _verdict(error, arguments)
     print(f"{PROGRAM}: {_one_line(text)}", file=sys.stderr)
     return status
 
 
-def _verdict(error: BaseException) -> tuple[str, int]:
+def _verdict(error: BaseException, arguments: Sequence[str]) -> tuple[str, int]:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", INTERRUPTED
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT
     if isinstance(error, typer.TyperException):
-        return error.format_message(), WRONG_INPUT
+        return error.format_message() + _given(error, arguments), WRONG_INPUT
     if isinstance(error, OSError) and error.strerror:
         names = [
             os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)
@@ -58,6 +60,15 @@ def _verdict(error: BaseException) -> tuple[str, int]:
         return ": ".join([*names, error.strerror]), WRONG_INPUT
     hint = f"`{PROGRAM} --debug ...` shows where; please report it"
     return f"unexpected {type(error).__name__}: {error} ({hint})", FAILED
+
+
+def _given(error: typer.TyperException, arguments: Sequence[str]) -> str:
+    """Return which value of an option was wrong; the library's message does not say."""
+    names = getattr(getattr(error, "param", None), "opts", ())
+    for option, value in pairwise(arguments):
+        if option in names and value not in error.format_message():
+            return f": got {value!r}"
+    return ""
 
 
 def _one_line(text: str) -> str:

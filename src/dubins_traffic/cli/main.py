@@ -64,5 +64,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt) as error:
-        return faults.conclude(error, debug="--debug" in arguments)
+        return faults.conclude(error, arguments)
     return int(status or faults.OK)

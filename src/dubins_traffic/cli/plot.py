@@ -39,10 +39,10 @@ def plot(
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.viewer.plot import write_plot
 
+    output = output or options.beside(file, ".png")
     subject = load(file)
     if isinstance(subject, Configuration):
         expected = "a network, an instance or a record; `dubins-traffic instance CONFIG` draws an instance"
         raise InputError("a configuration can't be drawn", file=file, expected=expected)
-    output = output or options.beside(file, ".png")
     write_plot(output, subject)
     options.tell(output)

@@ -24,7 +24,7 @@ def replay(
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.replay import write_replay
 
-    found = load_record(record)
     output = output or options.beside(record, ".html")
+    found = load_record(record)
     write_replay(output, found.instance, found.frames, found.ending, summary(score(found)))
     options.tell(output)
