@@ -34,6 +34,7 @@ from dubins_traffic.agents.tables import (
     STEP,
     STOP,
     TRAIL,
+    YAW_RATE,
     Agents,
     workspace,
 )
@@ -99,7 +100,7 @@ class Fleet:
             net=net,
             seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
             trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-            build=_builds(instances, floats[:, :, STOP].max(axis=1)),
+            build=_builds(instances, floats),
             ints=ints,
             floats=floats,
             cycle=np.array(cycle, dtype=np.int64),
@@ -208,15 +209,16 @@ def _habits(instance: Instance, kind: str, given: Mapping[str, Any]) -> tuple[fl
     )
 
 
-def _builds(instances: Sequence[Instance], stop: Floats) -> Floats:
+def _builds(instances: Sequence[Instance], floats: Floats) -> Floats:
     """Return `Agents.build`."""
     cars = pack_cars([instance.problem.car for instance in instances])
     slowest = np.maximum(cars.speed_low, 0.0)
+    turns = np.where(floats[:, :, YAW_RATE] > 0.0, floats[:, :, YAW_RATE], np.inf).min(axis=1)
     columns = (
-        stop + cars.reach,
+        floats[:, :, STOP].max(axis=1) + cars.reach,
         np.array([instance.problem.period for instance in instances]),
         slowest,
-        np.maximum(cars.turning_radius, slowest / cars.yaw_rate),
+        np.maximum(cars.turning_radius, slowest / turns),
         ((cars.turning_radius > 0.0) | (slowest > 0.0)).astype(np.float64),
         cars.w,
         cars.half_length,
