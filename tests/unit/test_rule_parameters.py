@@ -1,0 +1,74 @@
+"""The parameters of the rules, durations in ticks, names of flags and labels as words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.spec.labels import words
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.propositions import NAMES, names
+from dubins_traffic.spec.tables import ticks
+
+
+def test_defaults_are_those_of_the_rules() -> None:
+    own = RuleParameters()
+    assert (own.crossing_degree, own.turn_back, own.left_set, own.left_release) == (3, 0.3, 0.05, 0.0)
+    assert (own.stop_time, own.group_time, own.forfeit_time, own.stand_time) == (0.5, 0.1, 3.0, 1.0)
+    assert RuleParameters.from_mapping({}) == own
+    assert RuleParameters.from_mapping(own.to_mapping()) == own
+
+
+def test_a_mapping_changes_what_it_names() -> None:
+    own = RuleParameters.from_mapping({"turn_back": 0.4, "tickets": 2})
+    assert (own.turn_back, own.tickets, own.stop_time) == (0.4, 2, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("rules", "field"),
+    [
+        ({"turnback": 0.3}, "turnback"),
+        ({"turn_back": -0.1}, "turn_back"),
+        ({"turn_back": float("nan")}, "turn_back"),
+        ({"turn_back": float("inf")}, "turn_back"),
+        ({"turn_back": "0.3"}, "turn_back"),
+        ({"turn_back": True}, "turn_back"),
+        ({"crossing_degree": 3.0}, "crossing_degree"),
+        ({"left_release": 0.1}, "left_release"),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(rules: dict[str, Any], field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        RuleParameters.from_mapping(rules)
+    assert caught.value.field == field
+    assert caught.value.expected
+
+
+@pytest.mark.parametrize(
+    ("duration", "rate", "expected"),
+    [(0.5, 30.0, 15), (0.1, 30.0, 3), (0.1, 10.0, 1), (1.0, 30.0, 30),
+     (0.0, 30.0, 0), (0.101, 10.0, 2), (3.0, 7.0, 21)],
+)  # fmt: skip
+def test_a_duration_is_so_many_ticks(duration: float, rate: float, expected: int) -> None:
+    assert ticks(duration, rate) == expected
+
+
+def test_flags_are_distinct_and_named() -> None:
+    assert sorted(NAMES.values()) == [1 << k for k in range(len(NAMES))]
+    assert names(0) == ()
+    assert names(NAMES["left"] | NAMES["on_road"]) == ("on_road", "left")
+
+
+def test_labels_are_words_as_in_2016() -> None:
+    roads = RoadNetwork.grid(3, 4)
+    segment, at = np.array([0, 3]), np.array([-1, roads.vertex((1, 0))])
+    x0, y0, x1, y1 = roads.segments[3]
+    assert words(roads, ("ego", "agent0"), segment, at) == (
+        "ego_s_0_0_1_0",
+        f"agent0_s_{x0}_{y0}_{x1}_{y1}",
+        "agent0_t_1_0",
+    )
