@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,7 +66,7 @@ class _Watch:
     def begin(self, instance: Instance) -> None:
         """Nothing has run yet."""
 
-    def frames(self, frames: Frames) -> None:
+    def frames(self, frames: Frames) -> None:  # noqa: ARG002  # what they hold is no matter here
         """Look once a simulated second, and interrupt once."""
         if self._cancelled is not None and self._cancelled.is_set():
             self._cancelled = None
@@ -91,7 +92,8 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     with ProcessPoolExecutor(
         min(workers, len(jobs)), mp_context=context, initializer=_begin, initargs=(cancelled,)
     ) as pool:
-        pending = {pool.submit(_run, job) for job in jobs}
+        with _deaf_to_interrupts():
+            pending = {pool.submit(_run, job) for job in jobs}
         try:
             while pending:
                 done, pending = wait(pending, return_when=FIRST_COMPLETED)
@@ -101,6 +103,16 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
             cancelled.set()
             _drop(pending)
             raise
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Generator[None]:
+    """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _drop(pending: set[Future[Result]]) -> None:
@@ -114,7 +126,6 @@ _cancelled: Event | None = None
 def _begin(cancelled: Event) -> None:
     """Prepare a worker: the parent alone hears Ctrl-C and passes it on."""
     global _cancelled  # noqa: PLW0603  # a worker's only state, set once
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _cancelled = cancelled
 
 

@@ -16,17 +16,16 @@ from dubins_traffic.errors import DubinsTrafficError
 OK: Final = 0
 FAILED: Final = 1
 WRONG_INPUT: Final = 2
-INTERRUPTED: Final = 130
 
 PROGRAM: Final = "dubins-traffic"
 
 
-def conclude(error: BaseException, arguments: Sequence[str]) -> int:
+def conclude(error: Exception, arguments: Sequence[str]) -> int:
     """Tell the user about `error` on standard error and return the exit status.
 
     Parameters
     ----------
-    error : BaseException
+    error : Exception
         What a command raised.
     arguments : sequence of str
         The command line; with ``--debug`` in it, the traceback is shown before.
@@ -34,7 +33,7 @@ def conclude(error: BaseException, arguments: Sequence[str]) -> int:
     Returns
     -------
     int
-        2 where the input is wrong, 130 after Ctrl-C, 0 where the reader of our output had enough, 1 otherwise.
+        2 where the input is wrong, 0 where the reader of our output had enough, 1 otherwise.
     """
     if isinstance(error, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -42,13 +41,16 @@ def conclude(error: BaseException, arguments: Sequence[str]) -> int:
     if "--debug" in arguments:
         traceback.print_exception(error)
     text, status = _verdict(error, arguments)
-    print(f"{PROGRAM}: {_one_line(text)}", file=sys.stderr)
+    tell(text)
     return status
 
 
-def _verdict(error: BaseException, arguments: Sequence[str]) -> tuple[str, int]:
-    if isinstance(error, KeyboardInterrupt):
-        return "interrupted", INTERRUPTED
+def tell(text: str) -> None:
+    """Print one line about something wrong on standard error."""
+    print(f"{PROGRAM}: {' '.join(text.split())}", file=sys.stderr)
+
+
+def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT
     if isinstance(error, typer.TyperException):
@@ -69,7 +71,3 @@ def _given(error: typer.TyperException, arguments: Sequence[str]) -> str:
         if option in names and value not in error.format_message():
             return f": got {value!r}"
     return ""
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

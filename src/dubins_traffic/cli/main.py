@@ -63,6 +63,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
-    except (Exception, KeyboardInterrupt) as error:
+    except Exception as error:
         return faults.conclude(error, arguments)
     return int(status or faults.OK)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
@@ -108,15 +107,16 @@ def run(
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 advance()
+    except KeyboardInterrupt:
+        faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
+        raise
     finally:
         if results:
             show(todo.conclude(results), json=json)
     failed = [result for result in results if result.ending.end in FAULTS]
     for result in failed:
         ending = result.ending
-        print(
-            f"{faults.PROGRAM}: trial {result.instance.trial}: {ending.end}: {ending.detail}", file=sys.stderr
-        )
+        faults.tell(f"trial {result.instance.trial}: {ending.end}: {ending.detail}")
     if failed:
         raise typer.Exit(faults.FAILED)
 

@@ -62,10 +62,10 @@ def score_table(sheet: ScoreSheet) -> Table:
         table.add_column(_narrow(heading), footer=footer, justify=align, no_wrap=True)
     for score in sheet.trials:
         leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
-        table.add_row(*leading, *(cell(score) for cell in CELLS.values()))
+        table.add_row(*leading, *(_narrow(cell(score), 10) for cell in CELLS.values()))
     return table
 
 
-def _narrow(text: str) -> str:
-    """Return words below one another, so that a table fits 80 columns."""
-    return text.replace(" ", "\n")
+def _narrow(text: str, width: int = 0) -> str:
+    """Return the words of what is wider than `width` below one another, so that a table fits 80 columns."""
+    return text.replace(" ", "\n") if len(text) > width else text
