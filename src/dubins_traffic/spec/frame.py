@@ -66,6 +66,7 @@ from dubins_traffic.spec.tables import (
     NEXT_IN_LANE,
     NEXT_IN_QUEUE,
     NEXT_ON_SEGMENT,
+    NOW,
     OVERTAKING_AHEAD,
     OVERTAKING_BEHIND,
     PROGRESS,
@@ -105,6 +106,7 @@ def label_frame(
 
     Before frame 0 both are as they are made: no lane, no vertex, no flag.
     """
+    memory.head[0, NOW] = tick % memory.trail.shape[0]
     for b in range(state.count.shape[0]):
         cars = state.count[b]
         for n in range(cars):
@@ -230,23 +232,24 @@ def _entry(
 def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memory: Memory) -> int:
     """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
     trail = memory.trail
-    rows = trail.shape[0]
-    trail[tick % rows, b, n, 0] = x
-    trail[tick % rows, b, n, 1] = y
+    now = memory.head[0, NOW]
+    trail[now, b, n, 0] = x
+    trail[now, b, n, 1] = y
     if _moved2(b, n, tick, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]:
         return STILL
     return 0
 
 
-@jit
+@jit_inline
 def _moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
     """Return the squared distance of the centre from where it was `ago` ticks before; huge before that."""
     if tick < ago:
         return 1e300
     trail = memory.trail
-    rows = trail.shape[0]
-    now = tick % rows
-    then = (tick - ago) % rows
+    now = memory.head[0, NOW]
+    then = now - ago
+    if then < 0:
+        then += trail.shape[0]
     dx = trail[now, b, n, 0] - trail[then, b, n, 0]
     dy = trail[now, b, n, 1] - trail[then, b, n, 1]
     return dx * dx + dy * dy

@@ -68,7 +68,8 @@ LANE: Final = 0
 SEGMENT: Final = 1
 QUEUE: Final = 2
 CROSSERS: Final = 3
-HEADS: Final = 4
+NOW: Final = 4
+HEADS: Final = 5
 
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
@@ -104,7 +105,8 @@ class Memory(NamedTuple):
     link : (N, LINKS) int64
         Scratch: the cars of one lane, segment and queue as linked lists; members and groups of a queue.
     head : (H, HEADS) int64
-        Scratch: the first car of each lane, segment, queue (-1: none), and how many cars cross a vertex.
+        Scratch: the first car of each lane, segment, queue (-1: none), and how many cars cross a vertex; in the
+        first row, which row of `trail` is the present one (`NOW`).
     """
 
     measure: Floats
