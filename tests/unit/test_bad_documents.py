@@ -137,7 +137,7 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
     (
         "cycle that jumps",
         base(e_agents=[{"type": "loop", "name": "a", "parameters": {"cycle": [[0, 0], [2, 0]]}}]),
-        "e-agents (a).parameters.cycle[0]",
+        "e-agents[0].parameters.cycle[0]",
         "[0, 0]",
         "joined",
     ),
@@ -166,14 +166,14 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
     (
         "starts that overlap",
         base(ego={"start": [0, 0, 0]}, e_agents=[WANDER | {"start": [0.3, 0, 0]}]),
-        "start of agent",
+        "e-agents[0].start",
         "[0.3, 0.0, 0.0]",
         "clear",
     ),
     (
         "start in an obstacle",
         base(ego={"start": [1, 0, 0]}, obstacles=obstacle([0, -1], [2, -1], [2, 1], [0, 1])),
-        "start of ego",
+        "ego.start",
         "[1.0, 0.0, 0.0]",
         "clear",
     ),

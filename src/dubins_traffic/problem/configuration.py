@@ -25,10 +25,11 @@ from dubins_traffic.roads.network import RoadNetwork
 
 @dataclass(frozen=True, slots=True)
 class PlannedAgent:
-    """An e-agent of a configuration: what it is, and where it starts (None: drawn)."""
+    """An e-agent of a document: what it is, where it starts (None: drawn), and the entry that says so."""
 
     agent: EAgent
     start: Pose | None
+    field: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +249,7 @@ def plan_agents(entries: list[AgentEntry]) -> tuple[PlannedAgent, ...]:
                 )
                 raise InputError(problem, field=f"{where}.name", value=name, expected="a name of its own")
             taken[name] = where
-            agents.append(PlannedAgent(EAgent(kind, name, entry.type, parameters), start))
+            agents.append(PlannedAgent(EAgent(kind, name, entry.type, parameters), start, where))
     return tuple(agents)
 
 

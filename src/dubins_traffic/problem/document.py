@@ -153,8 +153,8 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         e_agents=names[1:],
         rules=rules,
     )
-    wishes = _wishes(model, network, planned, names)
-    wishes[1:] = agent_wishes(network, agents, [wish.pose for wish in wishes[1:]])
+    planned, ego = _placed(model, network, planned)
+    wishes = [ego, *agent_wishes(network, planned, agents)]
     ground = Ground(network, car, model.radius, problem.obstacles)
     duration = model.duration
     if duration is None:
@@ -182,17 +182,20 @@ def _network(document: Any) -> RoadNetwork:
         raise error.within(field="rnd") from None
 
 
-def _wishes(
-    model: InstanceModel, network: RoadNetwork, planned: tuple[PlannedAgent, ...], names: tuple[str, ...]
-) -> list[Wish]:
-    """Return where each car is to start: as `starts` says, else as its entry says, else drawn."""
-    for name in model.starts:
+def _placed(
+    model: InstanceModel, network: RoadNetwork, planned: tuple[PlannedAgent, ...]
+) -> tuple[tuple[PlannedAgent, ...], Wish]:
+    """Return the e-agents and the ego with the starts that `starts` gives, else their entries, else none."""
+    given = {name: _pose(row) for name, row in model.starts.items()}
+    names = ["ego", *(plan.agent.name for plan in planned)]
+    for name in given:
         if name not in names:
             expected = f"one of {', '.join(names[:20])}"
             raise InputError("start of an unknown car", field="starts", value=name, expected=expected)
-    given = {name: _pose(row) for name, row in model.starts.items()}
-    ego = given.get("ego") or origin_start(network, model.car.w)
-    return [Wish(ego), *(Wish(given.get(plan.agent.name, plan.start)) for plan in planned)]
+    placed = tuple(
+        PlannedAgent(plan.agent, given.get(plan.agent.name, plan.start), plan.field) for plan in planned
+    )
+    return placed, Wish(given.get("ego") or origin_start(network, model.car.w), None, "starts.ego")
 
 
 def _pose(row: tuple[float, ...]) -> Pose:

@@ -49,7 +49,7 @@ def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instanc
     """
     check_numbers(seed, trial)
     try:
-        return _draw(configuration, seed, trial)
+        return _draw(configuration, int(seed), int(trial))
     except InputError as error:
         raise error.within(file=configuration.file) from None
 
@@ -96,20 +96,20 @@ def complete_agents(
     return tuple(agents)
 
 
-def agent_wishes(network: RoadNetwork, agents: Sequence[EAgent], given: Sequence[Pose | None]) -> list[Wish]:
-    """Return where each e-agent is to start: as given, else drawn; a loop on its cycle."""
+def agent_wishes(
+    network: RoadNetwork, planned: Sequence[PlannedAgent], agents: Sequence[EAgent]
+) -> list[Wish]:
+    """Return where each e-agent is to start: as planned, else drawn; a loop on its cycle."""
     wishes: list[Wish] = []
-    for agent, pose in zip(agents, given, strict=True):
-        lanes = _cycle(network, agent) if agent.kind == "loop" else None
-        wishes.append(Wish(pose, lanes))
+    for plan, agent in zip(planned, agents, strict=True):
+        lanes = None
+        if agent.kind == "loop":
+            try:
+                lanes = cycle_lanes(network, agent.parameters["cycle"])
+            except InputError as error:
+                raise error.within(field=f"{plan.field}.parameters") from None
+        wishes.append(Wish(plan.start, lanes, f"{plan.field}.start"))
     return wishes
-
-
-def _cycle(network: RoadNetwork, agent: EAgent) -> tuple[int, ...]:
-    try:
-        return cycle_lanes(network, agent.parameters["cycle"])
-    except InputError as error:
-        raise error.within(field=f"e-agents ({agent.name}).parameters") from None
 
 
 def _draw(configuration: Configuration, seed: int, trial: int) -> Instance:
@@ -134,8 +134,8 @@ def _draw(configuration: Configuration, seed: int, trial: int) -> Instance:
         e_agents=names[1:],
         rules=rules,
     )
-    given = [planned.start for planned in configuration.agents]
-    wishes = [Wish(_ego_start(network, configuration)), *agent_wishes(network, agents, given)]
+    ego = Wish(_ego_start(network, configuration), None, "ego.start")
+    wishes = [ego, *agent_wishes(network, configuration.agents, agents)]
     ground = Ground(network, car, radius, problem.obstacles)
     return Instance(
         problem=problem,

@@ -58,7 +58,7 @@ class Loop(Strict):
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     stop_range: Distance = Field(default=0.5, description="gap to what is ahead at which it stops, m")
     patience: Seconds | None = Field(
-        default=2.0,
+        default=5.0,
         description="seconds it stands for others before it drives on past those not in its way, and turns round if "
         "its way stays barred; null: it stands for ever",
     )
@@ -71,7 +71,7 @@ class Follow(Strict):
     speed: Speed = Field(default=0.5, description="largest speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     patience: Seconds | None = Field(
-        default=2.0,
+        default=5.0,
         description="seconds it stands for others before it drives on past those not in its way, and turns round if "
         "its way stays barred; null: it stands for ever",
     )
@@ -88,7 +88,7 @@ class Parked(Strict):
     )
     speed: Speed = Field(default=0.5, description="speed once it drives, m/s")
     patience: Seconds | None = Field(
-        default=2.0,
+        default=5.0,
         description="seconds it stands for others before it drives on past those not in its way, and turns round if "
         "its way stays barred; null: it stands for ever",
     )

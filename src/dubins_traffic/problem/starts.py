@@ -23,10 +23,13 @@ TIGHT = 0.1
 
 
 class Wish(NamedTuple):
-    """Where a car is to start: the pose, or None to draw it, and the lanes it may be drawn on (None: all)."""
+    """Where a car is to start: the pose, or None to draw it, the lanes it may be drawn on (None: all), and the
+    field of the document that says so.
+    """
 
     pose: Pose | None
-    lanes: Collection[int] | None = None
+    lanes: Collection[int] | None
+    field: str
 
 
 class Ground(NamedTuple):
@@ -102,24 +105,25 @@ def _attempt(
 def _check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
     """Refuse given starts in which a body overlaps another or an obstacle."""
     given = [
-        (name, wish.pose, body_shape(ground.car.body, wish.pose))
+        (name, wish, body_shape(ground.car.body, wish.pose))
         for name, wish in zip(names, wishes, strict=True)
         if wish.pose is not None
     ]
     obstacles = [obstacle_shape(obstacle) for obstacle in ground.obstacles]
-    for k, (name, pose, shape) in enumerate(given):
+    for k, (name, wish, shape) in enumerate(given):
         for other, _, other_shape in given[:k]:
             if overlap(shape, other_shape):
-                raise _overlap_error(name, pose, other)
+                raise _overlap_error(name, wish, other)
         for number, obstacle in enumerate(obstacles):
             if overlap(shape, obstacle):
-                raise _overlap_error(name, pose, f"obstacles[{number}]")
+                raise _overlap_error(name, wish, f"obstacles[{number}]")
 
 
-def _overlap_error(name: str, pose: Pose, other: str) -> InputError:
+def _overlap_error(name: str, wish: Wish, other: str) -> InputError:
+    pose = wish.pose
     return InputError(
-        f"the start of {name} overlaps {other}",
-        field=f"start of {name}",
-        value=[pose.x, pose.y, pose.theta],
-        expected="starts clear of other cars and of obstacles",
+        f"{name} overlaps {other}",
+        field=wish.field,
+        value=[pose.x, pose.y, pose.theta] if pose else None,
+        expected="a start clear of other cars and of obstacles",
     )
