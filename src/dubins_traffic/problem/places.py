@@ -7,21 +7,33 @@ Places are found exactly, not by trial and error, so that "does not fit" is a fa
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import sqrt
+from math import ceil, floor
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.problem.lines import Lines, band, chord
 from dubins_traffic.problem.overlap import Point, Shape, contains, edges
+from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.network import RoadNetwork
 
 SLACK = 1e-9
 """Added to every clearance, metres, so that rounding never eats into it."""
 
-Mask = npt.NDArray[np.bool_]
+
+class Intervals(NamedTuple):
+    """Intervals of lanes, ascending by lane, then place: arrays (K,) of lane, and of metres along it."""
+
+    lane: Ints
+    low: Floats
+    high: Floats
+
+    def select(self, index: Ints) -> Intervals:
+        """Return the intervals at `index`."""
+        return Intervals(self.lane[index], self.low[index], self.high[index])
 
 
 class Places:
@@ -36,20 +48,16 @@ class Places:
     """
 
     def __init__(self, network: RoadNetwork, w: float) -> None:
-        lanes = np.arange(network.lanes)
-        segment, back = lanes >> 1, (lanes & 1).astype(bool)
-        tangent = np.where(back[:, None], -network.tangents[segment], network.tangents[segment])
-        start = network.points[np.where(back, network.ends[segment, 1], network.ends[segment, 0])]
-        self._tx, self._ty = tangent[:, 0] + 0.0, tangent[:, 1] + 0.0  # no negative zeros
-        self._ax, self._ay = start[:, 0] + w * self._ty, start[:, 1] - w * self._tx
-        self._lane: Ints = lanes
-        self._low: Floats = np.zeros(len(lanes))
-        self._high: Floats = network.lengths[segment].copy()
+        self._lines = Lines.right(network, w)
+        self._near = _Near(network, w)
+        self._network = network
+        lane = np.arange(network.lanes)
+        self._free = Intervals(lane, np.zeros(len(lane)), np.repeat(network.lengths, 2))
 
     @property
     def count(self) -> int:
         """Number of lanes of the network."""
-        return len(self._tx)
+        return self._network.lanes
 
     def copy(self) -> Places:
         """Return a copy that may be cut on its own."""
@@ -59,126 +67,177 @@ class Places:
 
     def block(self, x: float, y: float, radius: float) -> None:
         """Take away what is closer than `radius` to (x, y)."""
-        along, left = self._relative(x, y)
-        self._cut(*_chord(along, left, radius + SLACK))
+        radius += SLACK
+        index = self._around(x, y, radius)
+        own = self._free.select(index)
+        along, left = self._lines.relative(own.lane, x, y)
+        self._put(index, _cut(own, *chord(along, left, radius)))
 
     def block_shape(self, shape: Shape, clearance: float) -> None:
         """Take away what is closer than `clearance` to a shape, or inside it."""
+        radius = shape.rounding + clearance + SLACK
+        x, y = shape.corners[0]
+        reach = max(abs(p - x) + abs(q - y) for p, q in shape.corners)
+        index = self._around(x, y, reach + radius)
+        own = self._free.select(index)
         for a, b in edges(shape):
-            self._block_edge(a, b, shape.rounding + clearance + SLACK)
-        middle = 0.5 * (self._low + self._high)
-        x = self._ax[self._lane] + middle * self._tx[self._lane]
-        y = self._ay[self._lane] + middle * self._ty[self._lane]
-        points = zip(x.tolist(), y.tolist(), strict=True)
-        self._keep(np.array([not contains(shape, point) for point in points], dtype=bool))
+            own = _cut(own, *self._stadium(own.lane, a, b, radius))
+        outside = [not contains(shape, point) for point in self._middles(own)]
+        self._put(index, own.select(np.flatnonzero(np.array(outside, dtype=np.bool_))))
 
-    def block_discs(self, centres: Floats, radius: float) -> None:
-        """Take away what is closer than `radius` to any of `centres` (V, 2)."""
-        for x, y in self._candidates(centres, radius + SLACK):
-            self.block(x, y, radius)
+    def block_intersections(self, radius: float) -> None:
+        """Take away what is closer than `radius` to any intersection."""
+        radius += SLACK
+        segment, vertex = self._near.couples(radius)
+        lane = np.concatenate([2 * segment, 2 * segment + 1])
+        points = self._network.points[np.concatenate([vertex, vertex])]
+        along, left = self._lines.relative(lane, points[:, 0], points[:, 1])
+        low, high = chord(along, left, radius)
+        hit = low < high
+        self._free = _subtract(self._free, Intervals(lane[hit], low[hit], high[hit]))
 
     def choose(self, draws: Draws, lanes: Collection[int] | None = None) -> tuple[int, float] | None:
         """Return a lane and the metres along it, uniform over all free places (of `lanes`), or None."""
-        width = self._high - self._low
+        lane, low, high = self._free
+        width = high - low
         if lanes is not None:
-            width = np.where(np.isin(self._lane, list(lanes)), width, 0.0)
+            width = np.where(np.isin(lane, list(lanes)), width, 0.0)
         ends = np.cumsum(width)
         if not len(ends) or not ends[-1] > 0.0:
             return None
         pick = draws.uniform(0.0, float(ends[-1]))
-        k = int(np.searchsorted(ends, pick, side="right"))
-        k = min(k, int(np.flatnonzero(width > 0.0)[-1]))
-        along = float(self._low[k]) + (pick - float(ends[k] - width[k]))
-        return int(self._lane[k]), min(max(along, float(self._low[k])), float(self._high[k]))
+        k = min(int(np.searchsorted(ends, pick, side="right")), int(np.flatnonzero(width > 0.0)[-1]))
+        along = float(low[k]) + (pick - float(ends[k] - width[k]))
+        return int(lane[k]), min(max(along, float(low[k])), float(high[k]))
 
     def first(self, order: Ints, lanes: Collection[int] | None = None) -> tuple[int, float] | None:
         """Return the beginning of the first free place, lanes taken by their rank in `order`, or None."""
-        allowed = np.arange(len(self._lane))
+        lane, low, _ = self._free
         if lanes is not None:
-            allowed = np.flatnonzero(np.isin(self._lane, list(lanes)))
-        if not len(allowed):
+            allowed = np.isin(lane, list(lanes))
+            lane, low = lane[allowed], low[allowed]
+        if not len(lane):
             return None
-        ranks = order[self._lane[allowed]]
-        best = allowed[ranks == ranks.min()]
-        k = int(best[np.argmin(self._low[best])])
-        return int(self._lane[k]), float(self._low[k])
+        k = int(np.argmin(order[lane]))
+        return int(lane[k]), float(low[k])
 
     def pose(self, lane: int, along: float) -> Pose:
         """Return the pose `along` metres down a right lane, headed with it."""
-        tx, ty = float(self._tx[lane]), float(self._ty[lane])
-        return Pose(float(self._ax[lane]) + along * tx, float(self._ay[lane]) + along * ty, tx, ty)
+        return self._lines.pose(lane, along)
 
-    def _relative(self, x: float, y: float) -> tuple[Floats, Floats]:
-        """Return, for every interval, metres to (x, y) along its lane and to the left of it."""
-        lane = self._lane
-        tx, ty = self._tx[lane], self._ty[lane]
-        rx, ry = x - self._ax[lane], y - self._ay[lane]
-        return rx * tx + ry * ty, tx * ry - ty * rx
+    def _around(self, x: float, y: float, radius: float) -> Ints:
+        """Return the numbers of the intervals of all lanes that may come closer than `radius` to (x, y)."""
+        lanes = self._near.lanes(x, y, radius)
+        if lanes is None:
+            return np.arange(len(self._free.lane))
+        begin = np.searchsorted(self._free.lane, lanes, side="left")
+        end = np.searchsorted(self._free.lane, lanes, side="right")
+        count = end - begin
+        return np.repeat(begin - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))
 
-    def _candidates(self, centres: Floats, radius: float) -> list[Point]:
-        """Return the centres that are closer than `radius` to some interval."""
-        found: list[Point] = []
-        for x, y in centres.tolist():
-            along, left = self._relative(x, y)
-            low, high = _chord(along, left, radius)
-            if bool(np.any((low < self._high) & (high > self._low))):
-                found.append((x, y))
-        return found
+    def _put(self, index: Ints, new: Intervals) -> None:
+        """Put `new` in the place of the intervals at `index`, which are all of their lanes."""
+        kept = np.ones(len(self._free.lane), dtype=np.bool_)
+        kept[index] = False
+        rest = self._free.select(np.flatnonzero(kept))
+        place = np.searchsorted(rest.lane, new.lane)
+        lane = np.insert(rest.lane, place, new.lane).astype(np.int64)
+        low = np.insert(rest.low, place, new.low).astype(np.float64)
+        self._free = Intervals(lane, low, np.insert(rest.high, place, new.high).astype(np.float64))
 
-    def _block_edge(self, a: Point, b: Point, radius: float) -> None:
-        """Take away what is closer than `radius` to the edge ab: two discs and the box between them."""
-        a_along, a_left = self._relative(*a)
-        b_along, b_left = self._relative(*b)
-        low, high = _chord(a_along, a_left, radius)
-        other_low, other_high = _chord(b_along, b_left, radius)
+    def _middles(self, own: Intervals) -> list[Point]:
+        x, y = self._lines.points(own.lane, 0.5 * (own.low + own.high))
+        return list(zip(x.tolist(), y.tolist(), strict=True))
+
+    def _stadium(self, lane: Ints, a: Point, b: Point, radius: float) -> tuple[Floats, Floats]:
+        """Return where lanes are closer than `radius` to the edge ab: in two discs or the box between them."""
+        low, high = chord(*self._lines.relative(lane, *a), radius)
+        other_low, other_high = chord(*self._lines.relative(lane, *b), radius)
         low, high = np.minimum(low, other_low), np.maximum(high, other_high)
-        dx, dy = b[0] - a[0], b[1] - a[1]
-        length = sqrt(dx * dx + dy * dy)
-        if length > 0.0:
-            u, v = dx / length, dy / length
-            lane = self._lane
-            rate_along = self._tx[lane] * u + self._ty[lane] * v
-            rate_across = self._ty[lane] * u - self._tx[lane] * v
-            rx, ry = self._ax[lane] - a[0], self._ay[lane] - a[1]
-            box_low, box_high = _band(rx * u + ry * v, rate_along, 0.0, length)
-            low_2, high_2 = _band(ry * u - rx * v, rate_across, -radius, radius)
-            box_low, box_high = np.maximum(box_low, low_2), np.minimum(box_high, high_2)
+        if a != b:
+            box_low, box_high = band(self._lines, lane, a, b, radius)
             hit = box_low < box_high
             low = np.where(hit, np.minimum(low, box_low), low)
             high = np.where(hit, np.maximum(high, box_high), high)
-        self._cut(low, high)
-
-    def _cut(self, low: Floats, high: Floats) -> None:
-        """Take the open interval (low, high) out of each interval."""
-        hit = (low < self._high) & (high > self._low) & (low < high)
-        if not bool(np.any(hit)):
-            return
-        before = hit & (low >= self._low)
-        after = hit & (high <= self._high)
-        lane = np.concatenate([self._lane[~hit], self._lane[before], self._lane[after]])
-        new_low = np.concatenate([self._low[~hit], self._low[before], high[after]])
-        new_high = np.concatenate([self._high[~hit], low[before], self._high[after]])
-        order = np.lexsort((new_low, lane))
-        self._lane, self._low, self._high = lane[order], new_low[order], new_high[order]
-
-    def _keep(self, mask: Mask) -> None:
-        self._lane, self._low, self._high = self._lane[mask], self._low[mask], self._high[mask]
+        return low, high
 
 
-def _chord(along: Floats, left: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Return where a line is inside a disc whose centre is `along` down the line and `left` of it."""
-    square = radius * radius - left * left
-    half = np.sqrt(np.maximum(square, 0.0))
-    hit = square > 0.0
-    return np.where(hit, along - half, np.inf), np.where(hit, along + half, -np.inf)
+class _Near:
+    """Which lanes are near a point, through uniform cells."""
+
+    def __init__(self, network: RoadNetwork, w: float) -> None:
+        self._network = network
+        self._w = w
+        self._start = network.points[network.ends[:, 0]]
+        self._end = network.points[network.ends[:, 1]]
+        self._size = float(network.lengths.mean())
+        self._cells: dict[tuple[int, int], list[int]] | None = None
+
+    def lanes(self, x: float, y: float, radius: float) -> Ints | None:
+        """Return the lanes that may come closer than `radius` to (x, y), ascending; None for all of them."""
+        reach = radius + self._w
+        if reach > 2.0 * self._size:
+            return None
+        cells = self._table()
+        columns = range(floor((x - reach) / self._size), ceil((x + reach) / self._size))
+        rows = range(floor((y - reach) / self._size), ceil((y + reach) / self._size))
+        found = {s for column in columns for row in rows for s in cells.get((column, row), ())}
+        segments = np.array(sorted(found), dtype=np.int64)
+        return np.stack([2 * segments, 2 * segments + 1], axis=-1).ravel()
+
+    def couples(self, radius: float) -> tuple[Ints, Ints]:
+        """Return segments and intersections that may be closer than `radius` to a lane of the segment."""
+        points, count = self._network.points, len(self._start)
+        start, end = np.concatenate([self._start, points]), np.concatenate([self._end, points])
+        reach = radius + self._w
+        size = max(self._size, reach)
+        segments: list[Ints] = []
+        vertices: list[Ints] = []
+        for first, second in pairs(*covered(start, end, 0.5 * reach, size)):
+            low, high = np.minimum(first, second), np.maximum(first, second)
+            mixed = (low < count) & (high >= count)
+            segments.append(low[mixed])
+            vertices.append(high[mixed] - count)
+        return np.concatenate(segments), np.concatenate(vertices)
+
+    def _table(self) -> dict[tuple[int, int], list[int]]:
+        if self._cells is None:
+            self._cells = {}
+            item, column, row = covered(self._start, self._end, 0.0, self._size)
+            for s, i, j in zip(item.tolist(), column.tolist(), row.tolist(), strict=True):
+                self._cells.setdefault((i, j), []).append(s)
+        return self._cells
 
 
-def _band(offset: Floats, rate: Floats, low: float, high: float) -> tuple[Floats, Floats]:
-    """Return the s for which offset + rate * s lies between `low` and `high`."""
-    steep = rate != 0.0
-    slope = np.where(steep, rate, 1.0)
-    a, b = (low - offset) / slope, (high - offset) / slope
-    inside = (offset > low) & (offset < high)
-    first = np.where(steep, np.minimum(a, b), np.where(inside, -np.inf, np.inf))
-    last = np.where(steep, np.maximum(a, b), np.where(inside, np.inf, -np.inf))
-    return first, last
+def _cut(own: Intervals, low: Floats, high: Floats) -> Intervals:
+    """Take the open interval (low, high) out of each interval."""
+    hit = (low < own.high) & (high > own.low) & (low < high)
+    if not bool(np.any(hit)):
+        return own
+    before = np.flatnonzero(hit & (low >= own.low))
+    after = np.flatnonzero(hit & (high <= own.high))
+    kept = own.select(np.flatnonzero(~hit))
+    lane = np.concatenate([kept.lane, own.lane[before], own.lane[after]])
+    new_low = np.concatenate([kept.low, own.low[before], high[after]])
+    new_high = np.concatenate([kept.high, low[before], own.high[after]])
+    return Intervals(lane, new_low, new_high).select(np.lexsort((new_low, lane)))
+
+
+def _subtract(own: Intervals, blocked: Intervals) -> Intervals:
+    """Take all of `blocked` out of `own` at once: what is left are the gaps of all that is not free."""
+    first = np.flatnonzero(np.diff(own.lane, prepend=-1))
+    last = np.flatnonzero(np.diff(own.lane, append=-1))
+    joints = np.flatnonzero(np.diff(own.lane, append=-1) == 0)
+    taken = np.isin(blocked.lane, own.lane)
+    lane = np.concatenate([blocked.lane[taken], own.lane[first], own.lane[last], own.lane[joints]])
+    low = np.concatenate([blocked.low[taken], np.full(len(first), -np.inf), own.high[last], own.high[joints]])
+    high = np.concatenate(
+        [blocked.high[taken], own.low[first], np.full(len(last), np.inf), own.low[joints + 1]]
+    )
+    order = np.lexsort((low, lane))
+    lane, low, high = lane[order], low[order], high[order]
+    ranked = np.sort(high)
+    rank = np.searchsorted(ranked, high)
+    farthest = ranked[np.maximum.accumulate(lane * len(lane) + rank) % max(len(lane), 1)]
+    gap = np.flatnonzero((lane[1:] == lane[:-1]) & (low[1:] > farthest[:-1]))
+    return Intervals(lane[gap], farthest[gap], low[gap + 1])

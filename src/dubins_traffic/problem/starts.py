@@ -61,7 +61,7 @@ def draw_starts(ground: Ground, names: Sequence[str], wishes: Sequence[Wish], dr
     for obstacle in ground.obstacles:
         free.block_shape(obstacle_shape(obstacle), ground.car.body.reach)
     outside = free.copy()
-    outside.block_discs(ground.network.points, ground.intersection_radius + ground.car.body.reach)
+    outside.block_intersections(ground.intersection_radius + ground.car.body.reach)
     best = 0
     for areas in ((outside,), (outside, free)):
         for gap in (ROOMY, TIGHT) if len(areas) == 1 else (TIGHT,):
