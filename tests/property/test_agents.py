@@ -179,6 +179,22 @@ def test_interpreted_equals_compiled() -> None:
     assert own.stdout == digest(250)
 
 
+def test_a_rigid_motion_of_the_network_commutes() -> None:
+    kinds = [*[("wander", {})] * 3, *[("wander", {"patience": 1.0})] * 2, ("follow", {})]
+    motion = (2.0, -1.0, 0.7)
+    ends = []
+    for network in (GRID, RoadNetwork.grid(3, 4, 3.0, motion)):
+        placed = crowd(kinds, network).starts
+        state, _ = run(
+            [instance(kinds, [in_lane(network, 9, 0.3), *placed[1:]], network)], 900, ego=[(0.4, 0.0)] * 100
+        )
+        ends.append((state.x[0], state.y[0]))
+    (x, y), (moved_x, moved_y) = ends
+    c, s = math.cos(motion[2]), math.sin(motion[2])
+    assert np.abs(c * x - s * y + motion[0] - moved_x).max() < 1e-9
+    assert np.abs(s * x + c * y + motion[1] - moved_y).max() < 1e-9
+
+
 def test_little_room_for_pairs_changes_nothing(monkeypatch) -> None:
     network = RoadNetwork.grid(4, 4, 2.0)
     batch = [crowd([("wander", {"patience": 0.5})] * 30, network, trial=trial) for trial in range(2)]

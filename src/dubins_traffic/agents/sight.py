@@ -162,9 +162,10 @@ def look(
             continue
         other = (state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         for _ in range(2):
-            work.held[i] |= consider(
-                i, pose, build, ints, floats, other[0], other[1], other[2], other[3], p, q, r
-            )
+            if work.held[i] == 0 or ints[i, PATIENCE] >= 0:
+                work.held[i] |= consider(
+                    i, pose, build, ints, floats, other[0], other[1], other[2], other[3], p, q, r
+                )
             i, j = j, i
             pose, other = other, pose
     return found
