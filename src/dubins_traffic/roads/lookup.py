@@ -21,15 +21,12 @@ def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
     ry = y - t.seg[k, 1]
     tx = t.seg[k, 2]
     ty = t.seg[k, 3]
+    qx = x - t.seg[k, 5]
+    qy = y - t.seg[k, 6]
     along = rx * tx + ry * ty
-    if along <= 0.0:
-        return rx * rx + ry * ry
-    if along >= t.seg[k, 4]:
-        qx = x - t.seg[k, 5]
-        qy = y - t.seg[k, 6]
-        return qx * qx + qy * qy
     across = tx * ry - ty * rx
-    return across * across
+    beyond = qx * qx + qy * qy if along >= t.seg[k, 4] else across * across
+    return rx * rx + ry * ry if along <= 0.0 else beyond
 
 
 @jit_inline

@@ -89,8 +89,6 @@ def shortest(
         if gone > distance[lane]:
             continue
         for previous in before[lane]:
-            if lane_end[previous] == target:
-                continue
             length = gone + lengths[previous]
             closer = length < distance[previous]
             if closer or (length == distance[previous] and lane < follow[previous]):
