@@ -19,6 +19,7 @@ from dubins_traffic.driving.paths import FIELDS, PathMaker
 from dubins_traffic.driving.tours import LaneGraph, Round, find_round
 from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.problem.instance import Problem
+from dubins_traffic.roads.table import pack
 
 FOLLOW = 1.3
 """Gap kept behind cars, centre to centre, metres: the e-agent of 2016 stands while the ego is within 1 m."""
@@ -26,8 +27,9 @@ DETOUR = 80.0
 """How many metres a detour may be longer than the way past a place that was found blocked."""
 FORGET = 60.0
 """Seconds after which a blocked place is tried again."""
-TURN_ROUND = 3.0
-"""What turning round on the road counts, metres."""
+TURN_ROUND = 15.0
+"""What turning round on the road counts, metres, when the way is blocked; at the start it counts as BREACH."""
+BREACH = 1e3
 
 
 class Lanes:
@@ -123,6 +125,8 @@ class Lanes:
             car=row,
             part=obstacles.part,
             part_off=obstacles.off,
+            roads=pack([problem.network], [2.0 * problem.car.w]),
+            net=np.zeros(1, dtype=np.int64),
             sample=np.zeros((SAMPLES, SAMPLE_FIELDS)),
             command=np.zeros((1, 2)),
             blocker=np.full(1, NOBODY, dtype=np.int64),
@@ -166,7 +170,9 @@ class Lanes:
         point = np.array((pose.x, pose.y))
         segment = int(network.nearest_segment(point)[0])
         vertex, far = network.nearest_intersection(point)
-        free = can_pivot(self._problem.car)
+        turning = TURN_ROUND if self._blocked or self._closed else BREACH
+        if not can_pivot(self._problem.car):
+            turning = IMPOSSIBLE
         lanes = {2 * segment: False, 2 * segment + 1: False}
         if float(far) < self._problem.intersection_radius:
             lanes |= dict.fromkeys(network.arms(int(vertex)), True)
@@ -176,7 +182,7 @@ class Lanes:
             length = self._graph.length[lane]
             tx, ty = network.tangents[lane >> 1].tolist()
             along = (pose.c * tx + pose.s * ty) * (-1.0 if lane & 1 else 1.0)
-            cost = length - s + (0.0 if along > 0.3 else TURN_ROUND if free else IMPOSSIBLE)
+            cost = length - s + (0.0 if along > 0.3 or out else turning)
             cost += self._standing_cost(lane, time)
             if not out and length - s < self._longest_turn(lane):
                 cost += 20.0

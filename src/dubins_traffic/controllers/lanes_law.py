@@ -6,10 +6,12 @@ for it to keep away, passes what stands in its way, and asks for another route w
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from dubins_traffic.driving.gaps import (
     NOBODY,
+    O_GAP,
     O_SEEN,
     O_SPEED,
     O_STILL,
@@ -37,12 +39,15 @@ from dubins_traffic.driving.safety import motion_is_safe
 from dubins_traffic.driving.tracking import AHEAD, ahead_on, locate, place_on, steer
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.roads.lookup import nearest_segment
+from dubins_traffic.roads.table import RoadTable
 
 HALF_LENGTH, HALF_WIDTH, ROUNDING, REACH, SLOWEST, FASTEST, YAW_MOST, RADIUS, DISC, PERIOD, FOLLOW = range(11)
 CAR_FIELDS = 11
 
-SIGMA, ODO, LEFT, BEGIN, AIM, FROM, RAMP, UNTIL, WAITED, BACKING, TRIED, SHUFFLED = range(12)
-MEMORY_FIELDS = 12
+SIGMA, ODO, LEFT, BEGIN, AIM, FROM, RAMP, UNTIL, WAITED, BACKING, TRIED, SHUFFLED, STUCK = range(13)
+MEMORY_FIELDS = 13
 
 NEAR = 1.06
 """Within this of the ego, centre to centre, a cautious car does not move, metres."""
@@ -67,6 +72,12 @@ PASSING_MARGIN = 0.09
 MOVING_MARGIN = 0.1
 WARY_MARGIN = 0.5
 """Gaps kept: from what stands, the same when a way past is chosen, from what moves, and the same when passing."""
+VERGE = 0.02
+"""What the car's centre keeps from the edge of the road whatever happens, metres."""
+HELD_UP = 0.4
+"""Seconds without leave to move after which the car looks for another way."""
+BARRED = -1.0
+"""The car has backed up, or tried to, and moves on first."""
 MOVES, TURNS = 0.02, 0.05
 SHUTTLE = 10
 """Ticks of each stroke of a car that has to shuttle to turn round."""
@@ -78,7 +89,8 @@ class Desk(NamedTuple):
     `path` (rows, paths.FIELDS): all trials' paths; `span` (B, 3): first row, end, and number of the row after the
     last; `row` (B,): the row a car is on. `memory` (B, MEMORY_FIELDS), `ego` (B, 4): pose; `others`
     (B, N, gaps.OTHER_FIELDS); `car` (B, CAR_FIELDS): body, bounds, radius of discs, period, gap to follow at.
-    `part` and `part_off`: obstacles as in `cars.tables`. `sample`: a workspace. `command` (B, 2): the answer.
+    `part` and `part_off`: obstacles as in `cars.tables`. `roads` and `net` (B,): networks, as in
+    `roads.table`. `sample`: a workspace. `command` (B, 2): the answer.
     `blocker` (B,): who has kept the car waiting for too long (a car, -1 - part, or NOBODY): a new path is asked for.
     """
 
@@ -91,6 +103,8 @@ class Desk(NamedTuple):
     car: Floats
     part: Floats
     part_off: Ints
+    roads: RoadTable
+    net: Ints
     sample: Floats
     command: Floats
     blocker: Ints
@@ -107,8 +121,9 @@ def decide(desk: Desk) -> None:
         if near or desk.part_off[b + 1] > desk.part_off[b]:
             speed = _speed_in_traffic(desk, b)
         speed, yaw_rate = _follow(desk, b, speed)
-        if near or desk.part_off[b + 1] > desk.part_off[b]:
-            speed, yaw_rate = _last_look(desk, b, speed, yaw_rate)
+        wanted = speed
+        speed, yaw_rate = _last_look(desk, b, speed, yaw_rate)
+        _note_progress(desk, b, wanted, speed)
         desk.command[b, 0] = speed
         desk.command[b, 1] = yaw_rate
 
@@ -123,11 +138,35 @@ def _watch(desk: Desk, b: int) -> bool:
             others[n, O_STILL] = 0.0
             continue
         found = True
+        others[n, O_GAP] = _gap(desk, b, n)
         if abs(others[n, O_SPEED]) > MOVES or abs(others[n, O_YAW]) > TURNS:
             others[n, O_STILL] = 0.0
         else:
             others[n, O_STILL] += desk.car[b, PERIOD]
     return found
+
+
+@jit
+def _gap(desk: Desk, b: int, n: int) -> float:
+    car = desk.car[b]
+    o = desk.others[b, n]
+    ego = desk.ego[b]
+    return gap_to(
+        ego[0], ego[1], ego[2], ego[3], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
+        o[OX], o[OY], o[OC], o[OS], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
+    )  # fmt: skip
+
+
+@jit
+def _note_progress(desk: Desk, b: int, wanted: float, speed: float) -> None:
+    """Count for how long the last look has kept the car from moving."""
+    memory = desk.memory[b]
+    if wanted != 0.0 and speed == 0.0:
+        memory[STUCK] += desk.car[b, PERIOD]
+        if wanted < 0.0 and memory[STUCK] > 0.2:
+            memory[BACKING] = BARRED
+    elif speed != 0.0:
+        memory[STUCK] = 0.0
 
 
 @jit
@@ -206,7 +245,10 @@ def _following_speed(desk: Desk, b: int, first: int, who: int, nearest: int) -> 
         return max(0.0, GAIN * (SPACING * first - 0.35))
     o = desk.others[b, who]
     along = o[O_SPEED] * (o[OC] * desk.sample[nearest, TX] + o[OS] * desk.sample[nearest, TY])
-    return max(0.0, max(0.0, along) + GAIN * (SPACING * nearest - desk.car[b, FOLLOW]))
+    dx = o[OX] - desk.ego[b, 0]
+    dy = o[OY] - desk.ego[b, 1]
+    far = min(SPACING * nearest, sqrt(dx * dx + dy * dy))
+    return max(0.0, max(0.0, along) + GAIN * (far - desk.car[b, FOLLOW]))
 
 
 @jit
@@ -242,38 +284,65 @@ def _stops_inside(desk: Desk, b: int, who: int, nearest: int, gate_x: float, gat
 def _stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
     """Count how long the car has been kept waiting by `cause`; back up, pass or ask for another route in time."""
     memory = desk.memory[b]
-    if speed > 0.03 or cause == NOBODY:
-        memory[BACKING] = 0.0
-        if speed > 0.2:
+    period = desk.car[b, PERIOD]
+    if memory[BACKING] > 0.0 and _backs_up(desk, b, int(memory[BACKING]) - 1):
+        return -BACK_SPEED
+    stuck = memory[STUCK] > HELD_UP
+    if stuck and cause == NOBODY:
+        cause = _nearest_body(desk, b)
+    if cause == NOBODY or (speed > 0.03 and not stuck):
+        if speed > 0.2 or cause == NOBODY:
             memory[WAITED] = 0.0
             memory[TRIED] = 0.0
-        return speed
-    period = desk.car[b, PERIOD]
-    memory[WAITED] += period
-    still = 1e9
-    if cause >= 0:
-        o = desk.others[b, cause]
-        still = o[O_STILL]
-        dx = o[OX] - desk.ego[b, 0]
-        dy = o[OY] - desk.ego[b, 1]
-        far2 = dx * dx + dy * dy
-        if far2 < NEAR * NEAR and memory[WAITED] > 0.6 and still > 0.5:
-            memory[BACKING] = 1.0
-        elif far2 > CLEAR * CLEAR:
             memory[BACKING] = 0.0
-        if memory[BACKING] != 0.0 and _free_behind(desk, b):
-            memory[WAITED] = min(memory[WAITED], 1.0)
-            return -BACK_SPEED
-    memory[BACKING] = 0.0
+        return speed
+    memory[WAITED] += period
     memory[TRIED] += period
-    if memory[WAITED] > PATIENCE and still > STANDS and memory[TRIED] >= RETRY:
+    still = desk.others[b, cause, O_STILL] if cause >= 0 else 1e9
+    patience = HELD_UP if stuck else PATIENCE
+    if memory[WAITED] > patience and still > STANDS and memory[TRIED] >= RETRY:
         memory[TRIED] = 0.0
         if _find_way_past(desk, b, first):
             memory[WAITED] = 0.0
+            memory[STUCK] = 0.0
+            memory[BACKING] = 0.0
             return min(desk.car[b, FASTEST], PASSING_SPEED)
+    if cause >= 0 and _backs_up(desk, b, cause):
+        return -BACK_SPEED
     if memory[WAITED] > DESPAIR:
         desk.blocker[b] = cause
     return 0.0
+
+
+@jit
+def _backs_up(desk: Desk, b: int, cause: int) -> bool:
+    """Whether to back up from a car that stands so near that it may be waiting for the ego to go away.
+
+    Once begun, this goes on until there is enough room, the car moves off or something is behind.
+    """
+    memory = desk.memory[b]
+    o = desk.others[b, cause]
+    dx = o[OX] - desk.ego[b, 0]
+    dy = o[OY] - desk.ego[b, 1]
+    far2 = dx * dx + dy * dy
+    if memory[BACKING] == 0.0 and far2 < NEAR * NEAR and memory[WAITED] > 0.6 and o[O_STILL] > 0.5:
+        memory[BACKING] = cause + 1.0
+    if memory[BACKING] > 0.0 and (o[O_SEEN] == 0.0 or far2 > CLEAR * CLEAR or not _free_behind(desk, b)):
+        memory[BACKING] = BARRED
+    return memory[BACKING] > 0.0
+
+
+@jit
+def _nearest_body(desk: Desk, b: int) -> int:
+    """Return the sensed car nearest to the ego, or an obstacle's part if there is no car within 1 m."""
+    best = 1.0
+    who = -1 if desk.part_off[b + 1] > desk.part_off[b] else NOBODY
+    others = desk.others[b]
+    for n in range(others.shape[0]):
+        if others[n, O_SEEN] != 0.0 and others[n, O_GAP] < best:
+            best = others[n, O_GAP]
+            who = n
+    return who
 
 
 @jit
@@ -394,7 +463,7 @@ def _shuffle(desk: Desk, b: int, yaw_rate: float) -> tuple[float, float]:
 
 @jit
 def _last_look(desk: Desk, b: int, speed: float, yaw_rate: float) -> tuple[float, float]:
-    """Return the command, or a turn in place, or standing, whichever first can't bring about a contact."""
+    """Return the command, or a turn in place, or standing: the first that leads into no contact and off no road."""
     if _is_safe(desk, b, speed, yaw_rate):
         return speed, yaw_rate
     if desk.car[b, SLOWEST] > 0.0:
@@ -405,7 +474,21 @@ def _last_look(desk: Desk, b: int, speed: float, yaw_rate: float) -> tuple[float
 
 
 @jit
+def _stays_on_road(desk: Desk, b: int, speed: float, yaw_rate: float) -> bool:
+    x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
+    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, desk.car[b, PERIOD])
+    edge = desk.roads.half_width[desk.net[b]] - VERGE
+    _, d2 = nearest_segment(desk.roads, desk.net[b], nx, ny)
+    if d2 <= edge * edge:
+        return True
+    _, before = nearest_segment(desk.roads, desk.net[b], x, y)
+    return d2 < before
+
+
+@jit
 def _is_safe(desk: Desk, b: int, speed: float, yaw_rate: float) -> bool:
+    if speed != 0.0 and not _stays_on_road(desk, b, speed, yaw_rate):
+        return False
     car = desk.car[b]
     period = car[PERIOD]
     x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]

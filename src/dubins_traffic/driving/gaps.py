@@ -19,9 +19,9 @@ RETURN = 0.7
 PX, PY, TX, TY, P_LOW, P_HIGH = range(6)
 SAMPLE_FIELDS = 6
 
-OX, OY, OC, OS, O_SPEED, O_YAW, O_STILL, O_SEEN = range(8)
-OTHER_FIELDS = 8
-"""Another car: pose, speed, yaw rate, seconds since it last moved, whether it is seen."""
+OX, OY, OC, OS, O_SPEED, O_YAW, O_STILL, O_SEEN, O_GAP = range(9)
+OTHER_FIELDS = 9
+"""Another car: pose, speed, yaw rate, seconds since it last moved, whether it is seen, the gap to it now."""
 NOBODY = -(2**40)
 
 
@@ -104,50 +104,79 @@ def first_conflict(
     still_margin: float,
     moving_margin: float,
 ) -> tuple[int, int, int]:
-    """Return (first, who, nearest): the first of the samples 0..`last` at which a car that follows them has a body
-    ahead within the margin, that body (part p: -1 - p), and the sample nearest to it; (-1, NOBODY, -1) if none has.
+    """Return (first, who, nearest): the first of the samples 1..`last` at which a car that follows them comes nearer
+    to a body than the margin, that body (part p: -1 - p), and the sample nearest to it; (-1, NOBODY, -1) if none.
 
     `done` metres of the manoeuvre (`begin`, `aim`, `ramp`, `until`: see `offset_at`) are behind. `others`
-    (N, OTHER_FIELDS) are cars with the same body; `parts` rounded boxes that never move.
+    (N, OTHER_FIELDS) are cars with the same body; `parts` rounded boxes that never move. Where a gap is smaller than
+    the margin already, it may stay so.
     """  # fmt: skip
-    count = others.shape[0]
+    px = py = pc = ps = 0.0
     for k in range(last + 1):
         row = sample[k]
         offset = offset_at(done + SPACING * k, begin, aim, ramp, until)
         if k > 0:
             offset = min(max(offset, row[P_LOW]), row[P_HIGH])
-        x = row[PX] - offset * row[TY]
-        y = row[PY] + offset * row[TX]
-        for n in range(count):
+        tx = row[TX]
+        ty = row[TY]
+        x = row[PX] - offset * ty
+        y = row[PY] + offset * tx
+        for n in range(others.shape[0]):
             o = others[n]
-            if o[O_SEEN] == 0.0:
-                continue
             margin = still_margin if o[O_STILL] > 0.0 else moving_margin
+            margin = min(margin, max(o[O_GAP] - 0.005, 0.0))
             dx = o[OX] - x
             dy = o[OY] - y
             near = 2.0 * reach + margin
-            if dx * dx + dy * dy >= near * near or dx * row[TX] + dy * row[TY] <= 0.0:
-                continue
-            gap = gap_to(
-                x, y, row[TX], row[TY], half_length, half_width, rounding,
-                o[OX], o[OY], o[OC], o[OS], half_length, half_width, rounding,
-            )  # fmt: skip
-            if gap < margin:
+            if o[O_SEEN] != 0.0 and k > 0 and dx * dx + dy * dy < near * near and comes_nearer(
+                px, py, pc, ps, x, y, tx, ty, half_length, half_width, rounding,
+                o[OX], o[OY], o[OC], o[OS], half_length, half_width, rounding, margin,
+            ):  # fmt: skip
                 return k, n, nearest_sample(sample, k, o[OX], o[OY])
         for p in range(part_from, part_to):
             o = parts[p]
             dx = o[0] - x
             dy = o[1] - y
             near = reach + o[7] + still_margin
-            if dx * dx + dy * dy >= near * near:
-                continue
-            gap = gap_to(
-                x, y, row[TX], row[TY], half_length, half_width, rounding,
-                o[0], o[1], o[2], o[3], o[4], o[5], o[6],
-            )  # fmt: skip
-            if gap < still_margin:
+            if k > 0 and dx * dx + dy * dy < near * near and comes_nearer(
+                px, py, pc, ps, x, y, tx, ty, half_length, half_width, rounding,
+                o[0], o[1], o[2], o[3], o[4], o[5], o[6], still_margin,
+            ):  # fmt: skip
                 return k, -1 - p, nearest_sample(sample, k, o[0], o[1])
+        px, py, pc, ps = x, y, tx, ty
     return -1, NOBODY, -1
+
+
+@jit
+def comes_nearer(
+    px: float,
+    py: float,
+    pc: float,
+    ps: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    half_length: float,
+    half_width: float,
+    rounding: float,
+    ox: float,
+    oy: float,
+    oc: float,
+    os: float,
+    o_length: float,
+    o_width: float,
+    o_rounding: float,
+    margin: float,
+) -> bool:
+    """Whether a body comes nearer than `margin` to another in going from the pose (px, ..) to (x, ..)."""
+    gap = gap_to(x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding)
+    if gap >= margin:
+        return False
+    before = gap_to(
+        px, py, pc, ps, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
+    )
+    return gap < before
 
 
 @jit
