@@ -55,7 +55,7 @@ def write(text: str, output: str | None) -> None:
     if output is None or output == "-":
         sys.stdout.write(text)
         return
-    from dubins_traffic.roads.files import write_text
+    from dubins_traffic.files import write_text
 
     write_text(output, text)
 

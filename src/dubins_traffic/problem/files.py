@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.roads.files import read_text, write_text
+from dubins_traffic.files import read_text, write_text
 
 STANDARD_INPUT = "-"
 MCAP_MAGIC = b"\x89MCAP0\r\n"

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.files import replace_file
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.record.atomic import replace_file
 from dubins_traffic.record.reader import Record
 
 COLUMNS = ("tick", "time", "car", "x", "y", "theta", "speed", "yaw_rate")

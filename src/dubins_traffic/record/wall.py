@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from dubins_traffic.errors import RecordError
-from dubins_traffic.record.atomic import replace_file
+from dubins_traffic.files import replace_file
 
 VERSION = 1
 

@@ -13,9 +13,9 @@ import numpy as np
 from dubins_traffic.cars.body import Body, Car, Disc, DiscObstacle, Obstacle
 from dubins_traffic.cars.state import Frames, Pose
 from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.files import replace_file
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
-from dubins_traffic.record.atomic import replace_file
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.scene import Extent, centre_lines, extent, lane_hints, obstacle_points

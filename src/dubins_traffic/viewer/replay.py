@@ -19,9 +19,9 @@ import numpy.typing as npt
 from dubins_traffic.cars.body import Body, Disc, DiscObstacle, Obstacle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import replace_file
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
-from dubins_traffic.record.atomic import replace_file
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.spec.propositions import NAMES
 from dubins_traffic.viewer import palette

@@ -1,0 +1,70 @@
+"""Reading texts and writing them whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from dubins_traffic.errors import InputError
+
+STANDARD = "-"
+
+
+def read_text(path: str | Path) -> str:
+    """Return the UTF-8 text of a file; ``-`` reads standard input.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is a folder, may not be read or is not UTF-8.
+    """
+    name = str(path)
+    try:
+        data = sys.stdin.buffer.read() if name == STANDARD else Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError("no such file", file=name) from None
+    except IsADirectoryError:
+        raise InputError("a folder", file=name, expected="a file") from None
+    except PermissionError:
+        raise InputError("no permission to read", file=name) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"can't be read ({error})", file=name) from None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text (byte {error.start})", file=name) from None
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write `text` as UTF-8, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        As `replace_file`.
+    """
+    replace_file(Path(path), lambda neighbour: neighbour.write_bytes(text.encode("utf-8")))
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a temporary neighbour of `path`, then put it in the place of `path` in one step.
+
+    Raises
+    ------
+    InputError
+        If the file can't be written; nothing is left behind then, and an old file is untouched.
+    """
+    if path.is_dir():
+        raise InputError("a folder", file=str(path), expected="a file to write")
+    neighbour = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        write(neighbour)
+        neighbour.replace(path)
+    except OSError as error:
+        raise InputError(f"can't be written ({error.strerror or error})", file=str(path)) from error
+    finally:
+        with contextlib.suppress(OSError):
+            neighbour.unlink(missing_ok=True)
