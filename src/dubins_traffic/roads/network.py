@@ -14,7 +14,8 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads import files, rnd
+from dubins_traffic import files
+from dubins_traffic.roads import rnd
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.rnd import Segment
 from dubins_traffic.roads.routes import Routes, arms, shortest

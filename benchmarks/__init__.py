@@ -1,0 +1,1 @@
+"""Speed, as ratios to named limits measured in the same run: `make bench`."""

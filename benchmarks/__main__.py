@@ -1,0 +1,32 @@
+"""All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
+
+`motion`, `single` and `startup` take about a minute; `lanes` runs 400 trials and takes some minutes.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from benchmarks.table import show
+
+NAMES = ("motion", "single", "startup", "lanes")
+
+
+def main(names: list[str]) -> int:
+    """Run the named benchmarks, or all."""
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        print(
+            f"benchmarks: unknown: {', '.join(unknown)}; expected some of {', '.join(NAMES)}", file=sys.stderr
+        )
+        return 2
+    met = True
+    for name in names or NAMES:
+        rows = importlib.import_module(f"benchmarks.{name}").measure()
+        met = show(name, rows) and met
+    return 0 if met else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
