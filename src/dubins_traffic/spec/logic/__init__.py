@@ -1,0 +1,1 @@
+"""Temporal logic: formulas, their syntaxes, monitors, robustness and exports."""
