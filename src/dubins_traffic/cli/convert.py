@@ -12,8 +12,8 @@ from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "convert town.json -o town.rnd",
-    "convert out/trial-0.mcap -o trial.csv",
-    "convert out/trial-0.mcap -o trial.parquet",
+    "convert out/trial-0000.mcap -o trial.csv",
+    "convert out/trial-0000.mcap -o trial.parquet",
 )
 CONTAINERS = (".json", ".rnd", ".txt")
 

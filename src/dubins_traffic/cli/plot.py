@@ -11,7 +11,7 @@ from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "plot grid.json",
-    "plot out/trial-0.mcap -o paths.pdf",
+    "plot out/trial-0000.mcap -o paths.pdf",
     "instance demo | dubins-traffic plot - -o instance.svg",
 )
 

@@ -8,7 +8,7 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("replay out/trial-0.mcap", "replay out/trial-0.mcap -o trial.html")
+EXAMPLES = options.examples("replay out/trial-0000.mcap", "replay out/trial-0000.mcap -o trial.html")
 
 
 def replay(

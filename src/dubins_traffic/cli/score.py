@@ -8,7 +8,7 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("score out/*.mcap", "score out/trial-0.mcap --json")
+EXAMPLES = options.examples("score out/*.mcap", "score out/trial-0000.mcap --json")
 
 
 def score(
