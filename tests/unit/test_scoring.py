@@ -223,6 +223,7 @@ def test_the_score_as_json() -> None:
         "lane_departures": 0,
         "min_clearance_m": pytest.approx(1412.0, abs=20.0),
         "time_to_begin_s": 0.5,
+        "verdict": None,
     }
     assert document == expected
     assert list(document) == list(expected)

@@ -22,9 +22,12 @@ def replay(
     from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.scoring.score import score
+    from dubins_traffic.viewer.marks import breach_marks
     from dubins_traffic.viewer.replay import write_replay
 
     output = output or options.beside(record, ".html")
     found = load_record(record)
-    write_replay(output, found.instance, found.frames, found.ending, summary(score(found)))
+    scored = score(found)
+    breaches = () if scored.verdict is None else breach_marks(found.instance, scored.verdict.violations)
+    write_replay(output, found.instance, found.frames, found.ending, summary(scored), breaches)
     options.tell(output)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -25,6 +25,11 @@ CELLS: dict[str, Callable[[Score], str]] = {
 }
 """What is shown of a score: heading and cell."""
 
+JUDGED: dict[str, Callable[[Score], str]] = {
+    "verdict": lambda score: "-" if score.verdict is None else score.verdict.verdict.value,
+}
+"""What is shown beside where a score has a verdict."""
+
 
 def show(sheet: ScoreSheet, *, json: bool) -> None:
     """Print scores on standard output: JSON for machines, else a table."""
@@ -40,7 +45,7 @@ def summary(score: Score) -> dict[str, str]:
     """Return what a replay page shows of a score."""
     return {
         "controller": score.controller or "-",
-        **{heading: cell(score) for heading, cell in CELLS.items()},
+        **{heading: cell(score) for heading, cell in _cells([score]).items()},
     }
 
 
@@ -56,14 +61,20 @@ def score_table(sheet: ScoreSheet) -> Table:
         table.add_column("controller", overflow="fold")
     else:
         table.title = f"controller [b]{names[0]}[/b]"
-    for heading in CELLS:
+    cells = _cells(sheet.trials)
+    for heading in cells:
         footer = f"{sheet.icra2016_sum:g}" if heading == "ICRA 2016" else ""
-        align = "left" if heading == "end" else "right"
+        align = "left" if heading in ("end", "verdict") else "right"
         table.add_column(_narrow(heading), footer=footer, justify=align, no_wrap=True)
     for score in sheet.trials:
         leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
-        table.add_row(*leading, *(_narrow(cell(score), 10) for cell in CELLS.values()))
+        table.add_row(*leading, *(_narrow(cell(score), 10) for cell in cells.values()))
     return table
+
+
+def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
+    judged = any(score.verdict is not None for score in scores)
+    return {**JUDGED, **CELLS} if judged else CELLS
 
 
 def _narrow(text: str, width: int = 0) -> str:

@@ -19,6 +19,7 @@ from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.verdict import Judging, Verdict
 
 _BLOCK = 512
 
@@ -50,6 +51,8 @@ class Score:
         Smallest gap to any other car or obstacle; None if there is none.
     time_to_begin_s : float or None
         Wall-clock seconds of the controller's `start`; None if not measured.
+    verdict : Verdict or None
+        The verdict by the rules of the road; None if the problem does not ask for them.
     """
 
     trial: int
@@ -67,6 +70,7 @@ class Score:
     driven: Driven
     min_clearance_m: float | None
     time_to_begin_s: float | None
+    verdict: Verdict | None
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as a JSON object; the fields of `driven` stand beside the others."""
@@ -79,6 +83,8 @@ class Score:
                 document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
             elif name == "driven":
                 document |= asdict(self.driven)
+            elif name == "verdict":
+                document[name] = None if self.verdict is None else self.verdict.to_json()
             else:
                 document[name] = value
         return document
@@ -96,7 +102,15 @@ class Scorer:
         self._visiting = Visiting()
         self._driving = Driving()
         self._clearance = Clearance()
-        self._metrics = (self._icra2016, self._collisions, self._visiting, self._driving, self._clearance)
+        self._judging = Judging()
+        self._metrics = (
+            self._icra2016,
+            self._collisions,
+            self._visiting,
+            self._driving,
+            self._clearance,
+            self._judging,
+        )
 
     def begin(self, instance: Instance) -> None:
         """Start all metrics."""
@@ -154,6 +168,7 @@ class Scorer:
             driven=self._driving.result(),
             min_clearance_m=self._clearance.result(),
             time_to_begin_s=None if wall is None else wall.time_to_begin_s,
+            verdict=self._judging.result(),
         )
 
     def _show(self) -> None:

@@ -13,10 +13,10 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.frame import label_frame
-from dubins_traffic.spec.obstacles import place_obstacles
+from dubins_traffic.spec.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.propositions import STOPPED
 from dubins_traffic.spec.tables import (
@@ -29,6 +29,7 @@ from dubins_traffic.spec.tables import (
     STOP_TICKS,
     TICKET,
     Memory,
+    RuleTable,
     pack_rules,
 )
 
@@ -131,13 +132,17 @@ class Labeller:
 
     def reset(self, state: State) -> Labels:
         """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
-        trials, cars = state.x.shape
-        depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
-        self.memory = Memory.empty(trials, cars, depth, self._heads)
-        self.labels = Labels.zeros(trials, cars)
+        self.begin(*state.x.shape)
         self._tick = 0
         self._label(state)
         return self.labels
+
+    def begin(self, trials: int, cars: int) -> None:
+        """Forget everything: labels and memory are as before the first frame of `trials` x `cars` cars."""
+        depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
+        self.memory = Memory.empty(trials, cars, depth, self._heads)
+        self.labels = Labels.zeros(trials, cars)
+        self._tick = -1
 
     def update(
         self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
@@ -160,6 +165,11 @@ class Labeller:
         self._tick = tick
         self._label(state)
         return judged
+
+    @property
+    def tables(self) -> tuple[RoadTable, ObstacleLanes, RuleTable]:
+        """The roads, obstacles and rules of the batch, as the kernels of this room read them."""
+        return self._roads, self._obstacles, self._rules
 
     @property
     def progress(self) -> Floats:

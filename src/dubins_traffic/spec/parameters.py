@@ -82,10 +82,20 @@ class RuleParameters:
     """A verdict says whether the culprit was within the sensing radius in this last time."""
     gap_rounds: float = 10.0
     """satisfied: no gap between visits of a goal over this many free-flow rounds."""
+    assume_e1: int = 1
+    """Whether the problem assumes E1 of the e-agents, 0 or 1; so for E2 to E6."""
+    assume_e2: int = 1
+    assume_e3: int = 1
+    assume_e4: int = 1
+    assume_e5: int = 1
+    assume_e6: int = 1
 
     def __post_init__(self) -> None:
         for field in fields(self):
             _check(field.name, getattr(self, field.name), whole=isinstance(field.default, int))
+            if field.name.startswith("assume_") and getattr(self, field.name) > 1:
+                value = getattr(self, field.name)
+                raise InputError("not a switch", field=field.name, value=value, expected="0 or 1")
         if self.left_release > self.left_set:
             raise InputError(
                 "left would fall where it rises",

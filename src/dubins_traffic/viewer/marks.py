@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.scoring.verdict import Violation
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,21 @@ def event_mark(instance: Instance, rate: float, event: Event) -> Mark:
         words.append(instance.names[event.car])
     text = ": ".join(words)
     return Mark(event.tick / rate, "event", f"{text} ({event.detail})" if event.detail else text, event.car)
+
+
+def breach_marks(instance: Instance, violations: Sequence[Violation]) -> list[Mark]:
+    """Return the marks of breaches of the rules, which name who broke which, where, and since when it came."""
+    return [
+        Mark(
+            violation.time,
+            "breach",
+            f"{violation.car} breaks {violation.rule}",
+            instance.names.index(violation.car),
+            (violation.where.x, violation.where.y),
+            violation.since if violation.since < violation.time else None,
+        )
+        for violation in violations
+    ]
 
 
 def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:

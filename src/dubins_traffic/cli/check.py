@@ -1,0 +1,78 @@
+"""`dubins-traffic check`."""
+
+from __future__ import annotations
+
+import json as json_text
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dubins_traffic.cli import options
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.score import Score
+
+EXAMPLES = options.examples("check out/*.mcap", "check out/trial-0000.mcap --json")
+
+
+def check(
+    records: Annotated[
+        list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
+    ],
+    json: options.Json = False,
+) -> None:
+    """Judge recorded trials by the rules of the road: the verdict, and every breach of every car."""
+    from dubins_traffic.campaign.sources import load_record
+    from dubins_traffic.scoring.score import score
+
+    scores = [(record, score(load_record(record))) for record in records]
+    if json:
+        found = [_document(record, scored) for record, scored in scores]
+        print(json_text.dumps({"records": found}, indent=2))
+        return
+    for record, scored in scores:
+        _show(record, scored)
+
+
+def _document(record: str, score: Score) -> dict[str, Any]:
+    verdict = score.verdict
+    return {
+        "record": record,
+        "verdict": None if verdict is None else verdict.verdict.value,
+        "clean": None if verdict is None else verdict.clean,
+        "violations": [] if verdict is None else [entry.to_json() for entry in verdict.violations],
+        "rounds": score.rounds,
+        "longest_gap_s": max((goal.longest_gap_s for goal in score.goals), default=None),
+    }
+
+
+def _show(record: str, score: Score) -> None:
+    """Print a verdict for people: one line, why, and a table of the breaches."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True)
+    verdict = score.verdict
+    if verdict is None:
+        console.print(f"{record}: not judged, the problem does not ask for the rules", markup=False)
+        return
+    clean = "clean" if verdict.clean else "not clean"
+    gap = "" if verdict.longest_gap_s is None else f", longest gap {verdict.longest_gap_s:.1f} s"
+    limit = "" if verdict.gap_limit_s is None else f" of {verdict.gap_limit_s:.1f} s allowed"
+    line = f"{record}: {verdict.verdict}, {clean}, {verdict.rounds} rounds{gap}{limit if gap else ''}"
+    console.print(line, markup=False)
+    if verdict.excuse is not None:
+        excuse = verdict.excuse
+        sensed = "within" if excuse.sensed else "beyond"
+        first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
+        console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
+    if not verdict.violations:
+        return
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
+    for heading in ("time", "since", "car", "rule", "x", "y"):
+        table.add_column(heading, justify="left" if heading in ("car", "rule") else "right", no_wrap=True)
+    for entry in verdict.violations:
+        x, y = f"{entry.where.x:.2f}", f"{entry.where.y:.2f}"
+        table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y)
+    console.print(table)

@@ -1,0 +1,308 @@
+"""The verdict on a trial: whether the ego kept the rules of the road, or others broke them before it did."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.driving.free_flow import free_flow
+from dubins_traffic.problem.demands import check_demands
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.collisions import Collision, Collisions
+from dubins_traffic.scoring.goals import GoalDiscs, Visiting, Visits
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.tables import ticks
+
+if TYPE_CHECKING:
+    from dubins_traffic.spec.judge import Breach, Running
+
+Status = Literal["true", "presumably true", "presumably false", "false"]
+
+EGO_RULES = ("1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear")
+"""The rules of the ego that a finite run can break."""
+ASSUMPTIONS = ("E1", "E2", "E3", "E4", "E5", "E6")
+
+
+class Ruling(StrEnum):
+    """What is said of a trial (RULES, *Verdicts*)."""
+
+    SATISFIED = "satisfied"
+    VIOLATED = "violated"
+    EXCUSED = "excused"
+    UNFINISHED = "unfinished"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a rule was broken: a point in metres and, if it is about one, an intersection or a directed segment."""
+
+    x: float
+    y: float
+    intersection: tuple[int, int] | None
+    segment: tuple[int, int, int, int] | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the place as a JSON object."""
+        return {
+            "x": self.x,
+            "y": self.y,
+            "intersection": None if self.intersection is None else list(self.intersection),
+            "segment": None if self.segment is None else list(self.segment),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A breach of `rule` by `car` (its name) at `time` seconds, frame `tick`; what led to it began at `since` s."""
+
+    rule: str
+    car: str
+    time: float
+    tick: int
+    since: float
+    where: Place
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the breach as a JSON object: rule, car, time, since, where."""
+        return {
+            "rule": self.rule,
+            "car": self.car,
+            "time": self.time,
+            "since": self.since,
+            "where": self.where.to_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Excuse:
+    """What excuses the ego: the breach with which the assumption fell, and of which part of it (`assumption`).
+
+    `sensed` tells whether that car was within the sensing radius at some frame of the last `witness_time` before the
+    ego's first breach.
+    """
+
+    assumption: str
+    violation: Violation
+    sensed: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the excuse as a JSON object."""
+        return {"assumption": self.assumption, **self.violation.to_json(), "sensed": self.sensed}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The verdict on one trial.
+
+    Attributes
+    ----------
+    verdict : Ruling
+        Satisfied, violated, excused or unfinished.
+    clean : bool
+        Whether the ego broke nothing, whatever others did.
+    excuse : Excuse or None
+        Of an excused trial.
+    violations : tuple of Violation
+        Every breach of every car, in order of time.
+    collisions : tuple of Collision
+        The ego's, with the fault as found here.
+    rounds : int
+        Rounds of visits; `longest_gap_s` is the longest gap between visits of a goal (None without goals) and
+        `gap_limit_s` the longest that `satisfied` allows (None if there is no round through all goals).
+    formulas : dict
+        What holds of each formula so far, in four values.
+    """
+
+    verdict: Ruling
+    clean: bool
+    excuse: Excuse | None
+    violations: tuple[Violation, ...]
+    collisions: tuple[Collision, ...]
+    rounds: int
+    longest_gap_s: float | None
+    gap_limit_s: float | None
+    formulas: dict[str, Status]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict as a JSON object."""
+        return {
+            "verdict": self.verdict.value,
+            "clean": self.clean,
+            "excuse": None if self.excuse is None else self.excuse.to_json(),
+            "violations": [violation.to_json() for violation in self.violations],
+            "collisions": [collision.to_json() for collision in self.collisions],
+            "rounds": self.rounds,
+            "longest_gap_s": self.longest_gap_s,
+            "gap_limit_s": self.gap_limit_s,
+            "formulas": dict(self.formulas),
+        }
+
+
+class Judging:
+    """A sink that judges a trial whose problem carries rules.
+
+    Labels and faults are found again from the poses, so that a trial is judged by this code whoever recorded it.
+    """
+
+    def begin(self, instance: Instance) -> None:
+        """Start without a breach.
+
+        Raises
+        ------
+        InputError
+            If the problem asks for the rules and they are not defined on it; names the place.
+        """
+        problem = instance.problem
+        self._instance = instance
+        self._referee = None
+        if not problem.rules:
+            return
+        self._rules = RuleParameters.from_mapping(problem.rules)
+        check_demands(
+            problem.network,
+            problem.intersection_radius,
+            problem.car,
+            problem.sensing_radius,
+            self._rules.to_mapping(),
+        )
+        from dubins_traffic.spec.judge import Referee  # compiles; only where there is something to judge
+
+        self._referee = Referee([instance])
+        self._breaches: list[Breach] = []
+        self._sensed = [np.zeros((0, len(instance.names)), dtype=bool)]
+        self._visiting = Visiting()
+        self._visiting.begin(instance)
+        self._collisions = Collisions()
+        self._collisions.begin(instance)
+        self._goals = GoalDiscs(instance)
+        self._at_goal = np.zeros(len(self._goals.goals), dtype=bool)
+
+    def frames(self, frames: Frames) -> None:
+        """Judge a block of frames."""
+        if self._referee is None:
+            return
+        breaches, contacts = self._referee.judge(frames)
+        self._breaches += breaches
+        self._collisions.frames(replace(frames, contacts=contacts))
+        self._visiting.frames(frames)
+        if len(frames):
+            dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
+            radius = self._instance.problem.sensing_radius
+            self._sensed.append(dx * dx + dy * dy <= radius * radius)
+            self._at_goal = self._goals.inside(frames)[-1]
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is left to do."""
+
+    def result(self) -> Verdict | None:
+        """Return the verdict up to the last frame, None if the problem carries no rules."""
+        if self._referee is None:
+            return None
+        violations = tuple(self._violation(breach) for breach in self._breaches)
+        own = [breach for breach in self._breaches if breach.car == EGO]
+        fall = first_fall(self._breaches, self._rules, self._instance.problem.rate)
+        visits = self._visiting.result()
+        gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
+        flow = free_flow(self._instance)
+        limit = self._rules.gap_rounds * flow.round_time
+        excuse = None
+        if not own:
+            done = visits.visited == 1.0 and (gap is None or gap <= limit)
+            ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
+        elif fall is None or fall[1].tick > own[0].tick:
+            ruling = Ruling.VIOLATED
+        else:
+            ruling = Ruling.EXCUSED
+            sensed = self._was_sensed(fall[1].car, own[0].tick)
+            excuse = Excuse(fall[0], violations[self._breaches.index(fall[1])], sensed)
+        return Verdict(
+            ruling,
+            not own,
+            excuse,
+            violations,
+            self._collisions.result(),
+            visits.rounds,
+            gap,
+            limit if math.isfinite(limit) else None,
+            self._formulas(visits, self._referee.running[0]),
+        )
+
+    def _violation(self, breach: Breach) -> Violation:
+        network, rate = self._instance.problem.network, self._instance.problem.rate
+        segment = None
+        if breach.lane >= 0:
+            x0, y0, x1, y1 = network.segments[breach.lane // 2]
+            segment = (x1, y1, x0, y0) if breach.lane % 2 else (x0, y0, x1, y1)
+        vertex = network.intersections[breach.vertex] if breach.vertex >= 0 else None
+        place = Place(breach.x, breach.y, vertex, segment)
+        name = self._instance.names[breach.car]
+        return Violation(breach.rule, name, breach.tick / rate, breach.tick, breach.since / rate, place)
+
+    def _was_sensed(self, car: int, tick: int) -> bool:
+        back = ticks(self._rules.witness_time, self._instance.problem.rate)
+        sensed = np.concatenate(self._sensed)
+        self._sensed = [sensed]
+        return bool(sensed[max(0, tick - back) : tick + 1, car].any())
+
+    def _formulas(self, visits: Visits, running: Running) -> dict[str, Status]:
+        broken = {breach.rule for breach in self._breaches if breach.car == EGO}
+        found: dict[str, Status] = {rule: _status(rule in broken, rule in running.ego) for rule in EGO_RULES}
+        for goal, there in zip(visits.goals, self._at_goal.tolist(), strict=True):
+            found[f"1.goal {goal.goal[0]} {goal.goal[1]}"] = _status(False, not there)
+        pending = {assumption_of(rule) for rule in running.others}
+        for assumption in assumed(self._rules):
+            of_it = [
+                breach
+                for breach in self._breaches
+                if breach.car != EGO and assumption_of(breach.rule) == assumption
+            ]
+            fell = first_fall(of_it, self._rules, self._instance.problem.rate) is not None
+            found[assumption] = _status(fell, assumption in pending)
+        return found
+
+
+def assumption_of(rule: str) -> str:
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3."""
+    return rule[:2] if rule.startswith("E") else "E1"
+
+
+def assumed(rules: RuleParameters) -> tuple[str, ...]:
+    """Return the parts of the assumption that a problem makes."""
+    return tuple(name for name in ASSUMPTIONS if getattr(rules, f"assume_{name.lower()}"))
+
+
+def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
+    """Return which part of the assumption falls first, and with which breach; None if it holds.
+
+    Breaches of E1 that a car is allowed (`exceptions` within `exception_time`) don't count; what one car does against
+    one rule in one frame counts once.
+    """
+    made = assumed(rules)
+    window = ticks(rules.exception_time, rate)
+    allowed: dict[int, list[tuple[int, str]]] = {}
+    for breach in breaches:
+        part = assumption_of(breach.rule)
+        if breach.car == EGO or part not in made:
+            continue
+        if part == "E1":
+            recent = [entry for entry in allowed.get(breach.car, []) if breach.tick - entry[0] < window]
+            entry = (breach.tick, breach.rule[0])
+            allowed[breach.car] = recent if entry in recent else [*recent, entry]
+            if len(allowed[breach.car]) <= rules.exceptions:
+                continue
+        return part, breach
+    return None
+
+
+def _status(broken: bool, pending: bool) -> Status:
+    """Return the four-valued verdict on a formula that no finite run can make true."""
+    if broken:
+        return "false"
+    return "presumably false" if pending else "presumably true"

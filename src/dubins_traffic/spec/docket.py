@@ -1,0 +1,193 @@
+"""What the kernels of the referee read and write: the terms of each trial, running clocks, and breaches found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.tables import CarTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.spec.tables import ticks
+
+if TYPE_CHECKING:
+    from dubins_traffic.spec.parameters import RuleParameters
+
+COLLISION: Final = 0
+ROAD: Final = 1
+LEFT_UNBLOCKED: Final = 2
+RETURN: Final = 3
+STOP: Final = 4
+ORDER: Final = 5
+CLEARANCE: Final = 6
+FAULT: Final = 7
+ENTER: Final = 8
+TICKETS: Final = 9
+EXIT: Final = 10
+REST: Final = 11
+GOAL: Final = 12
+
+RULES: Final[tuple[str, ...]] = (
+    "1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear",
+    "E2", "E3.enter", "E3.tickets", "E4", "E5", "E6",
+)  # fmt: skip
+"""Names of the rules, by number. Rules 2 and 3 of an e-agent are E1."""
+
+MOST: Final = 10
+"""Most breaches that one car can begin in one frame."""
+
+JUDGED: Final = 0
+RETURN_TICKS: Final = 1
+ENTER_TICKS: Final = 2
+MOST_TICKETS: Final = 3
+EXIT_TICKS: Final = 4
+REST_TICKS: Final = 5
+GOAL_TICKS: Final = 6
+WHOLES: Final = 7
+
+EXIT2: Final = 0
+WAY: Final = 1
+EXIT_GAP: Final = 2
+LANE_MIDDLE: Final = 3
+REALS: Final = 4
+
+OFF_ROAD: Final = 0
+LEFT_SINCE: Final = 1
+UNBLOCKED_SINCE: Final = 2
+STOPPED_SINCE: Final = 3
+FIRST_SINCE: Final = 4
+EXIT_SINCE: Final = 5
+REST_SINCE: Final = 6
+AT_SINCE: Final = 7
+CLOCKS: Final = 8
+
+NEVER: Final = -2
+"""In `OFF_ROAD`: the car has never been on the road."""
+
+BITS: Final = 0
+LANE: Final = 1
+CROSSES: Final = 2
+AT: Final = 3
+PAST: Final = 4
+
+OF_TRIAL: Final = 0
+OF_RULE: Final = 1
+OF_CAR: Final = 2
+AT_TICK: Final = 3
+SINCE_TICK: Final = 4
+AT_VERTEX: Final = 5
+ON_LANE: Final = 6
+COLUMNS: Final = 7
+
+
+class Terms(NamedTuple):
+    """The terms by which each trial is judged.
+
+    Attributes
+    ----------
+    real : (B, REALS) float64
+        Squared distance of a body, without its rounding, from a vertex up to which it is in the way of those who
+        leave (`EXIT2`); E5's way ahead (`WAY`); E4's free length of an exit (`EXIT_GAP`); distance of the right
+        lane's middle from the centre line (`LANE_MIDDLE`). Metres.
+    whole : (B, WHOLES) int64
+        Whether the trial is judged at all, and the durations of the rules in ticks; E3's most new tickets.
+    goal_off : (B + 1,) int64
+        Goals of trial b are goal[goal_off[b]] to goal[goal_off[b + 1] - 1].
+    goal : (G,) int64
+        Vertices, each goal of a trial once.
+    """
+
+    real: Floats
+    whole: Ints
+    goal_off: Ints
+    goal: Ints
+
+
+class Docket(NamedTuple):
+    """What the referee remembers, and what he has found.
+
+    Attributes
+    ----------
+    past : (B, N, PAST) int64
+        Flags, lane state, disc that the body meets and disc that holds the centre, of the frame before.
+    clock : (B, N, CLOCKS) int64
+        First tick of the present run of: off the road (ego; `NEVER` before it has been on one), left, left and not
+        overtaking, stopped, first at a clear crossing, in a disc with a free exit, standing with a free way, where it
+        is: at a vertex or none; -1 where there is no run.
+    goal_clock : (G,) int64
+        First tick of the present run of a goal being taken; -1 while it is free.
+    row : (K, COLUMNS) int64
+        Breaches found: trial, number of the rule, car, tick, tick since which, vertex, lane.
+    filled : (1,) int64
+        How many rows are filled.
+    """
+
+    past: Ints
+    clock: Ints
+    goal_clock: Ints
+    row: Ints
+    filled: Ints
+
+    @staticmethod
+    def empty(trials: int, cars: int, goals: int, frames: int = 1) -> Docket:
+        """Return the docket of `trials` x `cars` cars before their first frame, with room for `frames` frames."""
+        past = np.full((trials, cars, PAST), -1, dtype=np.int64)
+        past[:, :, BITS] = 0
+        clock = np.full((trials, cars, CLOCKS), -1, dtype=np.int64)
+        clock[:, :, OFF_ROAD] = NEVER
+        room = (MOST * trials * cars + goals) * frames
+        return Docket(
+            past,
+            clock,
+            np.full(goals, -1, dtype=np.int64),
+            np.zeros((room, COLUMNS), dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
+        )
+
+    @property
+    def room_of_a_frame(self) -> int:
+        """The most rows that one frame can fill."""
+        return MOST * self.past.shape[0] * self.past.shape[1] + len(self.goal_clock)
+
+
+def pack_terms(
+    parameters: Sequence[RuleParameters],
+    judged: Sequence[bool],
+    radii: Sequence[float],
+    rates: Sequence[float],
+    goals: Sequence[Sequence[int]],
+    cars: CarTable,
+) -> Terms:
+    """Return the terms of each trial.
+
+    Parameters
+    ----------
+    parameters, judged
+        The parameters of the rules, and whether the trial is judged by them.
+    radii, rates
+        Intersection radius R (m) and control rate (Hz).
+    goals
+        Vertices of the goals.
+    cars
+        The car of each trial.
+    """
+    real = np.zeros((len(parameters), REALS))
+    whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
+    goal_off, goal = [0], list[int]()
+    for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
+        reach = radius + own.exit_gap + float(cars.rounding[b])
+        real[b, EXIT2] = reach * reach
+        real[b, WAY] = own.way_distance
+        real[b, EXIT_GAP] = own.exit_gap
+        real[b, LANE_MIDDLE] = cars.w[b]
+        whole[b, JUDGED] = judged[b]
+        whole[b, RETURN_TICKS] = ticks(own.left_time, rate)
+        whole[b, ENTER_TICKS] = ticks(own.enter_time, rate)
+        whole[b, MOST_TICKETS] = own.tickets
+        whole[b, EXIT_TICKS] = ticks(own.exit_time, rate)
+        whole[b, REST_TICKS] = ticks(own.rest_time, rate)
+        whole[b, GOAL_TICKS] = ticks(own.goal_time, rate)
+        goal += dict.fromkeys(goals[b]) if judged[b] else ()
+        goal_off.append(len(goal))
+    return Terms(real, whole, np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64))

@@ -1,0 +1,366 @@
+"""The referee's look at one frame of a batch: which rules are broken in it, by whom, since when, where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.blocking import obstacle_narrows
+from dubins_traffic.spec.docket import (
+    AT,
+    AT_SINCE,
+    AT_TICK,
+    AT_VERTEX,
+    BITS,
+    CLEARANCE,
+    CROSSES,
+    ENTER,
+    ENTER_TICKS,
+    EXIT,
+    EXIT2,
+    EXIT_GAP,
+    EXIT_SINCE,
+    EXIT_TICKS,
+    FIRST_SINCE,
+    GOAL,
+    GOAL_TICKS,
+    JUDGED,
+    LANE,
+    LANE_MIDDLE,
+    LEFT_SINCE,
+    LEFT_UNBLOCKED,
+    MOST_TICKETS,
+    OF_CAR,
+    OF_RULE,
+    OF_TRIAL,
+    OFF_ROAD,
+    ON_LANE,
+    ORDER,
+    REST,
+    REST_SINCE,
+    REST_TICKS,
+    RETURN,
+    RETURN_TICKS,
+    ROAD,
+    SINCE_TICK,
+    STOP,
+    STOPPED_SINCE,
+    TICKETS,
+    UNBLOCKED_SINCE,
+    WAY,
+    Docket,
+    Terms,
+)
+from dubins_traffic.spec.frame import label_frame
+from dubins_traffic.spec.obstacles import ObstacleLanes
+from dubins_traffic.spec.propositions import (
+    AHEAD,
+    BLOCKED,
+    CLEAR,
+    ENTERED,
+    EXCUSED,
+    FIRST,
+    IN_CROSSING,
+    LEFT,
+    ON_ROAD,
+    OVERTAKING,
+    STANDS,
+    STOPPED,
+)
+from dubins_traffic.spec.shape import distance2_to_body, half_extent
+from dubins_traffic.spec.tables import (
+    FORFEITS,
+    FREE_NEEDED,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    LANE_WIDTH,
+    LEFT_SET,
+    NET,
+    PROGRESS,
+    RADIUS,
+    ROUNDING,
+    TICKET,
+    Memory,
+    RuleTable,
+)
+
+EGO: int = 0
+ENTERS = ENTERED | IN_CROSSING
+GOES = FIRST | CLEAR
+
+
+@jit
+def judge_frame(
+    tick: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> None:
+    """Add the breaches that begin in frame `tick`, which has been labelled, to `docket`."""
+    row = docket.row
+    filled = docket.filled
+    for b in range(state.count.shape[0]):
+        if terms.whole[b, JUDGED] == 0:
+            continue
+        cars = state.count[b]
+        whole = terms.whole[b]
+        past = docket.past[b]
+        flags = labels.bits[b]
+        lanes = labels.lane[b]
+        for n in range(cars):
+            clock = docket.clock[b, n]
+            bits = np.int64(flags[n])
+            lane = lanes[n]
+            v = labels.crosses[b, n]
+            _judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
+            if bits & ENTERS == ENTERS:
+                stopped = (
+                    past[n, BITS] & STOPPED != 0 and lane_end(roads, rules.whole[b, NET], past[n, LANE]) == v
+                )
+                _judge_entry(b, n, tick, v, stopped, cars, past, row, filled)
+            if n == EGO:
+                _judge_road(b, tick, bits, lane, clock, row, filled)
+                continue
+            if bits & STOPPED != 0:
+                ahead = lane_end(roads, rules.whole[b, NET], lane)
+                _judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
+            else:
+                clock[STOPPED_SINCE] = -1
+                clock[FIRST_SINCE] = -1
+            if past[n, CROSSES] != v:
+                clock[EXIT_SINCE] = -1
+            free = v >= 0 and _has_exit(b, n, v, state, roads, obstacles, rules, terms, labels)
+            if _run(free, tick, clock, EXIT_SINCE) == whole[EXIT_TICKS]:
+                _add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, row, filled)
+            free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
+            free = free and _has_way(n, cars, terms.real[b, WAY], lanes, flags, memory.measure[b])
+            if _run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
+                _add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
+            if past[n, AT] != labels.at[b, n]:
+                clock[AT_SINCE] = tick
+        for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
+            _judge_goal(b, tick, cars, g, terms, labels.at[b], docket)
+        for n in range(cars):
+            past[n, BITS] = flags[n]
+            past[n, LANE] = lanes[n]
+            past[n, CROSSES] = labels.crosses[b, n]
+            past[n, AT] = labels.at[b, n]
+
+
+@jit
+def judge_frames(
+    first: int,
+    begin: int,
+    room: int,
+    poses: Floats,
+    bits: Bits,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> int:
+    """Label and judge `poses` (4: x, y, c, s; F, N) of one trial from row `begin` on; return the row after the last.
+
+    Row f is frame `first` + f. The flags found are written to `bits` (F, N). Ends early when there may not be room
+    in `docket` for another frame, which needs `room` rows.
+    """
+    for f in range(begin, poses.shape[1]):
+        if docket.filled[0] + room > docket.row.shape[0]:
+            return f
+        for n in range(poses.shape[2]):
+            state.x[0, n] = poses[0, f, n]
+            state.y[0, n] = poses[1, f, n]
+            state.c[0, n] = poses[2, f, n]
+            state.s[0, n] = poses[3, f, n]
+        label_frame(first + f, state, roads, obstacles, rules, labels, memory)
+        judge_frame(first + f, state, roads, obstacles, rules, terms, labels, memory, docket)
+        for n in range(poses.shape[2]):
+            bits[f, n] = labels.bits[0, n]
+    return poses.shape[1]
+
+
+@jit
+def _add(
+    b: int, rule: int, n: int, tick: int, since: int, vertex: int, lane: int, row: Ints, filled: Ints
+) -> None:
+    k = filled[0]
+    row[k, OF_TRIAL] = b
+    row[k, OF_RULE] = rule
+    row[k, OF_CAR] = n
+    row[k, AT_TICK] = tick
+    row[k, SINCE_TICK] = since
+    row[k, AT_VERTEX] = vertex
+    row[k, ON_LANE] = lane
+    filled[0] = k + 1
+
+
+@jit
+def _run(holds: bool, tick: int, clock: Ints, which: int) -> int:
+    """Keep the clock of a run; return for how many ticks it has gone on, -1 if there is none."""
+    if not holds:
+        clock[which] = -1
+        return -1
+    if clock[which] < 0:
+        clock[which] = tick
+    return tick - clock[which]
+
+
+@jit
+def _judge_lane(
+    b: int, n: int, tick: int, bits: Any, lane: int, whole: Ints, clock: Ints, row: Ints, filled: Ints
+) -> None:
+    """Rule 2: left only while overtaking, and for a while."""
+    long = _run(bits & LEFT != 0, tick, clock, LEFT_SINCE)
+    alone = _run(bits & (LEFT | OVERTAKING) == LEFT, tick, clock, UNBLOCKED_SINCE)
+    if alone == 0:
+        _add(b, LEFT_UNBLOCKED, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
+    if long == whole[RETURN_TICKS]:
+        _add(b, RETURN, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
+
+
+@jit
+def _judge_entry(
+    b: int, n: int, tick: int, v: int, stopped: bool, cars: int, past: Ints, row: Ints, filled: Ints
+) -> None:
+    """Rule 3, of a car that enters crossing v in this frame: judged on the frame before, in which it had `stopped`
+    there or not.
+    """
+    lane = past[n, LANE]
+    if not stopped:
+        _add(b, STOP, n, tick, tick, v, lane, row, filled)
+    elif past[n, BITS] & AHEAD != 0:
+        _add(b, ORDER, n, tick, tick, v, lane, row, filled)
+    for k in range(cars):
+        if k != n and past[k, CROSSES] == v:
+            _add(b, CLEARANCE, n, tick, tick, v, lane, row, filled)
+            return
+
+
+@jit
+def _judge_road(b: int, tick: int, bits: Any, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
+    """Rule 1: the ego stays on the road from its first frame there."""
+    if bits & ON_ROAD != 0:
+        clock[OFF_ROAD] = -1
+    elif clock[OFF_ROAD] == -1:
+        clock[OFF_ROAD] = tick
+        _add(b, ROAD, EGO, tick, tick, -1, lane, row, filled)
+
+
+@jit
+def _judge_queue(
+    b: int,
+    n: int,
+    tick: int,
+    bits: Any,
+    lane: int,
+    v: int,
+    whole: Ints,
+    mark: Ints,
+    clock: Ints,
+    row: Ints,
+    filled: Ints,
+) -> None:
+    """E3, of a car that has stopped at v: who is first at a clear crossing enters in time, and takes few tickets."""
+    _run(True, tick, clock, STOPPED_SINCE)
+    if _run(bits & GOES == GOES, tick, clock, FIRST_SINCE) == whole[ENTER_TICKS]:
+        _add(b, ENTER, n, tick, clock[FIRST_SINCE], v, lane, row, filled)
+    if mark[FORFEITS] == whole[MOST_TICKETS] + 1 and mark[TICKET] == tick:
+        _add(b, TICKETS, n, tick, clock[STOPPED_SINCE], v, lane, row, filled)
+
+
+@jit
+def _has_exit(
+    b: int,
+    n: int,
+    v: int,
+    state: State,
+    t: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+) -> bool:
+    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane."""
+    real = rules.real[b]
+    net = rules.whole[b, NET]
+    row = t.vert_off[net] + v
+    vx, vy = t.vert[row, 0], t.vert[row, 1]
+    mouth, middle = real[RADIUS], terms.real[b, LANE_MIDDLE]
+    taken = 0
+    for k in range(state.count[b]):
+        x, y, c, s = state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k]
+        near2 = distance2_to_body(vx, vy, x, y, c, s, real[HALF_LENGTH], real[HALF_WIDTH])
+        if k == n or near2 > terms.real[b, EXIT2]:
+            continue
+        for arm in range(t.degree[row]):
+            lane = t.arms[row, arm]
+            along, lateral = lane_coordinates(t, net, lane, x, y)
+            in_the_way = False
+            if labels.at[b, k] == v:
+                own, own_lateral = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
+                far2 = (along - mouth) * (along - mouth) + (lateral + middle) * (lateral + middle)
+                own2 = (own - mouth) * (own - mouth) + (own_lateral + middle) * (own_lateral + middle)
+                in_the_way = far2 < own2
+            elif labels.segment[b, k] == lane // 2:
+                tx, ty = lane_direction(t, net, lane)
+                half = half_extent(tx, ty, c, s, real[HALF_LENGTH], real[HALF_WIDTH], real[ROUNDING])
+                in_the_way = lateral - half < -real[LEFT_SET]
+            if in_the_way:
+                taken |= 1 << arm
+    for arm in range(t.degree[row]):
+        if taken & (1 << arm) != 0:
+            continue
+        lane = t.arms[row, arm]
+        length = t.seg[t.seg_off[net] + lane // 2, 4]
+        far = mouth + terms.real[b, EXIT_GAP]
+        if obstacles.base[b] < 0 or not obstacle_narrows(
+            obstacles, b, lane, length, mouth, far, real[LANE_WIDTH], real[FREE_NEEDED]
+        ):
+            return True
+    return False
+
+
+@jit
+def _has_way(n: int, cars: int, reach: float, lanes: Ints, flags: Bits, measure: Floats) -> bool:
+    """E5: tell whether nobody stands or waits within `reach` ahead of car n in its lane."""
+    own = measure[n, PROGRESS]
+    for k in range(cars):
+        if lanes[k] == lanes[n] and flags[k] & (STANDS | EXCUSED | STOPPED) != 0:
+            ahead = measure[k, PROGRESS] - own
+            if 0.0 < ahead <= reach:
+                return False
+    return True
+
+
+@jit
+def _judge_goal(b: int, tick: int, cars: int, g: int, terms: Terms, at: Ints, docket: Docket) -> None:
+    """E6: a goal is free again and again; of one that is not, the e-agent there longest is named."""
+    goal = terms.goal[g]
+    clock = docket.clock[b]
+    who = -1
+    for n in range(1, cars):
+        if at[n] == goal and (who < 0 or clock[n, AT_SINCE] < clock[who, AT_SINCE]):
+            who = n
+    if who < 0:
+        docket.goal_clock[g] = -1
+        return
+    if docket.goal_clock[g] < 0:
+        docket.goal_clock[g] = tick
+    since = docket.goal_clock[g]
+    if tick - since == terms.whole[b, GOAL_TICKS]:
+        _add(b, GOAL, who, tick, since, goal, -1, docket.row, docket.filled)
