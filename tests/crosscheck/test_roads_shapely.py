@@ -31,7 +31,7 @@ TABLE = pack(NETWORKS, [HALF_WIDTH] * len(NETWORKS))
 
 
 @jit
-def _look_up(t, net, p, segment, d2, vertex, v2, on):
+def look_up(t, net, p, segment, d2, vertex, v2, on):
     for k in range(len(p)):
         segment[k], d2[k] = lookup.nearest_segment(t, net, p[k, 0], p[k, 1])
         vertex[k], v2[k] = lookup.nearest_vertex(t, net, p[k, 0], p[k, 1])
@@ -84,7 +84,7 @@ def test_compiled_places_are_the_same_bit_for_bit(net: int) -> None:
     count = len(points)
     segment, vertex = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
     d2, v2, on = np.zeros(count), np.zeros(count), np.zeros(count, dtype=np.bool_)
-    _look_up(TABLE, net, points, segment, d2, vertex, v2, on)
+    look_up(TABLE, net, points, segment, d2, vertex, v2, on)
     for own, square, plain in (
         (segment, d2, network.nearest_segment(points)),
         (vertex, v2, network.nearest_intersection(points)),

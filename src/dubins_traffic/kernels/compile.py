@@ -65,6 +65,9 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
     The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is. Kernels
     don't allocate, so references to arrays are not counted (`_nrt`): each call would else count every array of
     the tables it is given up and down, which takes longer than most kernels do.
+
+    A kernel whose name begins with an underscore can be called from other kernels only: the code that would unpack
+    Python's arguments often takes longer to compile than the kernel.
     """
     return _compiled(function, inlined=False)
 
@@ -80,5 +83,14 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
 def _compiled(function: Callable[P, R], *, inlined: bool) -> Callable[P, R]:
     library = cast(Any, numba)
     library.config.CACHE_DIR = str(cache_folder())
-    compiler = library.njit(cache=True, error_model="numpy", nogil=True, forceinline=inlined, _nrt=False)
+    inner = function.__name__.startswith("_")
+    compiler = library.njit(
+        cache=True,
+        error_model="numpy",
+        nogil=True,
+        forceinline=inlined,
+        _nrt=False,
+        no_cfunc_wrapper=True,
+        no_cpython_wrapper=inner,
+    )
     return cast(Callable[P, R], compiler(function))
