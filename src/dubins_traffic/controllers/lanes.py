@@ -15,7 +15,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.controllers import lanes_law as law
 from dubins_traffic.controllers.lanes_law import Desk, decide
 from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
-from dubins_traffic.driving.paths import FIELDS, PathMaker
+from dubins_traffic.driving.paths import FIELDS, LANE, LENGTH, PathMaker
 from dubins_traffic.driving.tours import LaneGraph, Round, find_round
 from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.problem.instance import Problem
@@ -59,12 +59,10 @@ class Lanes:
         self._problem = problem
         self._network = problem.network
         self._maker = PathMaker(problem)
-        self._graph = LaneGraph(problem.network, self._maker.turn_cost)
-        self._round = self._find_round()
-        arrivals = self._round.arrivals[:8] if self._round is not None else ()
-        self._arrivals = tuple(dict.fromkeys(arrivals))
         self._blocked: dict[int, float] = {}
         self._closed: dict[int, float] = {}
+        self._graph = LaneGraph(problem.network, self._maker.turn_cost)
+        self._round = self._find_round()
         self._desk = None
 
     def act(self, observation: Observation) -> Command:
@@ -74,6 +72,8 @@ class Lanes:
         desk = self._desk
         if desk is None:
             desk = self._desk = self._furnish(observation.pose)
+        elif self._blocked or self._closed:
+            desk = self._desk = self._remember(desk, observation)
         ego, others = desk.ego[0], desk.others[0]
         ego[:] = observation.pose
         others[:, O_SEEN] = 0.0
@@ -131,30 +131,26 @@ class Lanes:
             command=np.zeros((1, 2)),
             blocker=np.full(1, NOBODY, dtype=np.int64),
         )
-        return self._plan(desk, pose, 0.0)
+        return self._plan(desk, pose)
 
-    def _plan(self, desk: Desk, pose: Pose, time: float) -> Desk:
+    def _plan(self, desk: Desk, pose: Pose) -> Desk:
         """Return the desk with the cheapest way from `pose` to the round as its path."""
         tours = self._round
         assert tours is not None
         best = (inf, 0, 0.0, 0.0, -1)
-        tables = [
-            self._graph.distances(tours.lanes[place], lambda lane, other: self._penalty(lane, other, time))
-            for place in self._arrivals
-        ]
-        for lane, progress, left, cost in self._entries(pose, time):
+        arrivals = tuple(dict.fromkeys(tours.arrivals[:8]))
+        tables = [self._graph.distances(tours.lanes[place]) for place in arrivals]
+        for lane, progress, left, cost in self._entries(pose):
             for k in range(len(tables)):
                 total = cost + tables[k][lane]
                 if total < best[0]:
                     best = (total, lane, progress, left, k)
         _, lane, progress, left, k = best
-        place = self._arrivals[k]
+        place = arrivals[k]
         target = tours.lanes[place]
         approach = [lane]
         if lane != target:
-            approach += self._graph.route(
-                lane, target, tables[k], lambda one, other: self._penalty(one, other, time)
-            )
+            approach += self._graph.route(lane, target, tables[k])
         lanes = [*approach, *tours.lanes[place + 1 :], *tours.lanes[: place + 1]]
         path = self._maker.path(lanes, progress, len(approach))
         memory = np.zeros((1, law.MEMORY_FIELDS))
@@ -164,7 +160,7 @@ class Lanes:
         span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
         return desk._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
 
-    def _entries(self, pose: Pose, time: float) -> list[tuple[int, float, float, float]]:
+    def _entries(self, pose: Pose) -> list[tuple[int, float, float, float]]:
         """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""
         network, w = self._network, self._problem.car.w
         point = np.array((pose.x, pose.y))
@@ -183,7 +179,7 @@ class Lanes:
             tx, ty = network.tangents[lane >> 1].tolist()
             along = (pose.c * tx + pose.s * ty) * (-1.0 if lane & 1 else 1.0)
             cost = length - s + (0.0 if along > 0.3 or out else turning)
-            cost += self._standing_cost(lane, time)
+            cost += DETOUR if lane in self._blocked else 0.0
             if not out and length - s < self._longest_turn(lane):
                 cost += 20.0
             if abs(left + w) > 2.5 * w or s < -self._problem.intersection_radius:
@@ -194,12 +190,32 @@ class Lanes:
     def _longest_turn(self, lane: int) -> float:
         return max(self._maker.turn(lane, other).before for other in self._network.successors(lane))
 
-    def _standing_cost(self, lane: int, time: float) -> float:
-        return DETOUR if self._blocked.get(lane, -1.0) > time else 0.0
+    def _cost(self, lane: int, other: int) -> float:
+        """Return the cost of a turn, with what keeps the route off places found blocked."""
+        cost = self._maker.turn_cost(lane, other)
+        if other in self._blocked:
+            cost += DETOUR
+        if self._graph.end[lane] in self._closed:
+            cost += DETOUR
+        return cost
 
-    def _penalty(self, lane: int, other: int, time: float) -> float:
-        closed = self._closed.get(self._graph.end[lane], -1.0) > time
-        return self._standing_cost(other, time) + (DETOUR if closed else 0.0)
+    def _reroute(self, desk: Desk, pose: Pose) -> Desk:
+        """Find the round again, with regard for what is blocked now, and return the desk with the way to it."""
+        before = self._round
+        self._graph = LaneGraph(self._network, self._cost)
+        self._round = self._find_round() or before
+        return self._plan(desk, pose)
+
+    def _remember(self, desk: Desk, observation: Observation) -> Desk:
+        """Forget blocked places in time; the desk has a new path if one was forgotten and this is a place to change."""
+        time = observation.time
+        old = [place for places in (self._blocked, self._closed) for place in places if places[place] <= time]
+        row = desk.path[desk.row[0]]
+        if not old or row[LANE] < 0 or desk.memory[0, law.SIGMA] > 0.3 * row[LENGTH]:
+            return desk
+        self._blocked = {lane: until for lane, until in self._blocked.items() if until > time}
+        self._closed = {vertex: until for vertex, until in self._closed.items() if until > time}
+        return self._reroute(desk, observation.pose)
 
     def _detour(self, observation: Observation, blocker: int) -> None:
         """Note where the way is blocked, and plan again."""
@@ -220,4 +236,4 @@ class Lanes:
             self._blocked[2 * segment + (1 if float(left) > 0.0 else 0)] = until
             if hypot(point[0] - pose.x, point[1] - pose.y) < 3.0:
                 self._blocked[2 * segment + (0 if ahead > 0.0 else 1)] = until
-        self._desk = self._plan(desk, pose, observation.time)
+        self._desk = self._reroute(desk, pose)

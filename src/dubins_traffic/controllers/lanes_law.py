@@ -120,10 +120,10 @@ def decide(desk: Desk) -> None:
         speed = desk.car[b, FASTEST]
         if near or desk.part_off[b + 1] > desk.part_off[b]:
             speed = _speed_in_traffic(desk, b)
-        speed, yaw_rate = _follow(desk, b, speed)
         wanted = speed
+        speed, yaw_rate = _follow(desk, b, speed)
         speed, yaw_rate = _last_look(desk, b, speed, yaw_rate)
-        _note_progress(desk, b, wanted, speed)
+        _note_progress(desk, b, wanted, speed, yaw_rate)
         desk.command[b, 0] = speed
         desk.command[b, 1] = yaw_rate
 
@@ -158,10 +158,10 @@ def _gap(desk: Desk, b: int, n: int) -> float:
 
 
 @jit
-def _note_progress(desk: Desk, b: int, wanted: float, speed: float) -> None:
+def _note_progress(desk: Desk, b: int, wanted: float, speed: float, yaw_rate: float) -> None:
     """Count for how long the last look has kept the car from moving."""
     memory = desk.memory[b]
-    if wanted != 0.0 and speed == 0.0:
+    if wanted != 0.0 and speed == 0.0 and yaw_rate == 0.0:
         memory[STUCK] += desk.car[b, PERIOD]
         if wanted < 0.0 and memory[STUCK] > 0.2:
             memory[BACKING] = BARRED
@@ -247,7 +247,9 @@ def _following_speed(desk: Desk, b: int, first: int, who: int, nearest: int) -> 
     along = o[O_SPEED] * (o[OC] * desk.sample[nearest, TX] + o[OS] * desk.sample[nearest, TY])
     dx = o[OX] - desk.ego[b, 0]
     dy = o[OY] - desk.ego[b, 1]
-    far = min(SPACING * nearest, sqrt(dx * dx + dy * dy))
+    far = SPACING * nearest
+    if not _is_oncoming(desk, b, who):
+        far = min(far, sqrt(dx * dx + dy * dy))
     return max(0.0, max(0.0, along) + GAIN * (far - desk.car[b, FOLLOW]))
 
 
@@ -285,7 +287,7 @@ def _stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
     """Count how long the car has been kept waiting by `cause`; back up, pass or ask for another route in time."""
     memory = desk.memory[b]
     period = desk.car[b, PERIOD]
-    if memory[BACKING] > 0.0 and _backs_up(desk, b, int(memory[BACKING]) - 1):
+    if memory[BACKING] > 0.0 and cause != NOBODY and _backs_up(desk, b, int(memory[BACKING]) - 1):
         return -BACK_SPEED
     stuck = memory[STUCK] > HELD_UP
     if stuck and cause == NOBODY:
@@ -299,8 +301,13 @@ def _stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
     memory[WAITED] += period
     memory[TRIED] += period
     still = desk.others[b, cause, O_STILL] if cause >= 0 else 1e9
-    patience = HELD_UP if stuck else PATIENCE
-    if memory[WAITED] > patience and still > STANDS and memory[TRIED] >= RETRY:
+    comes = cause >= 0 and _is_oncoming(desk, b, cause)
+    hasty = stuck or comes
+    if (
+        memory[WAITED] > (HELD_UP if hasty else PATIENCE)
+        and still > (0.0 if hasty else STANDS)
+        and memory[TRIED] >= (HELD_UP if comes else RETRY)
+    ):
         memory[TRIED] = 0.0
         if _find_way_past(desk, b, first):
             memory[WAITED] = 0.0
@@ -312,6 +319,12 @@ def _stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
     if memory[WAITED] > DESPAIR:
         desk.blocker[b] = cause
     return 0.0
+
+
+@jit
+def _is_oncoming(desk: Desk, b: int, n: int) -> bool:
+    o = desk.others[b, n]
+    return o[OC] * desk.ego[b, 2] + o[OS] * desk.ego[b, 3] < -0.5
 
 
 @jit

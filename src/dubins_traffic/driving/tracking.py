@@ -67,7 +67,8 @@ def locate(
             row -= 1
             sigma = path[row, LENGTH] - 1e-6
         else:
-            now = max(now, min(sigma, 0.0))
+            if row > first:
+                now = max(now, min(sigma, 0.0))
             return row, now, left, travelled + now - sigma
     return row, sigma, 0.0, travelled
 
