@@ -64,7 +64,10 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
     for controller in controllers:
         name = Path(controller).name.replace(":", "-")
         plan = dt.plan(configuration, controller, trials=trials, seed=seed, records=output / name)
-        print(f"{controller}: {len(plan.jobs)} trials ...", file=sys.stderr)
+        print(
+            f"{len(plan.jobs)} trials with {controller} (the first on a machine compile first)",
+            file=sys.stderr,
+        )
         sheets[name] = plan.conclude(dt.run_trials(plan.jobs))
     Console().print(side_by_side(sheets))
     for sheet in sheets.values():
