@@ -13,10 +13,10 @@ from shapely import Point, Polygon
 from shapely.affinity import rotate, translate
 
 from dubins_traffic.agents import fleet
-from dubins_traffic.agents.lanes import FAR, aim_for, spread
 from dubins_traffic.agents.sight import sees
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.driving.lane_graph import FAR, aim_for, spread
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack

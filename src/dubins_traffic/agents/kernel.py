@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.agents.lanes import (
-    FAR,
-    aim_for,
-    frame,
-    lane_at,
-    nearer_exit,
-    place_of,
-    random_exit,
-    spread,
-)
+from dubins_traffic.agents.lanes import nearer_exit, random_exit
 from dubins_traffic.agents.sight import look
 from dubins_traffic.agents.tables import (
     BARRED,
@@ -53,6 +44,7 @@ from dubins_traffic.agents.tables import (
 from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
 from dubins_traffic.driving.waypoint import pursue, turn_then_drive
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit

@@ -1,36 +1,15 @@
-"""Lanes as e-agents drive them: waypoints, and the choice of the next lane."""
+"""Which lane an e-agent takes next."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.driving.lane_graph import FAR
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import below
-from dubins_traffic.roads.lookup import nearest_segment
-from dubins_traffic.roads.table import RoadTable
 
 CHOICE_DRAW = 0
-FAR = 1 << 40
-
-
-@jit
-def frame(row: Floats, lane: int) -> tuple[float, float, float, float, float]:
-    """Return (x, y, tx, ty, length): start, unit direction and length of a lane on the road's centre line.
-
-    `row` is the row of the lane's segment in `RoadTable.seg`.
-    """
-    if lane & 1:
-        return row[0] + row[4] * row[2], row[1] + row[4] * row[3], -row[2], -row[3], row[4]
-    return row[0], row[1], row[2], row[3], row[4]
-
-
-@jit
-def lane_at(roads: RoadTable, net: int, x: float, y: float, c: float, s: float) -> int:
-    """Return the lane of the nearest segment that leads along the heading (its first-to-second end on ties)."""
-    segment, _ = nearest_segment(roads, net, x, y)
-    row = roads.seg[roads.seg_off[net] + segment]
-    return 2 * segment + (0 if c * row[2] + s * row[3] >= 0.0 else 1)
 
 
 @jit
@@ -59,41 +38,3 @@ def nearer_exit(arms: Ints, degree: Ints, v: int, lane: int, hops: Ints) -> int:
             best = arms[v, k]
             fewest = hops[best]
     return best
-
-
-@jit
-def aim_for(lane: int, hops: Ints, queue: Ints, count: int) -> int:
-    """Make a lane a target of `spread`; return the number of targets so far."""
-    if hops[lane] == FAR:
-        hops[lane] = 0
-        queue[count] = lane
-        count += 1
-    return count
-
-
-@jit
-def spread(roads: RoadTable, net: int, hops: Ints, queue: Ints, count: int) -> None:
-    """Fill `hops` with the number of lanes to drive from each lane to the `count` targets; FAR: there's no way.
-
-    Turning round counts as possible at dead ends only. All but the targets were FAR before.
-    """
-    done = 0
-    while done < count:
-        lane = queue[done]
-        done += 1
-        v = roads.vert_off[net] + roads.ends[roads.seg_off[net] + (lane >> 1), lane & 1]
-        for k in range(roads.degree[v]):
-            before = roads.arms[v, k] ^ 1
-            if hops[before] == FAR and (before != lane ^ 1 or roads.degree[v] == 1):
-                hops[before] = hops[lane] + 1
-                queue[count] = before
-                count += 1
-
-
-@jit
-def place_of(lane: int, first: int, last: int, cycle: Ints) -> int:
-    """Return the first row of a cycle that holds a lane, or -1."""
-    for k in range(first, last):
-        if cycle[k] == lane:
-            return k
-    return -1
