@@ -5,7 +5,7 @@ Loops over trials and cars; the element functions are in `kernels.trig` and `ker
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,13 @@ class Workspace(NamedTuple):
     found: Ints
 
 
+# Where each table begins and ends among the arrays of a call.
+STATE_END = len(State._fields)
+CARS_END = STATE_END + len(CarTable._fields)
+OBSTACLES_END = CARS_END + len(ObstacleTable._fields)
+ROWS_END = OBSTACLES_END + len(Rows._fields)
+
+
 def workspace(trials: int, cars: int) -> Workspace:
     """Return a workspace for a batch of `trials` x `cars`."""
     buckets = 64
@@ -68,7 +75,36 @@ def workspace(trials: int, cars: int) -> Workspace:
 
 
 @jit
-def step(
+def step(first: int, dt: float, commands: Floats, *arrays: Any) -> int:
+    """Clip the commands in place and move trials `first`... for one tick of `dt` seconds.
+
+    Parameters
+    ----------
+    first : int
+        The first trial to move.
+    dt : float
+        Seconds.
+    commands : array (B, N, 2)
+        Speed and yaw rate of every car.
+    *arrays
+        Those of State, CarTable, ObstacleTable, Rows and Workspace, one after another: a call from Python with
+        arrays takes a third of the time of one with tables of them.
+
+    Returns
+    -------
+    int
+        The number of trials B when all have moved, or the trial before which it stopped because the buffer of
+        contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
+    """
+    return _step(
+        State(*arrays[:STATE_END]), commands, CarTable(*arrays[STATE_END:CARS_END]),
+        ObstacleTable(*arrays[CARS_END:OBSTACLES_END]), Rows(*arrays[OBSTACLES_END:ROWS_END]),
+        dt, Workspace(*arrays[ROWS_END:]), first,
+    )  # fmt: skip
+
+
+@jit
+def _step(
     state: State,
     commands: Floats,
     cars: CarTable,
@@ -78,11 +114,6 @@ def step(
     work: Workspace,
     first: int,
 ) -> int:
-    """Clip the commands in place and move trials `first`... for one tick of `dt` seconds.
-
-    Returns the number of trials B when all have moved, or the trial before which it stopped because the buffer of
-    contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
-    """
     work.found[0] = 0
     trials, n = state.x.shape
     total = trials * n
@@ -110,8 +141,8 @@ def step(
                 return -1 - k
             if pairs > 0:
                 _pass_on(state, cars, obstacles, dt, work, begin, k)
-                resolve(state, commands, cars, obstacles, dt, work, k, pairs)
-                part(state, cars, obstacles, work, k)
+                _resolve(state, commands, cars, obstacles, dt, work, k, pairs)
+                _part(state, cars, obstacles, work, k)
                 begin = k + 1
         _pass_on(state, cars, obstacles, dt, work, begin, last)
         b = last
@@ -139,7 +170,7 @@ def _pass_on(
     )  # fmt: skip
     for b in range(first, last):
         if work.touching[b] > 0:
-            part(state, cars, obstacles, work, b)
+            _part(state, cars, obstacles, work, b)
 
 
 @jit
@@ -192,7 +223,7 @@ def _meet(
 
 
 @jit
-def resolve(
+def _resolve(
     state: State,
     commands: Floats,
     cars: CarTable,
@@ -309,20 +340,20 @@ def _note(
 
 
 @jit
-def part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
+def _part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
     """Forget the pairs of trial b that are PARTED or more apart."""
     for i in range(state.count[b]):
         for k in range(PARTNERS):
             other = work.partner[b, i, k]
             if other == VACANT:
                 continue
-            if gap(state, cars, obstacles, b, i, other) >= PARTED:
+            if _gap(state, cars, obstacles, b, i, other) >= PARTED:
                 work.partner[b, i, k] = VACANT
                 work.touching[b] -= 1
 
 
 @jit
-def gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int, other: int) -> float:
+def _gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int, other: int) -> float:
     """Return the gap, metres, between car i and `other`, a car or obstacle -1 - k."""
     a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
     x, y, c, s = state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i]

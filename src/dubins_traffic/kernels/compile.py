@@ -69,7 +69,7 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
     A kernel whose name begins with an underscore can be called from other kernels only: the code that would unpack
     Python's arguments often takes longer to compile than the kernel.
     """
-    return _compiled(function, inlined=False)
+    return _compiled(function)
 
 
 def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
@@ -80,10 +80,14 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, inlined=True)
 
 
-def _compiled(function: Callable[P, R], *, inlined: bool) -> Callable[P, R]:
+def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `jit` does a kernel whose name begins with an underscore: only other kernels can call it."""
+    return _compiled(function, inner=True)
+
+
+def _compiled(function: Callable[P, R], *, inlined: bool = False, inner: bool = False) -> Callable[P, R]:
     library = cast(Any, numba)
     library.config.CACHE_DIR = str(cache_folder())
-    inner = function.__name__.startswith("_")
     compiler = library.njit(
         cache=True,
         error_model="numpy",
@@ -91,6 +95,6 @@ def _compiled(function: Callable[P, R], *, inlined: bool) -> Callable[P, R]:
         forceinline=inlined,
         _nrt=False,
         no_cfunc_wrapper=True,
-        no_cpython_wrapper=inner,
+        no_cpython_wrapper=inner or function.__name__.startswith("_"),
     )
     return cast(Callable[P, R], compiler(function))

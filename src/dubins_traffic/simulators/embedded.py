@@ -54,6 +54,7 @@ class Embedded:
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
         self._rows = rows(self._cars, max(counts), 1.0 / self._rate)
         self._tick = 0
+        self._gather()
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -63,25 +64,20 @@ class Embedded:
         self._tick += 1
         done = 0
         while done < trials:
-            reached = step(
-                self.state,
-                commands,
-                self._cars,
-                self._obstacles,
-                self._rows,
-                1.0 / self._rate,
-                self._work,
-                done,
-            )
+            reached = step(done, 1.0 / self._rate, commands, *self._arrays)
             if self._work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
                 self._work = _enlarged(self._work)
+                self._gather()
         return contacts
 
     def close(self) -> None:
         """Nothing is held outside memory."""
+
+    def _gather(self) -> None:
+        self._arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)
 
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)

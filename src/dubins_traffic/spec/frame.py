@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
@@ -88,12 +88,34 @@ from dubins_traffic.spec.tables import (
     RuleTable,
 )
 
+# Where each table begins and ends among the arrays of a call.
+STATE_END = len(State._fields)
+ROADS_END = STATE_END + len(RoadTable._fields)
+OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
+RULES_END = OBSTACLES_END + len(RuleTable._fields)
+LABELS_END = RULES_END + len(Labels._fields)
+
 RULE3 = STOPPED | CLEAR | AHEAD
 KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
 
 
 @jit
-def label_frame(
+def label_frame(tick: int, *arrays: Any) -> None:
+    """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
+
+    Before frame 0 both are as they are made: no lane, no vertex, no flag. `arrays` are those of State, RoadTable,
+    ObstacleLanes, RuleTable, Labels and Memory, one after another: a call from Python with arrays takes a third of
+    the time of one with tables of them.
+    """
+    label_tables(
+        tick, State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
+        ObstacleLanes(*arrays[ROADS_END:OBSTACLES_END]), RuleTable(*arrays[OBSTACLES_END:RULES_END]),
+        Labels(*arrays[RULES_END:LABELS_END]), Memory(*arrays[LABELS_END:]),
+    )  # fmt: skip
+
+
+@jit_inner
+def label_tables(
     tick: int,
     state: State,
     roads: RoadTable,
@@ -102,10 +124,7 @@ def label_frame(
     labels: Labels,
     memory: Memory,
 ) -> None:
-    """Label frame `tick` of every trial: `labels` and `memory` hold those of the frame before and are updated.
-
-    Before frame 0 both are as they are made: no lane, no vertex, no flag.
-    """
+    """Do what `label_frame` does, for a kernel that has the tables."""
     memory.head[0, NOW] = tick % memory.trail.shape[0]
     for b in range(state.count.shape[0]):
         cars = state.count[b]
@@ -139,7 +158,14 @@ def _locate(
     v, away2 = nearest_vertex(t, net, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
     body2 = distance2_to_body(
-        t.vert[t.vert_off[net] + v, 0], t.vert[t.vert_off[net] + v, 1], x, y, c, s, half_length, half_width
+        float(t.vert[t.vert_off[net] + v, 0]),
+        float(t.vert[t.vert_off[net] + v, 1]),
+        x,
+        y,
+        c,
+        s,
+        half_length,
+        half_width,
     )
     crosses = v if body2 < real[b, CROSS2] else -1
 

@@ -57,7 +57,7 @@ from dubins_traffic.spec.docket import (
     Docket,
     Terms,
 )
-from dubins_traffic.spec.frame import label_frame
+from dubins_traffic.spec.frame import label_tables
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
     AHEAD,
@@ -187,7 +187,7 @@ def judge_frames(
             state.y[0, n] = poses[1, f, n]
             state.c[0, n] = poses[2, f, n]
             state.s[0, n] = poses[3, f, n]
-        label_frame(first + f, state, roads, obstacles, rules, labels, memory)
+        label_tables(first + f, state, roads, obstacles, rules, labels, memory)
         judge_frame(first + f, state, roads, obstacles, rules, terms, labels, memory, docket)
         for n in range(poses.shape[2]):
             bits[f, n] = labels.bits[0, n]

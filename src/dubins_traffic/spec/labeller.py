@@ -142,6 +142,7 @@ class Labeller:
         depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
         self.memory = Memory.empty(trials, cars, depth, self._heads)
         self.labels = Labels.zeros(trials, cars)
+        self._arrays = (*self._roads, *self._obstacles, *self._rules, *self.labels, *self.memory)
         self._tick = -1
 
     def update(
@@ -202,7 +203,7 @@ class Labeller:
         return self.memory.mark[:, :, RANK]
 
     def _label(self, state: State) -> None:
-        label_frame(self._tick, state, self._roads, self._obstacles, self._rules, self.labels, self.memory)
+        label_frame(self._tick, *state, *self._arrays)
 
 
 def _distinct_roads(problems: Sequence[Judged]) -> tuple[list[int], list[RoadNetwork], list[float]]:
