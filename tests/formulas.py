@@ -21,7 +21,11 @@ def drawn(
 ) -> Formula:
     """Return a random formula in which past operators range over past ones only."""
     if depth == 0 or random.random() < 0.1:
-        return make(Op.PROP, name=random.choice(names)) if random.random() < 0.95 else random.choice((TRUE, FALSE))
+        return (
+            make(Op.PROP, name=random.choice(names))
+            if random.random() < 0.95
+            else random.choice((TRUE, FALSE))
+        )
     if past and random.random() < 0.2:
         return _drawn_past(random, depth, names)
 
@@ -201,7 +205,9 @@ def holds_finite(formula: Formula, word: list[int], names: tuple[str, ...], at: 
         return any(
             value(args[1], t) and all(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1)
         )
-    return all(value(args[1], t) or any(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1))
+    return all(
+        value(args[1], t) or any(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1)
+    )
 
 
 def named(*names: str) -> tuple[Formula, ...]:

@@ -115,16 +115,17 @@ class _Builder:
                     if target not in number:
                         if len(states) >= MAX_STATES:
                             raise FormulaError(
-                                "too large to be monitored", expected=f"at most {MAX_STATES} states in each part"
+                                "too large to be monitored",
+                                expected=f"at most {MAX_STATES} states in each part",
                             )
                         number[target] = len(states)
                         states.append(target)
                     cells.append((number[target], reset))
                 row.append(cells)
             rows.append(row)
-        cells = np.array(rows, dtype=np.int64)
+        filled = np.array(rows, dtype=np.int64)
         verdict = np.array([self._verdict(state) for state in states], dtype=np.int64)
-        return _reduced(table, self._letter, cells[..., 0], cells[..., 1], verdict)
+        return _reduced(table, self._letter, filled[..., 0], filled[..., 1], verdict)
 
     def _step(self, state: State, tests: tuple[bool, ...], expired: int) -> tuple[State, int]:
         memory, left = state
@@ -199,7 +200,8 @@ class _Builder:
             return True
         if any(self._emptiness.meetable(memory, self._replaced(move, True)) for move in moves):
             raise FormulaError(
-                "its verdict depends on how far a long bound has run", expected="shorter bounds or simpler parts"
+                "its verdict depends on how far a long bound has run",
+                expected="shorter bounds or simpler parts",
             )
         return False
 
@@ -218,7 +220,7 @@ class _Builder:
             parts = tuple(sorted(set(parts)))
         changed = node._replace(parts=parts)
         if node.clock >= 0:
-            changed = changed._replace(clock=-1, count=-1, running=0)
+            changed = changed._replace(clock=-1, length=-1, running=0)
             if node.kind == "next":
                 kind, left = ("until", self._table.true) if kindly else ("release", self._table.false)
                 changed = changed._replace(kind=kind, parts=(left, parts[0]), strong=True)

@@ -68,7 +68,8 @@ class FormulaError(InputError):
     def within(self, *, file: str | None = None, field: str | None = None) -> FormulaError:
         """Return the same error placed in `file` and below the field `field`."""
         placed = super().within(file=file, field=field)
-        error = FormulaError(placed.problem, **(self.context | {"file": placed.file, "field": placed.field}))
+        context: dict[str, Any] = self.context | {"file": placed.file, "field": placed.field}
+        error = FormulaError(placed.problem, **context)
         error.line, error.column = self.line, self.column
         return error
 

@@ -88,5 +88,4 @@ def advance(values: Ints, tables: Tables, state: Ints, clocks: Ints, verdicts: I
             state[b, m] = target
             verdict = tables.verdict[tables.verdict_at[m] + target]
             formula = tables.part_of[m]
-            if verdict < verdicts[b, formula]:
-                verdicts[b, formula] = verdict
+            verdicts[b, formula] = min(verdicts[b, formula], verdict)

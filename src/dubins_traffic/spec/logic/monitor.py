@@ -4,7 +4,8 @@ A formula is split into the parts of its conjunction (G distributes over it), an
 its own; the verdict of the whole is the least one. A part is *true* as soon as every infinite continuation satisfies
 it and *false* as soon as none does. So is the whole, as long as parts that share propositions don't contradict each
 other on a continuation that suits each of them alone: then *false* comes when the first part is lost, possibly later
-than the whole was. Parts without common propositions never do. `split=False` monitors the formula in one piece.
+than the whole was. Parts without common propositions never do. *True* is as early as for the whole, and a part that is decided counts as
+decided in what is presumed of the whole. `split=False` monitors the formula in one piece.
 
 Bounds of at most `UNROLL` ticks are counted in the states of a table, longer ones by clocks beside it, so tables
 don't grow with the bounds. Where a clock doesn't do, the bound is counted if the table stays within its limits.
@@ -56,7 +57,9 @@ def _split(formula: Formula, positive: bool) -> list[Formula]:
         return _split(formula.args[0], True) + _split(formula.args[1], False)
     if formula.op is Op.IMPLIES:
         conclusions = _split(formula.args[1], True)
-        return [formula] if len(conclusions) == 1 else [implies(formula.args[0], part) for part in conclusions]
+        return (
+            [formula] if len(conclusions) == 1 else [implies(formula.args[0], part) for part in conclusions]
+        )
     if formula.op in (Op.G, Op.F) and (formula.op is Op.G) == positive:
         return [always(part, formula.bounds) for part in _split(formula.args[0], positive)]
     return [formula if positive else ~formula]
@@ -185,7 +188,9 @@ class Monitors:
 def _known(formula: Formula, names: Sequence[str]) -> None:
     for name in propositions(formula):
         if name not in names:
-            raise FormulaError("unknown proposition", value=name, expected="one of the problem's propositions")
+            raise FormulaError(
+                "unknown proposition", value=name, expected="one of the problem's propositions"
+            )
 
 
 def _packed(pieces: Sequence[tuple[int, Automaton]], column: Mapping[str, int]) -> dict[str, Ints]:
@@ -204,7 +209,11 @@ def _packed(pieces: Sequence[tuple[int, Automaton]], column: Mapping[str, int]) 
             for held, array in ((letter, piece.letter), (target, piece.target), (reset, piece.reset)):
                 held.append(array.reshape(-1))
             verdict.append(piece.verdict)
-            sizes = [sizes[0] + piece.letter.size, sizes[1] + piece.target.size, sizes[2] + piece.verdict.size]
+            sizes = [
+                sizes[0] + piece.letter.size,
+                sizes[1] + piece.target.size,
+                sizes[2] + piece.verdict.size,
+            ]
         places.append(place)
     clocks = [len(piece.clocks) for _, piece in pieces]
     fields: dict[str, Any] = {

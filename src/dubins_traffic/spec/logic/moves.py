@@ -124,7 +124,9 @@ class Stepper:
                 return self.step(node.parts[0], letter)
             rest = self.table.node(node._replace(running=2 if node.running else 1))
         else:
-            rest = node.parts[0] if node.count == 1 else self.table.node(node._replace(count=node.count - 1))
+            rest = (
+                node.parts[0] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
+            )
         return frozenset([frozenset([rest << 2 | (STRONG if node.strong else 0)])])
 
     def _step_fixpoint(self, node: Node, number: int, letter: Letter) -> Moves:
@@ -134,8 +136,10 @@ class Stepper:
             if node.running and letter.expired >> node.clock & 1:
                 return right
             rest = self.table.node(node._replace(running=2 if node.running else 1))
-        elif node.count > 0:
-            rest = node.parts[1] if node.count == 1 else self.table.node(node._replace(count=node.count - 1))
+        elif node.length > 0:
+            rest = (
+                node.parts[1] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
+            )
         else:
             rest = number
             flags |= PUT_OFF if node.kind == "until" else 0
@@ -147,8 +151,8 @@ class Stepper:
 
 def _at_most(shorter: Node, longer: Node) -> bool:
     """Say whether the first of two bounded fixpoints over the same parts certainly ends no later."""
-    if longer.clock < 0 and longer.count < 0:
+    if longer.clock < 0 and longer.length < 0:
         return True
     if shorter.clock >= 0 and shorter.clock == longer.clock:
         return shorter.running >= longer.running
-    return shorter.clock < 0 and longer.clock < 0 and 0 <= shorter.count <= longer.count
+    return shorter.clock < 0 and longer.clock < 0 and 0 <= shorter.length <= longer.length

@@ -54,7 +54,7 @@ class Node(NamedTuple):
     """One obligation.
 
     `kind` is ``true``, ``false``, ``test`` and ``past`` (`first`: its number; `strong`: its sign), ``and``, ``or``
-    (`parts`), ``next`` (`parts`, `count` ticks, `strong`), ``until`` and ``release`` (`parts`, `count` ticks or -1,
+    (`parts`), ``next`` (`parts`, `length` ticks, `strong`), ``until`` and ``release`` (`parts`, `length` ticks or -1,
     `clock` or -1, `running` 0: not yet, 1: since this tick, 2: since earlier).
     """
 
@@ -62,7 +62,7 @@ class Node(NamedTuple):
     parts: tuple[int, ...] = ()
     first: int = 0
     strong: bool = True
-    count: int = -1
+    length: int = -1
     clock: int = -1
     running: int = 0
 
@@ -96,11 +96,11 @@ class Table:
     period: float
     unroll: int
     names: tuple[str, ...] = ()
-    tests: list[Formula] = field(default_factory=list)
-    past: list[Formula] = field(default_factory=list)
-    clocks: list[int] = field(default_factory=list)
+    tests: list[Formula] = field(default_factory=list[Formula])
+    past: list[Formula] = field(default_factory=list[Formula])
+    clocks: list[int] = field(default_factory=list[int])
     root: int = 0
-    nodes: list[Node] = field(default_factory=list)
+    nodes: list[Node] = field(default_factory=list[Node])
 
     def __post_init__(self) -> None:
         self._number: dict[Node, int] = {}
@@ -142,7 +142,9 @@ class Table:
                 future.add(part)
                 if part.op in PAST:
                     raise FormulaError(
-                        "a past operator ranges over a future one", value=str(part), expected="the past of the past"
+                        "a past operator ranges over a future one",
+                        value=str(part),
+                        expected="the past of the past",
                     )
             if part.op in PAST or part in future or any(arg in timed for arg in part.args):
                 timed.add(part)
@@ -158,7 +160,11 @@ class Table:
         other = {"true": "false", "and": "or", "until": "release"}
         other |= {value: key for key, value in other.items()}
         parts = tuple(self.dual(part) for part in node.parts)
-        strong = node.strong if node.kind in ("and", "or", "until", "release", "true", "false") else not node.strong
+        strong = (
+            node.strong
+            if node.kind in ("and", "or", "until", "release", "true", "false")
+            else not node.strong
+        )
         changed = node._replace(kind=other.get(node.kind, node.kind), parts=parts, strong=strong)
         if node.kind in ("and", "or"):
             changed = changed._replace(parts=tuple(sorted(parts)))
@@ -183,7 +189,9 @@ class Table:
         if op in PAST:
             return self.node(Node("past", first=self._past(formula), strong=positive))
         if op is Op.IMPLIES:
-            return self._join(not positive, [self._build(args[0], not positive), self._build(args[1], positive)])
+            return self._join(
+                not positive, [self._build(args[0], not positive), self._build(args[1], positive)]
+            )
         if op is Op.IFF:
             a, b = args
             return self._join(
@@ -271,7 +279,7 @@ class Table:
         if count > self.unroll:
             clock = self._clock((part, int(strong)), count)
             return self.node(Node("next", (part,), strong=strong, clock=clock))
-        return self.node(Node("next", (part,), strong=strong, count=count))
+        return self.node(Node("next", (part,), strong=strong, length=count))
 
     def _fixpoint(self, kind: str, left: int, right: int, count: int | None) -> int:
         if count == 0 or right in (self.true, self.false):
@@ -282,7 +290,7 @@ class Table:
             return self.node(Node(kind, (left, right)))
         if count > self.unroll:
             return self.node(Node(kind, (left, right), clock=self._clock((left, right), count)))
-        return self.node(Node(kind, (left, right), count=count))
+        return self.node(Node(kind, (left, right), length=count))
 
     def _clock(self, owner: tuple[int, ...], count: int) -> int:
         number = self._clock_number.setdefault((owner, count), len(self.clocks))
@@ -352,9 +360,7 @@ class Table:
         return letter.reshape(-1).astype(np.int64), [tuple(map(bool, row)) for row in distinct.tolist()]
 
 
-def valued(
-    formula: Formula, known: Mapping[str, npt.NDArray[np.bool_]], count: int
-) -> npt.NDArray[np.bool_]:
+def valued(formula: Formula, known: Mapping[str, npt.NDArray[np.bool_]], count: int) -> npt.NDArray[np.bool_]:
     """Return the values of a formula without temporal operators under `count` valuations."""
     if formula.op is Op.PROP:
         return known[formula.name]

@@ -1,4 +1,4 @@
-"""The parser: SPIN's syntax and the usual ASCII forms, with the exact place of every error.
+r"""The parser: SPIN's syntax and the usual ASCII forms, with the exact place of every error.
 
 Loosest first: ``<->``, ``->``, ``||``, ``&&``, the binary temporal operators, then the unary operators, which bind
 tightest. ``->`` and the binary temporal operators group to the right. SPIN itself ranks ``&&``, ``||``, ``->`` and
@@ -7,8 +7,8 @@ there, so the printer always sets parentheses where the two readings differ.
 
 =====================  =========================================
 ``!`` ``~``            not
-``&&`` ``&`` ``/\\``    and
-``||`` ``|`` ``\\/``    or
+``&&`` ``&`` ``/\``     and
+``||`` ``|`` ``\/``     or
 ``->`` ``=>``          implies
 ``<->`` ``<=>``        is equivalent to
 ``[]`` ``<>``          ``G``, ``F``
@@ -31,7 +31,6 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.spec.logic.formula import (
     BOUNDABLE,
     FALSE,
-    MAX_DEPTH,
     RESERVED,
     TRUE,
     Bounds,
@@ -42,7 +41,6 @@ from dubins_traffic.spec.logic.formula import (
     disj,
     interval,
     make,
-    negation,
     prop,
 )
 
@@ -69,10 +67,13 @@ _SPELLINGS: Final = {
     "<>": "F",
     "V": "R",
 }
-_UNARY: Final = {op.value: op for op in (Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)}
-_BINARY: Final = {op.value: op for op in (Op.U, Op.R, Op.W, Op.M, Op.S, Op.T)}
-_RANKS: Final = {"<->": 1, "->": 2, "||": 3, "&&": 4} | dict.fromkeys(_BINARY, 5)
-_TO_THE_RIGHT: Final = frozenset({"->", *_BINARY})
+_CONSTANTS: Final = {"true": TRUE, "1": TRUE, "false": FALSE, "0": FALSE}
+_UNARY: Final = {op.value: op for op in (Op.NOT, Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)}
+_RANKS: Final = {Op.IFF: 1, Op.IMPLIES: 2, Op.OR: 3, Op.AND: 4} | dict.fromkeys(
+    (Op.U, Op.R, Op.W, Op.M, Op.S, Op.T), 5
+)
+_BINARY: Final = {op.value: op for op in _RANKS}
+_TIGHTEST: Final = 6
 _OPERAND: Final = "a proposition, true, false, '(' or a unary operator"
 
 
@@ -82,6 +83,16 @@ class _Token:
     text: str
     meaning: str
     start: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Pending:
+    """An operator that waits for its right part, or an opening parenthesis (without `op`)."""
+
+    token: _Token
+    op: Op | None
+    rank: int
+    bounds: Bounds | None = None
 
 
 def parse(text: str, *, file: str | None = None) -> Formula:
@@ -108,19 +119,24 @@ def parse(text: str, *, file: str | None = None) -> Formula:
 
 
 class _Parser:
-    """Reads one text by operator precedence; parts of one rank are collected in a loop, not by recursion."""
+    """Reads one text by operator precedence, with stacks of its own in place of recursion."""
 
     def __init__(self, text: str, file: str | None) -> None:
         self._text = text
         self._file = file
         self._tokens = self._split()
         self._next = 0
+        self._parts: list[Formula] = []
+        self._pending: list[_Pending] = []
 
     def whole(self) -> Formula:
-        formula = self._expression(1, 0)
-        if self._ahead().kind != "end":
-            self._unexpected("an operator or the end" if self._ahead().text != ")" else "no more ')' than '('")
-        return formula
+        while True:
+            self._operand()
+            while self._ahead().text == ")":
+                self._close()
+            if self._ahead().kind == "end":
+                return self._finish()
+            self._operator()
 
     def _split(self) -> list[_Token]:
         tokens: list[_Token] = []
@@ -145,72 +161,81 @@ class _Parser:
         self._next += 1
         return token
 
-    def _expression(self, rank: int, depth: int) -> Formula:
-        """Read operands joined by operators of at least `rank`."""
-        if depth > MAX_DEPTH:
-            self._fail("nested too deeply", self._ahead().start, None, f"at most {MAX_DEPTH} levels")
-        left = self._operand(depth)
+    def _operand(self) -> None:
+        """Read unary operators and opening parentheses up to and with a proposition or constant."""
         while True:
             token = self._ahead()
-            found = _RANKS.get(token.meaning, 0) if token.kind in ("sign", "word") else 0
-            if found < rank or found == 0:
-                return left
-            left = self._joined(left, token, found, depth)
-
-    def _joined(self, left: Formula, token: _Token, rank: int, depth: int) -> Formula:
-        sign = token.meaning
-        if sign in ("&&", "||"):
-            parts = [left]
-            while self._ahead().meaning == sign:
+            if token.text == "(":
+                self._pending.append(_Pending(self._take(), None, 0))
+            elif token.meaning in _UNARY:
                 self._take()
-                parts.append(self._expression(rank + 1, depth + 1))
-            return self._built(token, lambda: conj(*parts) if sign == "&&" else disj(*parts))
+                op = _UNARY[token.meaning]
+                self._pending.append(_Pending(token, op, _TIGHTEST, self._bounds(op)))
+            else:
+                break
+        found = _CONSTANTS.get(token.text)
+        if found is None:
+            if token.kind != "word" or token.text in RESERVED:
+                self._unexpected(_OPERAND)
+            found = prop(token.text)
         self._take()
-        bounds = self._bounds(_BINARY.get(sign))
-        right = self._expression(rank if sign in _TO_THE_RIGHT else rank + 1, depth + 1)
-        op = _BINARY.get(sign) or Op(sign)
-        return self._built(token, lambda: make(op, (left, right), bounds=bounds))
+        self._parts.append(found)
 
-    def _operand(self, depth: int) -> Formula:
-        """Read unary operators and what they apply to."""
-        prefix: list[tuple[_Token, Op, Bounds | None]] = []
-        while self._ahead().meaning == "!" or self._ahead().meaning in _UNARY:
-            token = self._take()
-            op = Op.NOT if token.meaning == "!" else _UNARY[token.meaning]
-            prefix.append((token, op, self._bounds(op)))
-        formula = self._atom(depth)
-        for token, op, bounds in reversed(prefix):
-            formula = self._apply(token, op, formula, bounds)
-        return formula
-
-    def _apply(self, token: _Token, op: Op, part: Formula, bounds: Bounds | None) -> Formula:
-        return self._built(
-            token, lambda: negation(part) if op is Op.NOT else make(op, (part,), bounds=bounds)
-        )
-
-    def _atom(self, depth: int) -> Formula:
+    def _operator(self) -> None:
         token = self._ahead()
-        if token.text in ("true", "1"):
-            self._take()
-            return TRUE
-        if token.text in ("false", "0"):
-            self._take()
-            return FALSE
-        if token.kind == "word" and token.text not in RESERVED:
-            self._take()
-            return prop(token.text)
-        if token.text == "(":
-            return self._parenthesised(depth)
-        self._unexpected(_OPERAND)
-
-    def _parenthesised(self, depth: int) -> Formula:
-        opening = self._take()
-        inner = self._expression(1, depth + 1)
-        if self._ahead().text != ")":
-            line, column = _place(self._text, opening.start)
-            self._unexpected(f"an operator or ')' for the '(' at line {line}, column {column}")
+        op = _BINARY.get(token.meaning)
+        if op is None:
+            self._unexpected(self._wanted())
         self._take()
-        return inner
+        rank = _RANKS[op]
+        while self._pending and (
+            self._pending[-1].rank > rank or (self._pending[-1].rank == rank and op is Op.IFF)
+        ):
+            self._reduce()
+        self._pending.append(_Pending(token, op, rank, self._bounds(op)))
+
+    def _close(self) -> None:
+        while self._pending and self._pending[-1].op is not None:
+            self._reduce()
+        if not self._pending:
+            self._unexpected("no more ')' than '('")
+        self._pending.pop()
+        self._take()
+
+    def _finish(self) -> Formula:
+        while self._pending:
+            if self._pending[-1].op is None:
+                self._unexpected(self._wanted())
+            self._reduce()
+        return self._parts.pop()
+
+    def _wanted(self) -> str:
+        """Say what may stand behind a part."""
+        for pending in reversed(self._pending):
+            if pending.op is None:
+                line, column = _place(self._text, pending.token.start)
+                return f"an operator or ')' for the '(' at line {line}, column {column}"
+        return "an operator or the end"
+
+    def _reduce(self) -> None:
+        """Apply the last pending operator; all of a chain of && or of || at once."""
+        last = self._pending.pop()
+        right = self._parts.pop()
+        if last.rank == _TIGHTEST:
+            self._parts.append(self._built(last, (right,)))
+            return
+        parts = [right, self._parts.pop()]
+        if last.op in (Op.AND, Op.OR):
+            while self._pending and self._pending[-1].op is last.op:
+                last = self._pending.pop()
+                parts.append(self._parts.pop())
+        self._parts.append(self._built(last, tuple(reversed(parts))))
+
+    def _built(self, pending: _Pending, parts: tuple[Formula, ...]) -> Formula:
+        op = pending.op or Op.AND
+        if op is Op.AND or op is Op.OR:
+            return self._placed(pending.token, lambda: conj(*parts) if op is Op.AND else disj(*parts))
+        return self._placed(pending.token, lambda: make(op, parts, bounds=pending.bounds))
 
     def _bounds(self, op: Op | None) -> Bounds | None:
         opening = self._ahead()
@@ -223,7 +248,7 @@ class _Parser:
         self._demand(",")
         high = self._duration()
         self._demand("]")
-        return self._built(opening, lambda: interval((low, high)))
+        return self._placed(opening, lambda: interval((low, high)))
 
     def _duration(self) -> float:
         if self._ahead().kind != "number":
@@ -238,7 +263,7 @@ class _Parser:
             self._unexpected(f"'{text}'")
         self._take()
 
-    def _built(self, token: _Token, build: Callable[[], T]) -> T:
+    def _placed(self, token: _Token, build: Callable[[], T]) -> T:
         """Return what `build` makes; its errors get the place of `token`."""
         try:
             return build()

@@ -1,81 +1,121 @@
 """Writing formulas: SPIN's syntax and the usual ASCII forms, with as few parentheses as both readings allow.
 
-What these functions return, `parse` reads back as the same formula.
+What `to_spin` and `to_ascii` return, `parse` reads back as the same formula.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
-from dubins_traffic.spec.logic.formula import Formula, Op, subformulas
+from dubins_traffic.spec.logic.formula import Bounds, Formula, Op, subformulas
 
 _JUNCTIONS: Final = (Op.AND, Op.OR, Op.IMPLIES, Op.IFF)
-_SPIN: Final = {Op.F: "<>", Op.G: "[]", Op.R: "V"}
-_ASCII: Final = {Op.AND: "&", Op.OR: "|"}
+
+
+class Brackets(Enum):
+    """Which parentheses are left out."""
+
+    RANKED = "ranked"
+    """Those that the ranks of ``&``, ``|``, ``->`` and ``<->`` make needless."""
+    MIXED_NEVER = "mixed never"
+    """As SPIN needs it: none around parts of ``&``, ``|``, ``->`` and ``<->`` that are none of these themselves."""
+    ALL = "all"
+    """None: every operator has its own."""
+
+
+def number(value: float) -> str:
+    """Return a number of seconds as short as it reads back exactly."""
+    return str(int(value)) if value.is_integer() and value < 1e15 else repr(value)
+
+
+def _in_brackets(bounds: Bounds) -> str:
+    return f"[{number(bounds[0])},{number(bounds[1])}]"
+
+
+@dataclass(frozen=True)
+class Style:
+    """How formulas are spelled.
+
+    Attributes
+    ----------
+    signs : mapping of Op to str
+        Operators and constants that are not spelled as their values.
+    brackets : Brackets
+        Which parentheses are left out.
+    bounds : callable
+        Spells the bounds behind an operator.
+    name : callable
+        Spells a proposition.
+    tight : bool
+        Whether the sign of the negation stands right before its part.
+    """
+
+    signs: Mapping[Op, str]
+    brackets: Brackets = Brackets.RANKED
+    bounds: Callable[[Bounds], str] = _in_brackets
+    name: Callable[[str], str] = str
+    tight: bool = True
+
+
+SPIN: Final = Style({Op.F: "<>", Op.G: "[]", Op.R: "V"}, Brackets.MIXED_NEVER)
+ASCII: Final = Style({Op.AND: "&", Op.OR: "|"})
 
 
 def to_spin(formula: Formula) -> str:
     """Return `formula` as SPIN writes it: ``[] (a -> <> b)``.
 
-    SPIN ranks all boolean operators equally, so parentheses stand wherever two of them meet.
-    Operators that SPIN lacks (past, bounds, W, M) keep their letters; `spin_form` rewrites those it can.
+    SPIN ranks all boolean operators equally, so parentheses stand wherever two of them meet. Operators that SPIN
+    lacks (past, bounds, W, M) keep their letters; `exports.spin` rewrites those it can.
     """
-    return written(formula, _SPIN, mixed=False)
+    return written(formula, SPIN)
 
 
 def to_ascii(formula: Formula) -> str:
     """Return `formula` in letters: ``G (a -> F b)``."""
-    return written(formula, _ASCII, mixed=True)
+    return written(formula, ASCII)
 
 
-def number(value: float) -> str:
-    """Return a number of seconds as short as it reads back exactly, never in exponents if that is short."""
-    return str(int(value)) if value.is_integer() and value < 1e15 else repr(value)
-
-
-def written(formula: Formula, signs: Mapping[Op, str], *, mixed: bool) -> str:
-    """Return `formula` with the operators spelled as in `signs`, else by their letters.
-
-    Parameters
-    ----------
-    mixed : bool
-        Whether `&` inside `|`, and both inside `->`, may do without parentheses.
-    """
+def written(formula: Formula, style: Style) -> str:
+    """Return `formula` spelled in a style."""
     done: dict[Formula, str] = {}
     for part in subformulas(formula):
         inner = [
-            done[arg] if _bare(part, place, arg, mixed) else f"({done[arg]})"
+            done[arg] if _bare(part, place, arg, style.brackets) else f"({done[arg]})"
             for place, arg in enumerate(part.args)
         ]
-        done[part] = _one(part, inner, signs)
+        done[part] = _one(part, inner, style)
     return done[formula]
 
 
-def _one(part: Formula, inner: list[str], signs: Mapping[Op, str]) -> str:
+def _one(part: Formula, inner: list[str], style: Style) -> str:
     if part.op is Op.PROP:
-        return part.name
-    sign = signs.get(part.op, part.op.value)
+        return style.name(part.name)
+    sign = style.signs.get(part.op, part.op.value)
     if part.bounds is not None:
-        sign += f"[{number(part.bounds[0])},{number(part.bounds[1])}]"
+        sign += style.bounds(part.bounds)
     if not inner:
         return sign
-    if part.op is Op.NOT:
+    if part.op is Op.NOT and style.tight:
         return sign + inner[0]
     if len(inner) == 1:
         return f"{sign} {inner[0]}"
     return f" {sign} ".join(inner)
 
 
-def _bare(whole: Formula, place: int, part: Formula, mixed: bool) -> bool:
+def _bare(whole: Formula, place: int, part: Formula, brackets: Brackets) -> bool:
     """Say whether `part` needs no parentheses as the part number `place` of `whole`."""
+    if brackets is Brackets.ALL:
+        return not part.args
     if len(part.args) < 2:
         return True
     if whole.op not in _JUNCTIONS:
         return False
     if part.op not in _JUNCTIONS:
         return True
-    if not mixed:
+    if brackets is Brackets.MIXED_NEVER:
         return False
     if whole.op is Op.IMPLIES and part.op is Op.IMPLIES:
         return place == 1

@@ -48,7 +48,9 @@ def robustness(formula: Formula, signals: Mapping[str, Floats], period: float) -
     for part in subformulas(formula):
         if part.op is Op.PROP:
             if part.name not in signals:
-                raise FormulaError("no signal for a proposition", value=part.name, expected="one of the signals")
+                raise FormulaError(
+                    "no signal for a proposition", value=part.name, expected="one of the signals"
+                )
             values[part] = np.asarray(signals[part.name], dtype=np.float64)
         elif part.op in (Op.TRUE, Op.FALSE):
             values[part] = np.full(shape, np.inf if part.op is Op.TRUE else -np.inf)
@@ -108,9 +110,9 @@ def _future(op: Op, first: Floats, last: Floats, span: tuple[int, ...] | None) -
 
 
 def _until(first: Floats, last: Floats) -> Floats:
-    out = np.empty(np.broadcast_shapes(first.shape, last.shape))
-    held = np.full(out.shape[:-1], -np.inf)
-    for frame in range(out.shape[-1] - 1, -1, -1):
+    out = np.empty_like(last)
+    held = np.full(last.shape[:-1], -np.inf)
+    for frame in range(last.shape[-1] - 1, -1, -1):
         held = np.maximum(last[..., frame], np.minimum(first[..., frame], held))
         out[..., frame] = held
     return out

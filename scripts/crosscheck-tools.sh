@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
+# stormpy (carries Spot), rtamt, TuLiP; and Debian's spin. What is there already is left alone.
+# Where something can't be installed it says so in one line; the status is 0 either way.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+folder=build/crosscheck
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+environment() { # name, module, packages...
+  local name=$1 module=$2 python=$folder/$1/bin/python
+  shift 2
+  if [ -x "$python" ] && "$python" -c "import $module" >/dev/null 2>&1; then return; fi
+  if .venv/bin/python -m venv --clear "$folder/$name" >"$log" 2>&1 &&
+    "$python" -m pip install --quiet --disable-pip-version-check "$@" >>"$log" 2>&1 &&
+    "$python" -c "import $module" >>"$log" 2>&1; then
+    echo "crosscheck-tools: installed $name"
+  else
+    rm -rf "${folder:?}/$name"
+    echo "crosscheck-tools: could not install $name: $(tail -n 1 "$log")"
+  fi
+}
+
+mkdir -p "$folder"
+environment stormpy stormpy 'stormpy==2.0.0'
+environment rtamt rtamt 'rtamt==0.4.10' 'setuptools<81'
+environment tulip tulip.spec.form 'tulip==1.4.0' 'setuptools<81' wheel
+
+if ! command -v spin >/dev/null 2>&1; then
+  as_root=""
+  [ "$(id -u)" = 0 ] || as_root="sudo -n"
+  if command -v apt-get >/dev/null 2>&1 && $as_root apt-get update >"$log" 2>&1 &&
+    $as_root env DEBIAN_FRONTEND=noninteractive \
+      apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends spin >>"$log" 2>&1; then
+    echo "crosscheck-tools: installed spin"
+  else
+    echo "crosscheck-tools: could not install spin: $(tail -n 1 "$log")"
+  fi
+fi
