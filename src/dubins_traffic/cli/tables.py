@@ -28,7 +28,7 @@ CELLS: dict[str, Callable[[Score], str]] = {
 JUDGED: dict[str, Callable[[Score], str]] = {
     "verdict": lambda score: "-" if score.verdict is None else score.verdict.verdict.value,
 }
-"""What is shown beside where a score has a verdict."""
+"""What is shown where a score has a verdict, in place of the time off the road, which is one of the rules."""
 
 
 def show(sheet: ScoreSheet, *, json: bool) -> None:
@@ -74,7 +74,8 @@ def score_table(sheet: ScoreSheet) -> Table:
 
 def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
     judged = any(score.verdict is not None for score in scores)
-    return {**JUDGED, **CELLS} if judged else CELLS
+    rest = {heading: cell for heading, cell in CELLS.items() if heading != "off road"}
+    return {**JUDGED, **rest} if judged else CELLS
 
 
 def _narrow(text: str, width: int = 0) -> str:
