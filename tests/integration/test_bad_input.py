@@ -294,7 +294,23 @@ OPTIONS: dict[str, tuple[list[str], list[str]]] = {
     "option without value": (["run", "demo", "--seed"], ["--seed"]),
     "seed a word": (["run", "demo", "--seed", "lucky"], ["--seed", "lucky", "integer"]),
     "seed negative": (["instance", "demo", "--seed", "-1"], ["--seed", "-1", "equal to 0"]),
-    "seed huge": (["instance", "demo", "--seed", str(2**64)], ["seed", str(2**64), "<"]),
+    "seed huge": (
+        ["instance", "demo", "--seed", str(2**64)],
+        ["seed", str(2**64), "<"],
+    ),
+    "seed huge for a network": (
+        ["network", "--intersections", "4", "--segments", "3", "--seed", "9" * 40],
+        ["seed", "9" * 40, "<"],
+    ),
+    "trial huge": (["instance", "demo", "--trial", "9" * 40], ["trial", "9" * 40, "<"]),
+    "more trials than can be": (
+        ["run", "demo", "--trials", "9" * 40],
+        ["--trials", "9" * 30, "at most 1000000"],
+    ),
+    "repeated too often": (
+        ["run", "good.mcap", "--repeat", str(10**9)],
+        ["--repeat", str(10**9), "at most 1000000"],
+    ),
     "trial negative": (["instance", "demo", "--trial", "-1"], ["--trial", "-1"]),
     "no trials asked for": (["run", "demo", "--trials", "0"], ["--trials", "0"]),
     "no jobs": (["run", "demo", "--jobs", "0"], ["--jobs", "0"]),

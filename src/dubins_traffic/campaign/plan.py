@@ -22,6 +22,7 @@ from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.simulators import registry as simulators
 
 DEFAULT_CONTROLLER = "lanes"
+MOST_RUNS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +101,11 @@ def plan(
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
     if isinstance(found, Configuration):
         configuration = found
-        jobs = _drawn(found, controller, found.number_trials if trials is None else trials, seed or 0)
+        count = found.number_trials if trials is None else trials
+        _check_count(count, repeat)
+        jobs = _drawn(found, controller, count, seed or 0)
     else:
+        _check_count(1, repeat)
         configuration = None
         instance = found.instance if isinstance(found, Record) else found
         other_seed = None if seed == instance.seed else seed
@@ -134,7 +138,11 @@ def _refuse(source: str, options: dict[str, object]) -> None:
     for name, value in options.items():
         if value is not None:
             raise InputError(
-                "belongs to a configuration; this is one trial", file=source, field=name, value=value
+                "is for configurations; this is one trial",
+                file=source,
+                field=name,
+                value=value,
+                expected="a trials configuration, or none of it",
             )
 
 
@@ -143,6 +151,14 @@ def _check_simulator(source: str, name: str) -> None:
         simulators.load(name).close()
     except InputError as error:
         raise error.within(file=source) from None
+
+
+def _check_count(trials: int, repeat: int) -> None:
+    if trials < 1 or repeat < 1 or trials * repeat > MOST_RUNS:
+        expected = f"both at least 1, and at most {MOST_RUNS} runs in all"
+        raise InputError(
+            "not a number of runs", file="--trials, --repeat", value=(trials, repeat), expected=expected
+        )
 
 
 def _check_deadline(deadline: float | None) -> None:
@@ -160,13 +176,11 @@ def _data_file(path: Path, overwrite: bool) -> Path:
 
 
 def _folder(folder: Path) -> Path:
-    expected = "a folder that can be written, or a place for one"
+    expected = "a folder, or a place for one"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"can't hold records ({error.strerror})", file=str(folder), expected=expected
         ) from None
-    if not os.access(folder, os.W_OK):
-        raise InputError("can't hold records (no permission)", file=str(folder), expected=expected)
     return folder

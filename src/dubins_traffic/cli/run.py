@@ -56,7 +56,11 @@ def run(
     seed: Annotated[
         int | None,
         typer.Option(
-            "--seed", metavar="S", min=0, help="What all random numbers follow from.", show_default="0"
+            "--seed",
+            metavar="S",
+            min=0,
+            help="What all random numbers follow from.",
+            show_default="0",
         ),
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")] = 1,

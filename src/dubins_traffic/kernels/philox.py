@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dubins_traffic.errors import InputError
+
 if TYPE_CHECKING:
     from typing import Any
 
@@ -21,6 +23,7 @@ W0 = np.uint64(0x9E3779B9)
 W1 = np.uint64(0xBB67AE85)
 LOW = np.uint64(0xFFFFFFFF)
 HALF = np.uint64(32)
+SEEDS = 2**64
 
 
 def philox4x32(c0: Any, c1: Any, c2: Any, c3: Any, k0: Any, k1: Any) -> tuple[Any, Any, Any, Any]:
@@ -46,6 +49,11 @@ class Draws:
     stream : int
         What is drawn: each purpose has a stream of its own, 0 <= stream < 2**32.
 
+    Raises
+    ------
+    InputError
+        If the seed is out of range.
+
     Notes
     -----
     The counter is (trial, 0xFFFFFFFF, position, stream): cars have numbers below 0xFFFFFFFF, so these numbers
@@ -53,6 +61,10 @@ class Draws:
     """
 
     def __init__(self, seed: int, trial: int, stream: int) -> None:
+        if not 0 <= seed < SEEDS:
+            raise InputError(
+                "not a seed", field="seed", value=seed, expected=f"an integer >= 0 and < {SEEDS}"
+            )
         self._key = (np.uint64(seed & 0xFFFFFFFF), np.uint64(seed >> 32))
         self._trial = np.uint64(trial)
         self._stream = np.uint64(stream)
