@@ -63,6 +63,7 @@ class Lanes:
         self._closed: dict[int, float] = {}
         self._graph = LaneGraph(problem.network, self._maker.turn_cost)
         self._round = self._find_round()
+        self._roads = pack([problem.network], [2.0 * problem.car.w])
         self._desk = None
 
     def act(self, observation: Observation) -> Command:
@@ -80,7 +81,7 @@ class Lanes:
         for car in observation.others:
             others[car.index - 1, :O_STILL] = (*car.pose, *car.twist)
             others[car.index - 1, O_SEEN] = 1.0
-        decide(desk)
+        decide(desk, self._roads)
         if desk.blocker[0] != NOBODY:
             self._detour(observation, int(desk.blocker[0]))
         speed, yaw_rate = desk.command[0].tolist()
@@ -125,7 +126,6 @@ class Lanes:
             car=row,
             part=obstacles.part,
             part_off=obstacles.off,
-            roads=pack([problem.network], [2.0 * problem.car.w]),
             net=np.zeros(1, dtype=np.int64),
             sample=np.zeros((SAMPLES, SAMPLE_FIELDS)),
             command=np.zeros((1, 2)),

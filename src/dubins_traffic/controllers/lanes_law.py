@@ -89,8 +89,8 @@ class Desk(NamedTuple):
     `path` (rows, paths.FIELDS): all trials' paths; `span` (B, 3): first row, end, and number of the row after the
     last; `row` (B,): the row a car is on. `memory` (B, MEMORY_FIELDS), `ego` (B, 4): pose; `others`
     (B, N, gaps.OTHER_FIELDS); `car` (B, CAR_FIELDS): body, bounds, radius of discs, period, gap to follow at.
-    `part` and `part_off`: obstacles as in `cars.tables`. `roads` and `net` (B,): networks, as in
-    `roads.table`. `sample`: a workspace. `command` (B, 2): the answer.
+    `part` and `part_off`: obstacles as in `cars.tables`. `net` (B,): number of the network in
+    the table of roads. `sample`: a workspace. `command` (B, 2): the answer.
     `blocker` (B,): who has kept the car waiting for too long (a car, -1 - part, or NOBODY): a new path is asked for.
     """
 
@@ -103,7 +103,6 @@ class Desk(NamedTuple):
     car: Floats
     part: Floats
     part_off: Ints
-    roads: RoadTable
     net: Ints
     sample: Floats
     command: Floats
@@ -111,7 +110,7 @@ class Desk(NamedTuple):
 
 
 @jit
-def decide(desk: Desk) -> None:
+def decide(desk: Desk, roads: RoadTable) -> None:
     """Choose the commands of all trials of a batch."""
     for b in range(desk.span.shape[0]):
         desk.blocker[b] = NOBODY
@@ -122,7 +121,7 @@ def decide(desk: Desk) -> None:
             speed = _speed_in_traffic(desk, b)
         wanted = speed
         speed, yaw_rate = _follow(desk, b, speed)
-        speed, yaw_rate = _last_look(desk, b, speed, yaw_rate)
+        speed, yaw_rate = _last_look(desk, roads, b, speed, yaw_rate)
         _note_progress(desk, b, wanted, speed, yaw_rate)
         desk.command[b, 0] = speed
         desk.command[b, 1] = yaw_rate
@@ -475,32 +474,32 @@ def _shuffle(desk: Desk, b: int, yaw_rate: float) -> tuple[float, float]:
 
 
 @jit
-def _last_look(desk: Desk, b: int, speed: float, yaw_rate: float) -> tuple[float, float]:
+def _last_look(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> tuple[float, float]:
     """Return the command, or a turn in place, or standing: the first that leads into no contact and off no road."""
-    if _is_safe(desk, b, speed, yaw_rate):
+    if _is_safe(desk, roads, b, speed, yaw_rate):
         return speed, yaw_rate
     if desk.car[b, SLOWEST] > 0.0:
         return desk.car[b, SLOWEST], yaw_rate
-    if desk.car[b, RADIUS] == 0.0 and _is_safe(desk, b, 0.0, yaw_rate):
+    if desk.car[b, RADIUS] == 0.0 and _is_safe(desk, roads, b, 0.0, yaw_rate):
         return 0.0, yaw_rate
     return 0.0, 0.0
 
 
 @jit
-def _stays_on_road(desk: Desk, b: int, speed: float, yaw_rate: float) -> bool:
+def _stays_on_road(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
     x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
     nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, desk.car[b, PERIOD])
-    edge = desk.roads.half_width[desk.net[b]] - VERGE
-    _, d2 = nearest_segment(desk.roads, desk.net[b], nx, ny)
+    edge = roads.half_width[desk.net[b]] - VERGE
+    _, d2 = nearest_segment(roads, desk.net[b], nx, ny)
     if d2 <= edge * edge:
         return True
-    _, before = nearest_segment(desk.roads, desk.net[b], x, y)
+    _, before = nearest_segment(roads, desk.net[b], x, y)
     return d2 < before
 
 
 @jit
-def _is_safe(desk: Desk, b: int, speed: float, yaw_rate: float) -> bool:
-    if speed != 0.0 and not _stays_on_road(desk, b, speed, yaw_rate):
+def _is_safe(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
+    if speed != 0.0 and not _stays_on_road(desk, roads, b, speed, yaw_rate):
         return False
     car = desk.car[b]
     period = car[PERIOD]

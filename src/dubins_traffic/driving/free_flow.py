@@ -50,22 +50,14 @@ class FreeFlow:
         return self.speed * duration
 
     def rounds(self, duration: float) -> int:
-        """Return the rounds completed in `duration` seconds: as in scoring, one each time every goal has been passed
-        since the last.
+        """Return the rounds completed in `duration` seconds: one when every goal has been passed for the first time,
+        and one for every round's length driven after that.
         """
         if not self.arrivals:
             return 0
-        goals = {goal for _, goal in self.arrivals}
-        missing, rounds, lap = set(goals), 0, 0
-        while True:
-            for far, goal in self.arrivals:
-                if far + lap * self.round_length > self.distance(duration):
-                    return rounds
-                missing.discard(goal)
-                if not missing:
-                    rounds += 1
-                    missing = set(goals)
-            lap += 1
+        first = {goal: far for far, goal in reversed(self.arrivals)}
+        beyond = self.distance(duration) - max(first.values())
+        return 0 if beyond < 0.0 else 1 + int(beyond / self.round_length)
 
 
 def free_flow(instance: Instance) -> FreeFlow:
