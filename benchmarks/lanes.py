@@ -1,6 +1,6 @@
 """How `lanes` drives: random instances alone and among wandering cars, against free flow.
 
-    python -m benchmarks.lanes [INSTANCES] [JOBS]
+    python -m benchmarks.lanes [INSTANCES [JOBS [FIRST]]]
 
 Each instance is a random network of 6 to 60 intersections (anything from a tree to as many segments as a grid has),
 1 to 4 goals and 1 to 8 e-agents of the kind `wander`. It is run without e-agents for ten free-flow rounds, and with
@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.table import Row, show
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.driving.free_flow import free_flow
 from dubins_traffic.kernels.philox import Draws
@@ -37,7 +38,7 @@ LOOK = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Drive:
     """One instance: what `lanes` did alone (rounds, seconds off the road) and among others."""
 
     number: int
@@ -56,12 +57,14 @@ class StandingWhileFree:
     """Measures the longest time for which the ego stood though the way ahead was free."""
 
     def begin(self, instance: Instance) -> None:
+        """Begin a trial."""
         self._problem = instance.problem
         self._longest = 0
         self._run = 0
         self._rate = instance.problem.rate
 
     def frames(self, frames: Frames) -> None:
+        """Look at a block of frames."""
         for f in range(len(frames)):
             x, y = frames.x[f], frames.y[f]
             stands = abs(frames.speed[f, 0]) < 0.05
@@ -71,7 +74,7 @@ class StandingWhileFree:
             else:
                 self._run = 0
 
-    def end(self, ending: Ending) -> None:
+    def end(self, ending: Ending) -> None:  # noqa: ARG002  # the protocol's
         self._seconds = self._longest / self._rate
 
     def result(self) -> float:
@@ -129,7 +132,7 @@ def instance(number: int, seed: int = 2016) -> Instance:
     return draw(load_config(configuration), seed, number)
 
 
-def measure(number: int) -> Row:
+def drive(number: int) -> Drive:
     """Run `lanes` on an instance, alone and among others."""
     whole = instance(number)
     flow = free_flow(whole)
@@ -140,7 +143,7 @@ def measure(number: int) -> Row:
     watch = StandingWhileFree()
     second = run_trial(whole, "lanes", sinks=[watch]).score
     faults = [collision for collision in second.collisions if collision.at_fault]
-    return Row(
+    return Drive(
         number,
         len(problem.network.intersections),
         len(whole.e_agents),
@@ -154,39 +157,48 @@ def measure(number: int) -> Row:
     )
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the bar's table."""
-    share = [row.rounds / row.free_rounds for row in rows]
-    lines = [
-        ("seconds off the road, all instances", f"{sum(row.off_road for row in rows):.3f}", "0"),
-        ("collisions at fault, all instances", str(sum(row.at_fault for row in rows)), "0"),
-        ("alone: rounds per free-flow round, least", f"{min(share):.3f}", ">= 0.9"),
-        ("alone: rounds per free-flow round, median", f"{statistics.median(share):.3f}", ""),
-        (
-            "among others: distance per free-flow distance, median",
-            f"{statistics.median(row.distance for row in rows):.3f}",
+def bars(drives: Sequence[Drive]) -> list[Row]:
+    """Return the table of the bars."""
+    off_road = sum(one.off_road for one in drives)
+    faults = sum(one.at_fault for one in drives)
+    shares = [one.rounds / one.free_rounds for one in drives]
+    distances = [one.distance for one in drives]
+    distance, stood = statistics.median(distances), max(one.stood_free for one in drives)
+    rounds = f"{min(shares):.3f} (median {statistics.median(shares):.3f})"
+    return [
+        Row("seconds off the road, all instances", f"{off_road:.3f}", "0", off_road == 0),
+        Row("collisions at fault, all instances", str(faults), "0", faults == 0),
+        Row("alone: least rounds per free-flow round", rounds, ">= 0.9", min(shares) >= 0.9),
+        Row(
+            "among others: median distance per free-flow distance",
+            f"{distance:.3f} (least {min(distances):.3f})",
             ">= 0.5",
+            distance >= 0.5,
         ),
-        ("among others: the same, least", f"{min(row.distance for row in rows):.3f}", ""),
-        ("stood while free, longest, seconds", f"{max(row.stood_free for row in rows):.1f}", "< 10"),
+        Row("longest time stood while the way was free", f"{stood:.1f} s", "< 10 s", stood < 10.0),
     ]
-    return "\n".join(f"{name:<56}{value:>10}   {bar}" for name, value, bar in lines)
+
+
+def drives(count: int = 200, jobs: int = 2, first: int = 0) -> list[Drive]:
+    """Run `count` instances in `jobs` processes."""
+    with ProcessPoolExecutor(jobs) as pool:
+        return list(pool.map(drive, range(first, first + count)))
+
+
+def measure() -> list[Row]:
+    """Run all instances and return the table of the bars."""
+    return bars(drives())
 
 
 def main() -> None:
-    """Print the table."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
-    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
-    with ProcessPoolExecutor(jobs) as pool:
-        rows = list(pool.map(measure, range(first, first + count)))
-    for row in rows:
-        if row.off_road or row.at_fault or row.rounds < 0.9 * row.free_rounds or row.stood_free >= 10.0:
-            print(row)
-    for row in sorted(rows, key=lambda row: row.distance)[:12]:
-        print(f"least distance: {row}")
-    print(f"lanes on {count} random instances")
-    print(table(rows))
+    """Print what is remarkable, and the table."""
+    found = drives(*(int(argument) for argument in sys.argv[1:4]))
+    for one in found:
+        if one.off_road or one.at_fault or one.rounds < 0.9 * one.free_rounds or one.stood_free >= 10.0:
+            print(one)
+    for one in sorted(found, key=lambda one: one.distance)[:12]:
+        print(f"least distance: {one}")
+    show(f"lanes on {len(found)} random instances", bars(found))
 
 
 if __name__ == "__main__":

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic import files
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic import files
 from dubins_traffic.roads import rnd
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.rnd import Segment
