@@ -74,11 +74,12 @@ class StandingWhileFree:
             else:
                 self._run = 0
 
-    def end(self, ending: Ending) -> None:  # noqa: ARG002  # the protocol's
-        self._seconds = self._longest / self._rate
+    def end(self, _: Ending) -> None:
+        """Nothing is left to do."""
 
     def result(self) -> float:
-        return self._seconds
+        """Return the seconds."""
+        return self._longest / self._rate
 
 
 def way_is_free(problem: Problem, x: Any, y: Any, c: float, s: float) -> bool:
@@ -132,11 +133,11 @@ def instance(number: int, seed: int = 2016) -> Instance:
     return draw(load_config(configuration), seed, number)
 
 
-def drive(number: int) -> Drive:
-    """Run `lanes` on an instance, alone and among others."""
-    whole = instance(number)
+def drive(number: int, rounds: int = ROUNDS, seconds: float = DURATION) -> Drive:
+    """Run `lanes` on an instance, alone for so many rounds and among others for so many seconds."""
+    whole = replace(instance(number), duration=seconds)
     flow = free_flow(whole)
-    duration = math.ceil(flow.arrivals[0][0] / flow.speed + ROUNDS * flow.round_time)
+    duration = math.ceil(flow.arrivals[0][0] / flow.speed + rounds * flow.round_time)
     problem = replace(whole.problem, e_agents=())
     alone = replace(whole, problem=problem, e_agents=(), starts=whole.starts[:1], duration=float(duration))
     first = run_trial(alone, "lanes").score
