@@ -33,7 +33,7 @@ def obstacle_narrows(
 
     An obstacle's lateral interval is the hull of its parts within that reach of the lane; its edges are clipped.
     """
-    base = obstacles.base[b]
+    base: int = obstacles.base[b]
     if base < 0:
         return False
     begin = max(near, 0.0)

@@ -151,7 +151,7 @@ def _locate(
     Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them.
     """
     real = rules.real
-    net = rules.whole[b, NET]
+    net: int = rules.whole[b, NET]
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
     segment, off2 = nearest_segment(t, net, x, y)
@@ -239,7 +239,7 @@ def _entry(
     """Return `bits` with the flags of the disc that the body meets; an entry is judged on the flags `before`."""
     if crosses < 0:
         return bits & ~BREACH3
-    net = rules.whole[b, NET]
+    net: int = rules.whole[b, NET]
     crossing = t.degree[t.vert_off[net] + crosses] >= rules.whole[b, CROSSING_DEGREE]
     if crosses != crossed:
         bits &= ~BREACH3
@@ -303,7 +303,7 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
 
     Sets CLEAR too, which needs who crosses what.
     """
-    net = rules.whole[b, NET]
+    net: int = rules.whole[b, NET]
     real = rules.real
     mark = memory.mark
     gap2 = memory.measure[b, n, GAP2]
@@ -347,7 +347,7 @@ def _queue(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: La
     """Order the queue of which car n is the head of the list, and flag its cars."""
     if labels.bits[b, n] & STOPPED == 0:
         return
-    net = rules.whole[b, NET]
+    net: int = rules.whole[b, NET]
     v = lane_end(t, net, labels.lane[b, n])
     if memory.head[v, QUEUE] != n:
         return
@@ -418,7 +418,7 @@ def _block(
     if lane < 0:
         labels.bits[b, n] = bits & ~(OVERTAKING | LEFT)
         return
-    net = rules.whole[b, NET]
+    net: int = rules.whole[b, NET]
     tx, ty = lane_direction(t, net, lane)
     own = memory.measure[b, n, PROGRESS]
     width = real[b, LANE_WIDTH]
