@@ -25,7 +25,7 @@ environment() { # name, module, packages...
 mkdir -p "$folder"
 environment stormpy stormpy 'stormpy==2.0.0'
 environment rtamt rtamt 'rtamt==0.4.10' 'setuptools<81'
-environment tulip tulip.spec.form 'tulip==1.4.0' 'setuptools<81' wheel
+environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' 'setuptools<80'
 
 if ! command -v spin >/dev/null 2>&1; then
   as_root=""

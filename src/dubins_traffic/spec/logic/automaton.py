@@ -22,7 +22,7 @@ from dubins_traffic.spec.logic.formula import Formula, FormulaError
 from dubins_traffic.spec.logic.moves import STRONG, Stepper
 from dubins_traffic.spec.logic.obligations import DONE, Atom, Moves, Table
 
-MAX_STATES: Final = 4096
+MAX_STATES: Final = 2048
 """Most states of one table before it is made smaller."""
 MAX_CLOCKS: Final = 3
 """Most clocks of one table."""

@@ -25,7 +25,7 @@ from dubins_traffic.spec.logic.formula import (
 )
 from dubins_traffic.spec.logic.gr1 import gr1, slugs_text, tulip_text
 from dubins_traffic.spec.logic.printer import SPIN, Brackets, Style, number, written
-from dubins_traffic.spec.logic.rewrite import mapped, simplify
+from dubins_traffic.spec.logic.rewrite import mapped
 from dubins_traffic.spec.logic.translation import (
     for_signals,
     in_ticks,
@@ -128,8 +128,8 @@ def _positive(name: str) -> str:
 
 _STL: Final = Style(
     {
-        Op.TRUE: "(1 > 0)",
-        Op.FALSE: "(0 > 1)",
+        Op.TRUE: "(1e300 > 0)",
+        Op.FALSE: "(0 > 1e300)",
         Op.NOT: "not",
         Op.AND: "and",
         Op.OR: "or",
@@ -157,7 +157,7 @@ def stl(spec: Specification, period: float) -> str:
     """
 
     def change(formula: Formula) -> Formula:
-        return for_signals(simplify(_rounded(formula, period)))
+        return for_signals(_rounded(formula, period))
 
     return written(_changed(spec, change).whole, _STL)
 

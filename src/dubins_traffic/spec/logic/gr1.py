@@ -133,6 +133,8 @@ class _Sorter:
 
     def sort(self, part: Formula) -> None:
         body = part.args[0] if part.args else part
+        if part.op is Op.TRUE:
+            return
         if not _temporal(part):
             self._side.first.append(part)
         elif part.op is Op.F and part.bounds is None and not _temporal(body):

@@ -4,8 +4,8 @@ A formula is split into the parts of its conjunction (G distributes over it), an
 its own; the verdict of the whole is the least one. A part is *true* as soon as every infinite continuation satisfies
 it and *false* as soon as none does. So is the whole, as long as parts that share propositions don't contradict each
 other on a continuation that suits each of them alone: then *false* comes when the first part is lost, possibly later
-than the whole was. Parts without common propositions never do. *True* is as early as for the whole, and a part that is decided counts as
-decided in what is presumed of the whole. `split=False` monitors the formula in one piece.
+than the whole was. Parts without common propositions never do. *True* is as early as for the whole; a part that is
+decided counts as decided in what is presumed of the whole. `split=False` monitors the formula in one piece.
 
 Bounds of at most `UNROLL` ticks are counted in the states of a table, longer ones by clocks beside it, so tables
 don't grow with the bounds. Where a clock doesn't do, the bound is counted if the table stays within its limits.
@@ -15,15 +15,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.spec.logic.automaton import Automaton, automaton
-from dubins_traffic.spec.logic.formula import Formula, FormulaError, Op, always, implies, propositions
+from dubins_traffic.spec.logic.formula import (
+    FUTURE,
+    PAST,
+    Formula,
+    FormulaError,
+    Op,
+    always,
+    conj,
+    implies,
+    propositions,
+    subformulas,
+)
+from dubins_traffic.spec.logic.obligations import MAX_PROPOSITIONS
 from dubins_traffic.spec.logic.rewrite import renamed
+
+if TYPE_CHECKING:
+    from dubins_traffic.spec.logic.kernel import Tables
 
 UNROLL: Final = 4
 """Longest bound, ticks, that is counted in states though a clock would do."""
@@ -34,14 +49,19 @@ MAX_PARTS: Final = 512
 
 
 def parts(formula: Formula) -> tuple[Formula, ...]:
-    """Return formulas whose conjunction is equivalent to `formula`, none of them true; at least one.
+    """Return formulas whose conjunction is equivalent to `formula`; what has no temporal operator stays together.
 
     Raises
     ------
     FormulaError
         If there are more than `MAX_PARTS`.
     """
-    found = tuple(dict.fromkeys(_split(formula, True)))
+    split = dict.fromkeys(_split(formula, True))
+    plain = [part for part in split if not any(inner.op in FUTURE | PAST for inner in subformulas(part))]
+    if plain and len(propositions(conj(*plain))) <= MAX_PROPOSITIONS:
+        found = (conj(*plain), *(part for part in split if part not in plain))
+    else:
+        found = tuple(split)
     if len(found) > MAX_PARTS:
         raise FormulaError("too many parts", value=len(found), expected=f"at most {MAX_PARTS} conjuncts")
     return found
@@ -151,6 +171,7 @@ class Monitors:
             except FormulaError as error:
                 raise error.within(field=name) from None
         self._tables = _packed(pieces, {name: column for column, name in enumerate(names)})
+        self._kernel_tables: Tables | None = None
         self.tables = len(pieces)
         self.reset(0)
 
@@ -178,10 +199,12 @@ class Monitors:
         """
         from dubins_traffic.spec.logic.kernel import Tables, advance
 
+        if self._kernel_tables is None:
+            self._kernel_tables = Tables(**self._tables)
         if values.shape != (len(self._state), self._width):
             raise ValueError(f"values: shape {values.shape}, expected {(len(self._state), self._width)}")
         frame = np.ascontiguousarray(values, dtype=np.int64)
-        advance(frame, Tables(**self._tables), self._state, self._clocks, self.verdicts)
+        advance(frame, self._kernel_tables, self._state, self._clocks, self.verdicts)
         return self.verdicts
 
 

@@ -1,0 +1,214 @@
+"""Exports: what each format contains, that its grammar is kept, and what is refused."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from dubins_traffic.spec.logic.exports import (
+    FORMATS,
+    Specification,
+    latex,
+    slugs,
+    spin,
+    spot,
+    stl,
+    tlsf,
+    tulip,
+)
+from dubins_traffic.spec.logic.formula import FormulaError
+from dubins_traffic.spec.logic.parse import parse
+
+TASK = Specification(
+    assumptions=tuple(
+        map(parse, ("[]<> free_0", "[] (stands -> <>[0,5] !stands)", "[] (ahead -> <> !ahead)"))
+    ),
+    guarantees=tuple(
+        map(
+            parse,
+            (
+                "[] !hit && []<> at_0 && []<> at_1",
+                "[] (left -> over) && [] (left -> <>[0,1] !left)",
+                "[] (enter -> Y (stopped && !ahead))",
+                "[] (enter -> (!ahead S clear))",
+                "[] (brake -> [][0,0.5] brake)",
+                "[] (enter -> X brake)",
+                "!left",
+            ),
+        )
+    ),
+    inputs=("free_0", "stands", "hit", "over", "stopped", "ahead", "clear"),
+    outputs=("at_0", "at_1", "left", "enter", "brake"),
+)
+PERIOD = 0.1
+
+
+class Grammar:
+    """Recognises fully parenthesised formulas: binary operators only between operands, one kind per level."""
+
+    def __init__(self, text: str, operand: str, unary: str, binary: str) -> None:
+        self.tokens = re.findall(rf"\s*({operand}|{unary}|{binary}|[()])", text)
+        assert "".join(self.tokens).replace(" ", "") == re.sub(r"\s", "", text), text
+        self.operand, self.unary, self.binary = operand, unary, binary
+        self.place = 0
+
+    def _at(self, pattern: str) -> bool:
+        return self.place < len(self.tokens) and re.fullmatch(pattern, self.tokens[self.place]) is not None
+
+    def formula(self) -> None:
+        self.part()
+        first = self.tokens[self.place] if self._at(self.binary) else ""
+        count = 0
+        while self._at(self.binary):
+            assert self.tokens[self.place] == first, self.tokens
+            self.place += 1
+            count += 1
+            self.part()
+        assert count < 2 or first in ("&&", "||", "&", "|"), self.tokens
+
+    def part(self) -> None:
+        while self._at(self.unary):
+            self.place += 1
+        if self._at(r"\("):
+            self.place += 1
+            self.formula()
+            assert self._at(r"\)"), self.tokens
+            self.place += 1
+        else:
+            assert self._at(self.operand), (self.tokens, self.place)
+            self.place += 1
+
+    def accepts(self) -> bool:
+        self.formula()
+        return self.place == len(self.tokens)
+
+
+def test_spin_without_past_and_bounds() -> None:
+    plain = Specification(
+        (parse("[]<> f"),), (parse("[] (e -> (a W b))"), parse("a M b")), ("f",), ("e", "a", "b")
+    )
+    assert spin(plain, PERIOD) == "[] <> f -> ([] (e -> b V (a || b)) && b U (a && b))"
+
+
+def test_spin_writes_memory_and_short_bounds_with_next() -> None:
+    task = Specification((), (parse("[] (e -> Y s)"), parse("[] (e -> <>[0,0.2] s)")), ("s",), ("e",))
+    assert spin(task, PERIOD) == (
+        "(!past_1 && [] (X past_1 <-> s)) -> ([] (e -> past_1) && [] (e -> (s || X (s || X s))))"
+    )
+    with pytest.raises(FormulaError, match="too long to be written out with next"):
+        spin(TASK, 0.01)
+
+
+def test_spot_counts_ticks() -> None:
+    task = Specification((), (parse("[] (l -> <>[0,10] !l)"), parse("a U[1,2] b")), (), ("l", "a", "b"))
+    assert spot(task, 1 / 30) == "G (l -> F[0:300] !l) & G[0:29] a & F[30:30] (a U b & F[0:30] b)"
+
+
+def test_stl_has_signals_and_seconds() -> None:
+    task = Specification(
+        (parse("[]<> f"),), (parse("[] (l -> <>[0,10] !l)"), parse("a T b")), ("f",), ("l", "a", "b")
+    )
+    assert stl(task, 1 / 30) == (
+        "(always (eventually (f > 0))) -> ((always ((l > 0) -> (eventually[0:10] (not (l > 0))))) and "
+        "(not ((not (a > 0)) since (not (b > 0)))))"
+    )
+
+
+def test_tlsf_keeps_its_grammar() -> None:
+    text = tlsf(TASK, PERIOD)
+    main = re.fullmatch(
+        r"INFO \{\n  TITLE: \"[^\"]*\"\n  DESCRIPTION: \"[^\"]*\"\n  SEMANTICS: Mealy\n  TARGET: Mealy\n\}\n\n"
+        r"MAIN \{\n  INPUTS \{\n(?P<inputs>(?:    \w+;\n)+)  \}\n  OUTPUTS \{\n(?P<outputs>(?:    \w+;\n)+)  \}\n"
+        r"  ASSUME \{\n(?P<assume>(?:    .+;\n)+)  \}\n  GUARANTEE \{\n(?P<guarantee>(?:    .+;\n)+)  \}\n\}\n",
+        text,
+    )
+    assert main is not None
+    assert main["inputs"].split() == [f"{name};" for name in (*TASK.inputs, "past_1", "past_2")]
+    assert main["outputs"].split() == [f"{name};" for name in TASK.outputs]
+    lines = [line.strip(" ;") for line in (main["assume"] + main["guarantee"]).splitlines()]
+    assert len(lines) == 4 + 3 + 7
+    for line in lines:
+        assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), line
+    assert "G (left -> (F[0:10] (!left)))" in text
+
+
+def test_slugs_keeps_its_grammar() -> None:
+    text = slugs(TASK, PERIOD)
+    sections: dict[str, list[str]] = {}
+    for line in text.splitlines():
+        if line.startswith("["):
+            sections[line] = []
+        elif line:
+            sections[list(sections)[-1]].append(line)
+    sides = [f"[{side}_{part}]" for part in ("INIT", "TRANS", "LIVENESS") for side in ("ENV", "SYS")]
+    assert list(sections) == ["[INPUT]", "[OUTPUT]", *sides]
+    counters = r"(?:ticks|left)_\d"
+    for line in sections["[INPUT]"] + sections["[OUTPUT]"]:
+        assert re.fullmatch(rf"{counters}:0\.\.\.\d+|\w+", line)
+    operand = rf"{counters}'? (?:=|>) (?:{counters} [+-] )?\d+|[a-z]\w*'?"
+    for name in sides:
+        assert sections[name] or name == "[ENV_TRANS]"
+        for line in sections[name]:
+            assert Grammar(line, operand, "!", r"&|\||->|<->").accepts(), line
+    assert sections["[ENV_LIVENESS]"] == ["free_0", "!owed_1"]
+    assert sections["[SYS_LIVENESS]"] == ["at_0", "at_1"]
+    assert "past_1' <-> (stopped & (!ahead))" in sections["[ENV_TRANS]"]
+    assert "enter -> brake'" in sections["[SYS_TRANS]"]
+    assert "!left" in sections["[SYS_INIT]"]
+    primed_by_environment = set(re.findall(r"(\w+)'", "\n".join(sections["[ENV_TRANS]"])))
+    assert primed_by_environment <= {line.split(":")[0] for line in sections["[INPUT]"]}
+
+
+def test_tulip_is_a_python_file() -> None:
+    text = tulip(TASK, PERIOD)
+    made: dict[str, object] = {}
+    source = text.replace("from tulip.spec.form import GRSpec", "GRSpec = dict")
+    exec(compile(source, "specification.py", "exec"), made)
+    found = made["specification"]
+    assert isinstance(found, dict)
+    assert found["env_vars"] | found["sys_vars"] == {
+        **dict.fromkeys((*TASK.inputs, *TASK.outputs, "past_1", "past_2", "owed_1"), "boolean"),
+        "ticks_1": (0, 50),
+        "ticks_2": (0, 10),
+        "left_1": (0, 5),
+    }
+    assert found["sys_prog"] == ["at_0", "at_1"]
+
+
+def test_latex_escapes_names() -> None:
+    text = latex(Specification((), (parse("[] (left_r -> <>[0,10] !left_r)"),), (), ("left_r",)), PERIOD)
+    assert "\\Box (\\mathit{left\\_r} \\rightarrow \\Diamond_{[0,10]} \\neg \\mathit{left\\_r})" in text
+    assert text.count("{") == text.count("}")
+    assert "\\varphi_{\\mathrm{env}} &= \\top" in text
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_every_format_takes_a_task_without_assumptions(name: str) -> None:
+    assert FORMATS[name](Specification((), (parse("[]<> a"),), (), ("a",)), PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("assumption", "guarantee", "reason"),
+    [
+        ("true", "a U b", "not of a form that GR\\(1\\) knows"),
+        ("true", "F G a", "not of a form that GR\\(1\\) knows"),
+        ("true", "G X X a", "not of a form that GR\\(1\\) knows"),
+        ("true", "G (a -> F[1,2] b)", "not of a form that GR\\(1\\) knows"),
+        ("G X a", "true", "an assumption restricts what the system chooses next"),
+        ("a", "true", "an assumption restricts what the system chooses first"),
+        ("true", "Y F a", "a past operator ranges over a future one"),
+    ],
+)
+def test_what_gr1_does_not_know_is_refused(assumption: str, guarantee: str, reason: str) -> None:
+    task = Specification((parse(assumption),), (parse(guarantee),), ("b",), ("a",))
+    for export in (slugs, tulip):
+        with pytest.raises(FormulaError, match=reason):
+            export(task, PERIOD)
+
+
+def test_sides_must_be_clear() -> None:
+    with pytest.raises(FormulaError, match="neither input nor output: got 'a'"):
+        Specification((), (parse("[] a"),), ("b",), ())
+    with pytest.raises(FormulaError, match="both input and output: got 'a'"):
+        Specification((), (), ("a",), ("a",))

@@ -1,0 +1,168 @@
+"""Monitors: verdicts at the right tick, clocks, limits and their reasons."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from dubins_traffic.spec.logic.automaton import FALSE, PRESUMABLY_FALSE, PRESUMABLY_TRUE, TRUE
+from dubins_traffic.spec.logic.formula import FormulaError
+from dubins_traffic.spec.logic.monitor import Monitors, compiled, parts
+from dubins_traffic.spec.logic.parse import parse
+
+
+def history(text: str, names: str, rows: list[str], period: float = 1.0) -> str:
+    """Return the verdicts after each frame as letters: F, f, t, T; a row names what holds in it."""
+    monitors = Monitors({"f": parse(text)}, tuple(names), period)
+    monitors.reset(1)
+    out = ""
+    for row in rows:
+        out += "FftT"[int(monitors.update(np.array([[name in row for name in names]]))[0, 0])]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("text", "rows", "verdicts"),
+    [
+        ("[] a", ["a", "a", "", "a"], "ttFF"),
+        ("<> a", ["", "", "a", ""], "ffTT"),
+        ("[]<> a", ["", "a", "", "a"], "ftft"),
+        ("<>[] a", ["", "a", "", "a"], "ftft"),
+        ("a U b", ["a", "a", "b", ""], "ffTT"),
+        ("a U b", ["a", "", "b"], "fFF"),
+        ("a W b", ["a", "a", "", ""], "ttFF"),
+        ("X a", ["", "a"], "fT"),
+        ("[] (a -> X b)", ["a", "b", "ab", ""], "ftfF"),
+        ("[] (a -> Y b)", ["b", "a", "a"], "ttF"),
+        ("[] (a -> Y b)", ["a"], "F"),
+        ("[] (a -> !b S c)", ["c", "a", "b", "a"], "tttF"),
+        ("[] (b -> O a)", ["", "a", "b"], "tTT"),
+        ("H a -> <> b", ["a", "b"], "fT"),
+        ("[] (a -> X Y a)", [""], "T"),
+        ("(<> a) && [] !a", [""], "f"),
+        ("F[0,2] a", ["", "", ""], "ffF"),
+        ("F[1,2] a", ["a", "", "a"], "ffT"),
+        ("G[1,2] a", ["", "a", "a"], "ttT"),
+        ("a U[1,2] b", ["ab", "ab"], "fT"),
+        ("true", [""], "T"),
+        ("a -> a", [""], "T"),
+    ],
+)
+def test_verdicts(text: str, rows: list[str], verdicts: str) -> None:
+    assert history(text, "abc", rows) == verdicts
+
+
+def test_contradicting_parts_in_one_piece_are_false_at_once() -> None:
+    formula = {"f": parse("(<> a) && [] !a")}
+    assert Monitors(formula, ("a",), 1.0, split=False).verdicts.shape == (0, 1)
+    monitors = Monitors(formula, ("a",), 1.0, split=False)
+    monitors.reset(1)
+    assert monitors.verdicts[0, 0] == FALSE
+    split = Monitors(formula, ("a",), 1.0)
+    split.reset(1)
+    assert split.verdicts[0, 0] == PRESUMABLY_FALSE or split.verdicts[0, 0] == PRESUMABLY_TRUE
+
+
+@pytest.mark.parametrize(("rate", "ticks"), [(30.0, 300), (10.0, 100), (7.0, 70)])
+def test_the_ten_seconds_of_rule_2_end_at_the_right_tick(rate: float, ticks: int) -> None:
+    assert (
+        history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * ticks + [""], 1 / rate)
+        == "t" + "f" * ticks + "t"
+    )
+    assert (
+        history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * (ticks + 2), 1 / rate)
+        == "t" + "f" * ticks + "FF"
+    )
+
+
+def test_a_clock_follows_the_oldest_request_and_starts_anew() -> None:
+    rows = ["r", "", "r", "", "", "g", "r", "", "", "", "", "", "g"]
+    assert history("G (r -> F[0,5] g)", "rg", rows) == "ffffftfffffFF"
+
+
+def test_a_clock_follows_the_latest_request_for_what_must_last() -> None:
+    rows = ["rg", "g", "g", "rg", "g", "g", "g", "g", "g", "", "rg", ""]
+    assert history("G (r -> G[0,5] g)", "rg", rows) == "tttttttttttF"
+
+
+def test_long_bounds_need_no_large_tables() -> None:
+    found = compiled(parse("G (a -> b U[0,3600] c)"), 1 / 100)
+    assert found.target.shape[0] <= 4
+    assert found.clocks.tolist() == [360_000]
+
+
+def test_parts_are_split_and_share_tables() -> None:
+    text = " && ".join(f"[] (enter_{v} -> Y stopped_{v} && Y !ahead_{v})" for v in range(40))
+    found = parts(parse(text))
+    assert len(found) == 80
+    names = [f"{name}_{v}" for v in range(40) for name in ("enter", "stopped", "ahead")]
+    monitors = Monitors({"rule 3": parse(text)}, names, 0.1)
+    assert monitors.tables == 80
+    monitors.reset(2)
+    frame = np.zeros((2, len(names)))
+    assert monitors.update(frame).tolist() == [[PRESUMABLY_TRUE]] * 2
+    frame[1, names.index("stopped_7")] = 1
+    assert monitors.update(frame).tolist() == [[PRESUMABLY_TRUE]] * 2
+    frame[:, names.index("enter_7")] = 1
+    assert monitors.update(frame).tolist() == [[FALSE], [PRESUMABLY_TRUE]]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (" || ".join(f"F (p{i} && X p{i})" for i in range(13)), "too many propositions in one part"),
+        (" || ".join(f"F p{i}" for i in range(12)), "too many combinations|too large"),
+        ("Y F a", "a past operator ranges over a future one"),
+        ("G (a -> F[0,10] (b & F[0,10] c))", "can be asked for again while it is pending|too large"),
+        (" && ".join(f"[] p{i}" for i in range(600)), "too many parts"),
+    ],
+)
+def test_what_is_too_large_is_refused_with_a_reason(text: str, reason: str) -> None:
+    formula = parse(text)
+    names = tuple({f"p{i}" for i in range(13)} | {"a", "b", "c"})
+    start = time.perf_counter()
+    with pytest.raises(FormulaError, match=reason) as caught:
+        Monitors({"mine": formula}, names, 1 / 30)
+    assert time.perf_counter() - start < 30
+    assert str(caught.value).startswith("mine: ")
+    assert caught.value.expected
+
+
+def test_unknown_propositions_and_shapes_are_refused() -> None:
+    with pytest.raises(FormulaError, match="mine: unknown proposition: got 'b'"):
+        Monitors({"mine": parse("a U b")}, ("a",), 1.0)
+    with pytest.raises(FormulaError, match="not a period"):
+        Monitors({}, (), 0.0)
+    monitors = Monitors({"mine": parse("[] a")}, ("a",), 1.0)
+    monitors.reset(3)
+    with pytest.raises(ValueError, match="shape"):
+        monitors.update(np.zeros((3, 2)))
+
+
+def test_verdicts_before_the_first_frame() -> None:
+    monitors = Monitors({"t": parse("a | !a"), "f": parse("a & !a"), "g": parse("[] a")}, ("a",), 1.0)
+    monitors.reset(1)
+    assert monitors.verdicts.tolist() == [[TRUE, FALSE, PRESUMABLY_TRUE]]
+
+
+def test_ten_million_updates_a_second() -> None:
+    formulas = {
+        f"{v}": parse(
+            f"[] (e{v} -> Y s{v}) && [] (e{v} -> Y !a{v}) && []<> g{v} && [] (l{v} -> <>[0,10] !l{v})"
+        )
+        for v in range(12)
+    }
+    names = [f"{letter}{v}" for v in range(12) for letter in "esagl"]
+    monitors = Monitors(formulas, names, 1 / 30)
+    monitors.reset(256)
+    values = np.random.default_rng(1).integers(0, 2, size=(4, 256, len(names)))
+    monitors.update(values[0])
+    best = 0.0
+    for _ in range(5):
+        start = time.perf_counter()
+        for tick in range(20):
+            monitors.update(values[tick % 4])
+        best = max(best, 20 * 256 * monitors.tables / (time.perf_counter() - start))
+    assert best >= 1e7
