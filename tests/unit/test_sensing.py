@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.body import Car, DiscObstacle, PolygonObstacle
-from dubins_traffic.cars.sensing import SEEN_FIELDS, blur, neighbours, scan
+from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbours, scan
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.trig import sincos
@@ -19,26 +19,25 @@ def cars_at(*places):
 
 def test_neighbours_are_those_within_the_radius_in_order_of_index() -> None:
     state = cars_at((0, 0), (5.0, 0), (0, 5.0000001), (3, 4), (-1, 0))
-    seen = np.zeros((5, SEEN_FIELDS))
-    count = neighbours(state, Labels.zeros(1, 5), 0, 0, 5.0, seen)
-    assert seen[:count, 0].tolist() == [0, 1, 3, 4]
-    assert seen[2, 1:3].tolist() == [3, 4]
-    assert seen[0, 10] == -1
+    reals, wholes = np.zeros((5, SEEN_REALS)), np.zeros((5, SEEN_WHOLES), dtype=np.int64)
+    count = neighbours(0, 0, 5.0, reals, wholes, *state, *Labels.zeros(1, 5))
+    assert wholes[:count, 0].tolist() == [0, 1, 3, 4]
+    assert reals[2, :2].tolist() == [3, 4]
+    assert wholes[1].tolist() == [1, 0, -1, -1, -1, 0]
 
 
 def test_noise_has_the_asked_size_and_keeps_headings_unit() -> None:
     rows = []
     for tick in range(3000):
-        seen = np.zeros((2, SEEN_FIELDS))
-        seen[:, 0] = [0, 1]
-        seen[:, 3] = 1.0
-        blur(seen, 2, np.uint64(9), 4, tick, 0.05, 0.1)
-        rows.append(seen)
+        reals = np.zeros((2, SEEN_REALS))
+        reals[:, 2] = 1.0
+        blur(reals, np.array([[0] * 6, [1] * 6]), 2, np.uint64(9), 4, tick, 0.05, 0.1)
+        rows.append(reals)
     rows = np.array(rows)
-    assert rows[:, :, 1:3].std(axis=0) == pytest.approx(0.05, rel=0.05)
-    assert np.arctan2(rows[:, :, 4], rows[:, :, 3]).std(axis=0) == pytest.approx(0.1, rel=0.05)
-    assert np.hypot(rows[:, :, 3], rows[:, :, 4]) == pytest.approx(1.0, abs=1e-12)
-    assert abs(np.corrcoef(rows[:, 0, 1], rows[:, 1, 1])[0, 1]) < 0.06
+    assert rows[:, :, :2].std(axis=0) == pytest.approx(0.05, rel=0.05)
+    assert np.arctan2(rows[:, :, 3], rows[:, :, 2]).std(axis=0) == pytest.approx(0.1, rel=0.05)
+    assert np.hypot(rows[:, :, 2], rows[:, :, 3]) == pytest.approx(1.0, abs=1e-12)
+    assert abs(np.corrcoef(rows[:, 0, 0], rows[:, 1, 0])[0, 1]) < 0.06
 
 
 def test_a_scan_of_the_2016_layout() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import bell
@@ -17,55 +17,62 @@ from dubins_traffic.kernels.trig import sincos
 
 POSITION_DRAW = 200
 HEADING_DRAW = 206
-SEEN_FIELDS = 12
+STATE_END = len(State._fields)
+SEEN_REALS = 6
+SEEN_WHOLES = 6
 
 
 @jit
-def neighbours(state: State, labels: Labels, b: int, viewer: int, radius: float, seen: Floats) -> int:
-    """Write the viewer and then the other cars within `radius` of it, by index, into `seen`; return the number.
+def neighbours(b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, *arrays: Any) -> int:
+    """Write the viewer and then the other cars within `radius` of it, by index, into two arrays; return the number.
 
-    A row of `seen` (N, SEEN_FIELDS) is: index, x, y, cos, sin, speed, yaw rate, segment, at, crosses, lane, bits.
+    A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
+    segment, at, crosses, lane, bits. `arrays` are those of State and of Labels, one after another.
     """
+    state = State(*arrays[:STATE_END])
+    labels = Labels(*arrays[STATE_END:])
     limit = radius * radius
     x = state.x[b, viewer]
     y = state.y[b, viewer]
-    _view(state, labels, b, viewer, seen[0])
+    _view(state, labels, b, viewer, reals[0], wholes[0])
     count = 1
     for n in range(state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         if n != viewer and dx * dx + dy * dy <= limit:
-            _view(state, labels, b, n, seen[count])
+            _view(state, labels, b, n, reals[count], wholes[count])
             count += 1
     return count
 
 
 @jit
-def _view(state: State, labels: Labels, b: int, n: int, row: Floats) -> None:
-    row[0] = n
-    row[1] = state.x[b, n]
-    row[2] = state.y[b, n]
-    row[3] = state.c[b, n]
-    row[4] = state.s[b, n]
-    row[5] = state.speed[b, n]
-    row[6] = state.yaw_rate[b, n]
-    row[7] = labels.segment[b, n]
-    row[8] = labels.at[b, n]
-    row[9] = labels.crosses[b, n]
-    row[10] = labels.lane[b, n]
-    row[11] = labels.bits[b, n]
+def _view(state: State, labels: Labels, b: int, n: int, reals: Floats, wholes: Ints) -> None:
+    reals[0] = state.x[b, n]
+    reals[1] = state.y[b, n]
+    reals[2] = state.c[b, n]
+    reals[3] = state.s[b, n]
+    reals[4] = state.speed[b, n]
+    reals[5] = state.yaw_rate[b, n]
+    wholes[0] = n
+    wholes[1] = labels.segment[b, n]
+    wholes[2] = labels.at[b, n]
+    wholes[3] = labels.crosses[b, n]
+    wholes[4] = labels.lane[b, n]
+    wholes[5] = np.int64(labels.bits[b, n])
 
 
 @jit
-def blur(seen: Floats, count: int, seed: Any, trial: int, tick: int, position: float, heading: float) -> None:
-    """Add noise to the poses in `seen`: standard deviations `position` (m, each axis) and `heading` (rad)."""
+def blur(
+    reals: Floats, wholes: Ints, count: int, seed: Any, trial: int, tick: int, position: float, heading: float
+) -> None:
+    """Add noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad)."""
     for k in range(count):
-        row = seen[k]
-        car = int(row[0])
-        row[1] += position * bell(seed, trial, car, tick, POSITION_DRAW)
-        row[2] += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
+        row = reals[k]
+        car = wholes[k, 0]
+        row[0] += position * bell(seed, trial, car, tick, POSITION_DRAW)
+        row[1] += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
         c, s = sincos(heading * bell(seed, trial, car, tick, HEADING_DRAW))
-        row[3], row[4] = row[3] * c - row[4] * s, row[4] * c + row[3] * s
+        row[2], row[3] = row[2] * c - row[3] * s, row[3] * c + row[2] * s
 
 
 @jit

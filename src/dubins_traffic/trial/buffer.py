@@ -3,16 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.protocols import Ending, Sink
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+
+
+STATE_END = len(State._fields)
+
+
+@jit
+def keep(f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, *arrays: Any) -> None:
+    """Copy trial 0 of the arrays of State and Labels, and its commands, into frame f of a block."""
+    state = State(*arrays[:STATE_END])
+    labels = Labels(*arrays[STATE_END:])
+    for n in range(reals.shape[2]):
+        reals[0, f, n] = state.x[0, n]
+        reals[1, f, n] = state.y[0, n]
+        reals[2, f, n] = state.c[0, n]
+        reals[3, f, n] = state.s[0, n]
+        reals[4, f, n] = state.speed[0, n]
+        reals[5, f, n] = state.yaw_rate[0, n]
+        reals[6, f, n] = commands[0, n, 0]
+        reals[7, f, n] = commands[0, n, 1]
+        whole[0, f, n] = labels.segment[0, n]
+        whole[1, f, n] = labels.at[0, n]
+        whole[2, f, n] = labels.crosses[0, n]
+        whole[3, f, n] = labels.lane[0, n]
+        bits[f, n] = labels.bits[0, n]
+
+
+@jit
+def all_finite(commands: Floats) -> bool:
+    """Whether all commands of trial 0, (1, N, 2), are finite."""
+    finite = True
+    for n in range(commands.shape[1]):
+        for k in range(2):
+            finite &= commands[0, n, k] - commands[0, n, k] == 0.0
+    return finite
 
 
 class FrameBuffer:
@@ -42,20 +77,7 @@ class FrameBuffer:
     ) -> None:
         """Take the frame just reached, the clipped commands that led to it, and what happened in its tick."""
         f = self._filled
-        reals = self._reals
-        reals[0, f] = state.x[0]
-        reals[1, f] = state.y[0]
-        reals[2, f] = state.c[0]
-        reals[3, f] = state.s[0]
-        reals[4, f] = state.speed[0]
-        reals[5, f] = state.yaw_rate[0]
-        reals[6:, f] = commands[0].T
-        whole = self._whole
-        whole[0, f] = labels.segment[0]
-        whole[1, f] = labels.at[0]
-        whole[2, f] = labels.crosses[0]
-        whole[3, f] = labels.lane[0]
-        self._bits[f] = labels.bits[0]
+        keep(f, self._reals, self._whole, self._bits, commands, *state, *labels)
         if contacts:
             self._contacts += contacts
         if events:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dubins_traffic.cars.sensing import SEEN_FIELDS, blur, neighbours, scan
+from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbours, scan
 from dubins_traffic.cars.state import EGO, Labels, Observation, Pose, Propositions, SensedCar, State, Twist
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
@@ -14,6 +15,10 @@ from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+
+
+new: Callable[..., Any] = tuple.__new__
+"""Makes a named tuple from a sequence of all its fields, in half the time of a call; some ten are made a tick."""
 
 
 class Senses:
@@ -26,7 +31,8 @@ class Senses:
         self._body = problem.car.body
         self._radius = problem.sensing_radius
         self._rate = problem.rate
-        self._seen = np.zeros((len(instance.starts), SEEN_FIELDS))
+        self._reals = np.zeros((len(instance.starts), SEEN_REALS))
+        self._wholes = np.zeros((len(instance.starts), SEEN_WHOLES), dtype=np.int64)
         noise = instance.disturbances
         self._noisy = noise.position_noise > 0.0 or noise.heading_noise > 0.0
         self._laser = problem.laser
@@ -40,38 +46,33 @@ class Senses:
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the ego knows at the beginning of the tick that starts in `state`."""
-        seen = self._seen
-        count = neighbours(state, labels, 0, EGO, self._radius, seen)
+        count = neighbours(0, EGO, self._radius, self._reals, self._wholes, *state, *labels)
         if self._noisy:
             noise = self._instance.disturbances
-            seed = np.uint64(self._instance.seed)
-            trial = self._instance.trial
-            blur(seen, count, seed, trial, tick, noise.position_noise, noise.heading_noise)
+            blur(
+                self._reals, self._wholes, count, np.uint64(self._instance.seed), self._instance.trial, tick,
+                noise.position_noise, noise.heading_noise,
+            )  # fmt: skip
         if self._laser is not None:
             self._sweep(tick, state)
-        rows = seen[:count].tolist()
-        _, x, y, c, s, speed, yaw, segment, at, crosses, lane, bits = rows[0]
-        names = self._names
-        body = self._body
-        others = tuple(
-            SensedCar(
-                names[int(row[0])],
-                int(row[0]),
-                Pose(row[1], row[2], row[3], row[4]),
-                Twist(row[5], row[6]),
-                body,
-                Propositions(int(row[7]), int(row[8]), int(row[9]), int(row[10]), int(row[11])),
-            )
-            for row in rows[1:]
-        )
+        reals = self._reals[:count].tolist()
+        wholes = self._wholes[:count].tolist()
+        own, labelled = reals[0], wholes[0]
         return Observation(
             tick,
             tick / self._rate,
-            Pose(x, y, c, s),
-            Twist(speed, yaw),
-            Propositions(int(segment), int(at), int(crosses), int(lane), int(bits)),
-            others,
+            new(Pose, own[:4]),
+            new(Twist, own[4:]),
+            new(Propositions, labelled[1:]),
+            tuple([self._sensed(reals[k], wholes[k]) for k in range(1, count)]),
             self._scan,
+        )
+
+    def _sensed(self, real: list[float], whole: list[int]) -> SensedCar:
+        index = whole[0]
+        pose, twist = new(Pose, real[:4]), new(Twist, real[4:])
+        return new(
+            SensedCar, (self._names[index], index, pose, twist, self._body, new(Propositions, whole[1:]))
         )
 
     def _sweep(self, tick: int, state: State) -> None:

@@ -12,7 +12,7 @@ from dubins_traffic.cars.state import EGO, Contact, Event, Observation
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
 from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink
 from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.trial.buffer import FrameBuffer
+from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.senses import Senses
 
@@ -104,7 +104,7 @@ class Trial:
             agent.decide(self._tick, self._state, self._labels, commands)
         commands[0, EGO, 0] = speed
         commands[0, EGO, 1] = yaw
-        if not np.isfinite(commands).all():
+        if not all_finite(commands):
             return self._agent_fault()
         contacts = self._simulator.step(commands)
         self._tick += 1
