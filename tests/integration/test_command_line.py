@@ -18,6 +18,8 @@ import pytest
 
 from dubins_traffic.cli import listing, options
 from dubins_traffic.cli.main import main
+from dubins_traffic.controllers import registry
+from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -309,8 +311,11 @@ def test_lists(subject, run):
 
 def test_lists_name_all_that_documents_may(run):
     kinds = [line.split()[0] for line in run("list", "agents").splitlines()]
-    assert kinds == ["wander", "loop", "follow", "parked", "scripted"]
-    assert [line.split()[0] for line in run("list", "controllers").splitlines()] == ["lanes", "simple"]
+    assert kinds == list(KINDS)
+    assert {"wander", "loop", "follow", "parked", "scripted"} <= set(kinds)
+    controllers = [line.split()[0] for line in run("list", "controllers").splitlines()]
+    assert controllers == list(registry.names())
+    assert {"lanes", "simple"} <= set(controllers)
 
 
 def test_completion_offers_commands_configurations_and_controllers():
