@@ -17,6 +17,7 @@ from dubins_traffic.spec.logic.automaton import (
 )
 from dubins_traffic.spec.logic.formula import Formula, FormulaError, propositions
 from dubins_traffic.spec.logic.monitor import Monitors, parts
+from dubins_traffic.spec.logic.parse import parse
 from tests.formulas import drawn, holds, holds_finite, words
 
 NAMES = ("a", "b")
@@ -121,3 +122,29 @@ def test_split_monitors_are_sound_and_late_only_where_parts_share_propositions(s
             elif found != exact:
                 assert (exact, found) == (PRESUMABLY_FALSE, PRESUMABLY_TRUE), formula
     assert late > 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G (a -> F[5,7] b)",
+        "G (a -> G[5,7] b)",
+        "G (a -> (a U[5,7] b))",
+        "G F[5,6] b",
+        "G (!Y a | G[6,6] b)",
+        "G (a & Y !a -> F[5,8] (b & X b))",
+        "G ((b S a) -> !b | F[6,7] b)",
+    ],
+)
+def test_delay_lines_judge_as_tables_that_count_everything(text: str) -> None:
+    formula = parse(text)
+    monitors = Monitors({"f": formula}, NAMES, 1.0)
+    assert monitors.lines == 1
+    exact = automaton(formula, 1.0, 10)
+    random = np.random.default_rng(5)
+    frames = np.where(random.random((40, 60)) < 0.15, random.integers(0, 4, (40, 60)), 2)
+    monitors.reset(60)
+    found = [monitors.update(np.stack([frame & 1, frame >> 1], axis=-1))[:, 0].copy() for frame in frames]
+    expected = [verdicts(exact, frames[:, trial].tolist()) for trial in range(60)]
+    assert np.stack(found, axis=1).tolist() == expected
+    assert len(np.unique(expected)) >= 2

@@ -93,6 +93,16 @@ def test_long_bounds_need_no_large_tables() -> None:
     assert found.clocks.tolist() == [360_000]
 
 
+def test_bounds_that_begin_later_wait_in_a_delay_line() -> None:
+    rows = [""] * 400
+    rows[3] = rows[10] = rows[40] = "r"
+    rows[160] = "g"
+    found = history("G (r -> F[5,10] g)", "rg", rows, 1 / 30)
+    assert found == "ttt" + "f" * (40 + 300 - 3) + "F" * 60
+    rows[190] = "g"
+    assert history("G (r -> F[5,10] g)", "rg", rows, 1 / 30) == "ttt" + "f" * (190 - 3) + "t" * 210
+
+
 def test_parts_are_split_and_share_tables() -> None:
     text = " && ".join(f"[] (enter_{v} -> Y stopped_{v} && Y !ahead_{v})" for v in range(40))
     found = parts(parse(text))

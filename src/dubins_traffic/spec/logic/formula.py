@@ -30,6 +30,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from enum import Enum
+from threading import Lock
 from typing import Any, Final, TypeAlias
 from weakref import WeakValueDictionary
 
@@ -161,6 +162,7 @@ class Formula:
 
 _Key: TypeAlias = tuple[Op, tuple[Formula, ...], str, Bounds | None]
 _known: WeakValueDictionary[_Key, Formula] = WeakValueDictionary()
+_lock = Lock()
 
 
 def make(op: Op, args: tuple[Formula, ...] = (), name: str = "", bounds: Bounds | None = None) -> Formula:
@@ -172,9 +174,14 @@ def make(op: Op, args: tuple[Formula, ...] = (), name: str = "", bounds: Bounds 
         If it is nested too deeply or too long, or if its bounds are no interval.
     """
     key = (op, args, name, bounds)
-    found = _known.get(key)
-    if found is not None:
+    with _lock:
+        found = _known.get(key)
+        if found is None:
+            found = _known[key] = _new(op, args, name, bounds)
         return found
+
+
+def _new(op: Op, args: tuple[Formula, ...], name: str, bounds: Bounds | None) -> Formula:
     depth = 1 + max((part.depth for part in args), default=0)
     size = 1 + sum(part.size for part in args)
     if depth > MAX_DEPTH:
@@ -185,7 +192,6 @@ def make(op: Op, args: tuple[Formula, ...] = (), name: str = "", bounds: Bounds 
     values = {"op": op, "args": args, "name": name, "bounds": bounds, "depth": depth, "size": size}
     for attribute, value in values.items():
         object.__setattr__(formula, attribute, value)
-    _known[key] = formula
     return formula
 
 

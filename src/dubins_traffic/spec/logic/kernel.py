@@ -1,4 +1,4 @@
-"""The compiled loop that runs tables over a batch; imported when monitors run."""
+"""The compiled loops that run tables over a batch; imported when monitors run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from typing import NamedTuple
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
+
+STATE = 0
+PLACE = 1
+WAITING = 2
 
 
 class Tables(NamedTuple):
@@ -23,6 +27,8 @@ class Tables(NamedTuple):
         How many letters and clocks it has, and its first clock.
     part_of : (M,) int64
         The formula that it belongs to.
+    watch : (M,) int64
+        The delay line whose waiting requests speak against it, or -1.
     letter, target, reset, verdict : int64
         See `automaton.Automaton`.
     clock_length : (C,) int64
@@ -38,6 +44,7 @@ class Tables(NamedTuple):
     clock_count: Ints
     clock_off: Ints
     part_of: Ints
+    watch: Ints
     letter: Ints
     target: Ints
     reset: Ints
@@ -45,16 +52,81 @@ class Tables(NamedTuple):
     clock_length: Ints
 
 
+class Lines(NamedTuple):
+    """D delay lines (`delays.Line`), one after another.
+
+    Attributes
+    ----------
+    names_off : (D+1,) int64
+        Where the propositions of each line begin in `names`.
+    names : (N,) int64
+        Columns of the input.
+    letter_at, cell_at, letters : (D,) int64
+        Where its table begins in `letter`, in `target` and `value`, and how many letters it has.
+    ring_off : (D+1,) int64
+        Where its ring begins: one place a tick.
+    letter, target, value : int64
+        The tables.
+    """
+
+    names_off: Ints
+    names: Ints
+    letter_at: Ints
+    cell_at: Ints
+    letters: Ints
+    ring_off: Ints
+    letter: Ints
+    target: Ints
+    value: Ints
+
+
 @jit
-def advance(values: Ints, tables: Tables, state: Ints, clocks: Ints, verdicts: Ints) -> None:
+def delay(values: Ints, lines: Lines, memory: Ints, rings: Ints) -> None:
+    """Take one frame of every trial into the delay lines.
+
+    Parameters
+    ----------
+    values : (B, P+D) int64
+        The propositions, 0 or 1; the last D columns are set: the requests that come out.
+    lines : Lines
+        The delay lines.
+    memory : (B, D, 3) int64
+        State of the table, place in the ring, how many requests wait; updated.
+    rings : (B, R) int64
+        The requests that wait; updated.
+    """
+    count = lines.letter_at.shape[0]
+    for b in range(values.shape[0]):
+        for d in range(count):
+            valuation = 0
+            first = lines.names_off[d]
+            for i in range(first, lines.names_off[d + 1]):
+                valuation |= (values[b, lines.names[i]] & 1) << (i - first)
+            letter = lines.letter[lines.letter_at[d] + valuation]
+            cell = memory[b, d, STATE] * lines.letters[d] + letter + lines.cell_at[d]
+            memory[b, d, STATE] = lines.target[cell]
+            place = lines.ring_off[d] + memory[b, d, PLACE]
+            out = rings[b, place]
+            rings[b, place] = lines.value[cell]
+            memory[b, d, WAITING] += lines.value[cell] - out
+            memory[b, d, PLACE] += 1
+            if place + 1 == lines.ring_off[d + 1]:
+                memory[b, d, PLACE] = 0
+            values[b, values.shape[1] - count + d] = out
+
+
+@jit
+def advance(values: Ints, tables: Tables, memory: Ints, state: Ints, clocks: Ints, verdicts: Ints) -> None:
     """Take one frame of every trial into account.
 
     Parameters
     ----------
-    values : (B, P) int64
-        The propositions, 0 or 1.
+    values : (B, P+D) int64
+        The propositions, 0 or 1, and the delayed requests.
     tables : Tables
         The monitors.
+    memory : (B, D, 3) int64
+        Of the delay lines (`delay`).
     state : (B, M) int64
         Updated.
     clocks : (B, C) int64
@@ -87,5 +159,8 @@ def advance(values: Ints, tables: Tables, state: Ints, clocks: Ints, verdicts: I
             target = tables.target[cell]
             state[b, m] = target
             verdict = tables.verdict[tables.verdict_at[m] + target]
+            watch = tables.watch[m]
+            if verdict == 2 and watch >= 0 and memory[b, watch, WAITING] > 0:
+                verdict = 1
             formula = tables.part_of[m]
             verdicts[b, formula] = min(verdicts[b, formula], verdict)

@@ -8,7 +8,8 @@ than the whole was. Parts without common propositions never do. *True* is as ear
 decided counts as decided in what is presumed of the whole. `split=False` monitors the formula in one piece.
 
 Bounds of at most `UNROLL` ticks are counted in the states of a table, longer ones by clocks beside it, so tables
-don't grow with the bounds. Where a clock doesn't do, the bound is counted if the table stays within its limits.
+don't grow with the bounds. Where a clock doesn't do, requests go through a delay line (`delays`), or the bound is
+counted if the table stays within its limits.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.spec.logic.automaton import Automaton, automaton
+from dubins_traffic.spec.logic.delays import Line, delayed, line
 from dubins_traffic.spec.logic.formula import (
     FUTURE,
     PAST,
@@ -35,10 +37,11 @@ from dubins_traffic.spec.logic.formula import (
     subformulas,
 )
 from dubins_traffic.spec.logic.obligations import MAX_PROPOSITIONS
+from dubins_traffic.spec.logic.packing import Piece, packed_lines, packed_tables
 from dubins_traffic.spec.logic.rewrite import renamed
 
 if TYPE_CHECKING:
-    from dubins_traffic.spec.logic.kernel import Tables
+    from dubins_traffic.spec.logic.kernel import Lines, Tables
 
 UNROLL: Final = 4
 """Longest bound, ticks, that is counted in states though a clock would do."""
@@ -85,7 +88,7 @@ def _split(formula: Formula, positive: bool) -> list[Formula]:
     return [formula if positive else ~formula]
 
 
-def compiled(formula: Formula, period: float) -> Automaton:
+def compiled(formula: Formula, period: float, unroll: int = UNROLL) -> Automaton:
     """Return the table of one formula in one piece.
 
     Parameters
@@ -94,30 +97,26 @@ def compiled(formula: Formula, period: float) -> Automaton:
         With at most `obligations.MAX_PROPOSITIONS` propositions.
     period : float
         Seconds between frames, > 0.
+    unroll : int
+        Bounds up to this many ticks are counted in states, longer ones by clocks.
 
     Raises
     ------
     FormulaError
-        If it is too large to be monitored, saying what is too large.
+        If it can't be monitored in this form, saying why.
     """
     names = propositions(formula)
     plain = {name: f"p{place:03d}" for place, name in enumerate(names)}
     try:
-        found = _compiled(renamed(formula, plain), period)
+        found = _compiled(renamed(formula, plain), period, unroll)
     except FormulaError as error:
         raise FormulaError(f"{error.problem}, in {_short(formula)}", **error.context) from None
     return Automaton(names, found.letter, found.target, found.reset, found.verdict, found.clocks)
 
 
 @lru_cache(maxsize=1024)
-def _compiled(formula: Formula, period: float) -> Automaton:
-    try:
-        return automaton(formula, period, UNROLL)
-    except FormulaError as first:
-        try:
-            return automaton(formula, period, LONGEST)
-        except FormulaError:
-            raise first from None
+def _compiled(formula: Formula, period: float, unroll: int) -> Automaton:
+    return automaton(formula, period, unroll)
 
 
 def _short(formula: Formula, limit: int = 80) -> str:
@@ -145,6 +144,8 @@ class Monitors:
         The names of the formulas, in the order of the verdicts' columns.
     tables : int
         How many table look-ups a frame of one trial takes.
+    lines : int
+        How many delay lines there are.
     verdicts : (B, F) int64
         The verdicts after the last frame (`automaton.VERDICTS`); before the first, what holds of the empty word.
 
@@ -160,26 +161,64 @@ class Monitors:
         if not period > 0.0:
             raise FormulaError("not a period", value=period, expected="seconds > 0")
         self.formulas = tuple(formulas)
-        self._width = len(names)
-        pieces: list[tuple[int, Automaton]] = []
+        self._column = {name: column for column, name in enumerate(names)}
+        self._pieces: list[Piece] = []
+        self._delays: list[tuple[Line, int]] = []
         for number, (name, formula) in enumerate(formulas.items()):
             try:
-                pieces += [
-                    (number, compiled(part, period)) for part in (parts(formula) if split else (formula,))
-                ]
-                _known(formula, names)
+                for part in parts(formula) if split else (formula,):
+                    self._add(number, part, period)
             except FormulaError as error:
                 raise error.within(field=name) from None
-        self._tables = _packed(pieces, {name: column for column, name in enumerate(names)})
-        self._kernel_tables: Tables | None = None
-        self.tables = len(pieces)
+        self.tables = len(self._pieces)
+        self.lines = len(self._delays)
+        self._tables = packed_tables(self._pieces)
+        self._lines = packed_lines(self._delays, self._column)
+        self._kernel: tuple[Tables, Lines] | None = None
         self.reset(0)
+
+    def _add(self, number: int, part: Formula, period: float) -> None:
+        """Monitor a part: with clocks, else with a delay line, else by counting its bounds."""
+        try:
+            self._place(number, compiled(part, period))
+            return
+        except FormulaError as error:
+            refused = error
+        found = delayed(part, period)
+        if found is not None:
+            others, late = found
+            for other in others:
+                self._add(number, other, period)
+            table = compiled(late.formula, period)
+            self._delays.append((line(late.request, period), late.length))
+            self._place(number, table, late.name, late.strong)
+            return
+        try:
+            self._place(number, compiled(part, period, LONGEST))
+        except FormulaError:
+            raise refused from None
+
+    def _place(self, number: int, table: Automaton, request: str = "", strong: bool = False) -> None:
+        """Add a table; `request` is its proposition that comes out of the last delay line."""
+        for name in table.names:
+            if name != request and name not in self._column:
+                raise FormulaError(
+                    "unknown proposition", value=name, expected="one of the problem's propositions"
+                )
+        last = len(self._delays) - 1
+        columns = tuple(
+            len(self._column) + last if name == request else self._column[name] for name in table.names
+        )
+        self._pieces.append(Piece(number, table, columns, last if strong else -1))
 
     def reset(self, trials: int) -> None:
         """Begin anew with `trials` trials."""
         tables = self._tables
         self._state = np.zeros((trials, self.tables), dtype=np.int64)
         self._clocks = np.zeros((trials, len(tables["clock_length"])), dtype=np.int64)
+        self._memory = np.zeros((trials, len(self._delays), 3), dtype=np.int64)
+        self._rings = np.zeros((trials, sum(length for _, length in self._delays)), dtype=np.int64)
+        self._frame = np.zeros((trials, len(self._column) + len(self._delays)), dtype=np.int64)
         first = np.full(len(self.formulas), 3, dtype=np.int64)
         np.minimum.at(first, tables["part_of"], tables["verdict"][tables["verdict_at"]])
         self.verdicts = np.tile(first, (trials, 1))
@@ -197,66 +236,16 @@ class Monitors:
         (B, F) int64
             `verdicts`, updated in place.
         """
-        from dubins_traffic.spec.logic.kernel import Tables, advance
+        from dubins_traffic.spec.logic.kernel import Lines, Tables, advance, delay
 
-        if self._kernel_tables is None:
-            self._kernel_tables = Tables(**self._tables)
-        if values.shape != (len(self._state), self._width):
-            raise ValueError(f"values: shape {values.shape}, expected {(len(self._state), self._width)}")
-        frame = np.ascontiguousarray(values, dtype=np.int64)
-        advance(frame, self._kernel_tables, self._state, self._clocks, self.verdicts)
+        width = len(self._column)
+        if values.shape != (len(self._state), width):
+            raise ValueError(f"values: shape {values.shape}, expected {(len(self._state), width)}")
+        if self._kernel is None:
+            self._kernel = Tables(**self._tables), Lines(**self._lines)
+        tables, lines = self._kernel
+        self._frame[:, :width] = values
+        if self._delays:
+            delay(self._frame, lines, self._memory, self._rings)
+        advance(self._frame, tables, self._memory, self._state, self._clocks, self.verdicts)
         return self.verdicts
-
-
-def _known(formula: Formula, names: Sequence[str]) -> None:
-    for name in propositions(formula):
-        if name not in names:
-            raise FormulaError(
-                "unknown proposition", value=name, expected="one of the problem's propositions"
-            )
-
-
-def _packed(pieces: Sequence[tuple[int, Automaton]], column: Mapping[str, int]) -> dict[str, Ints]:
-    """Return the fields of `kernel.Tables`; tables that several parts share stand once."""
-    shared: dict[int, tuple[int, int, int]] = {}
-    letter: list[Ints] = []
-    target: list[Ints] = []
-    reset: list[Ints] = []
-    verdict: list[Ints] = []
-    places: list[tuple[int, int, int]] = []
-    sizes = [0, 0, 0]
-    for _, piece in pieces:
-        place = shared.get(id(piece.target))
-        if place is None:
-            place = shared[id(piece.target)] = (sizes[0], sizes[1], sizes[2])
-            for held, array in ((letter, piece.letter), (target, piece.target), (reset, piece.reset)):
-                held.append(array.reshape(-1))
-            verdict.append(piece.verdict)
-            sizes = [
-                sizes[0] + piece.letter.size,
-                sizes[1] + piece.target.size,
-                sizes[2] + piece.verdict.size,
-            ]
-        places.append(place)
-    clocks = [len(piece.clocks) for _, piece in pieces]
-    fields: dict[str, Any] = {
-        "names_off": np.cumsum([0] + [len(piece.names) for _, piece in pieces]),
-        "names": [column[name] for _, piece in pieces for name in piece.names],
-        "letter_at": [place[0] for place in places],
-        "cell_at": [place[1] for place in places],
-        "verdict_at": [place[2] for place in places],
-        "letters": [piece.target.shape[1] for _, piece in pieces],
-        "clock_count": clocks,
-        "clock_off": np.cumsum([0, *clocks])[:-1],
-        "part_of": [number for number, _ in pieces],
-        "letter": _joined(letter),
-        "target": _joined(target),
-        "reset": _joined(reset),
-        "verdict": _joined(verdict),
-        "clock_length": _joined([piece.clocks for _, piece in pieces]),
-    }
-    return {name: np.ascontiguousarray(value, dtype=np.int64) for name, value in fields.items()}
-
-
-def _joined(arrays: Sequence[Ints]) -> Ints:
-    return np.concatenate(arrays) if arrays else np.zeros(0, dtype=np.int64)

@@ -128,6 +128,23 @@ class Table:
         FormulaError
             If a past operator ranges over a future one, or if there are too many propositions.
         """
+        self._prepare(formula)
+        self.root = self._build(formula, True)
+
+    def observe(self, formula: Formula) -> None:
+        """Make `outcome` and `letter` ready for a formula without future operators.
+
+        Raises
+        ------
+        FormulaError
+            If there are too many propositions.
+        """
+        self._prepare(formula)
+        self._register(formula)
+        if formula not in self._timed:
+            self._test(formula, True)
+
+    def _prepare(self, formula: Formula) -> None:
         self.names = propositions(formula)
         if len(self.names) > MAX_PROPOSITIONS:
             raise FormulaError(
@@ -149,7 +166,6 @@ class Table:
             if part.op in PAST or part in future or any(arg in timed for arg in part.args):
                 timed.add(part)
         self._timed = timed
-        self.root = self._build(formula, True)
 
     def dual(self, number: int) -> int:
         """Return the negation of an obligation."""
@@ -237,6 +253,11 @@ class Table:
         return self.node(Node("test", first=number, strong=positive))
 
     def _past(self, formula: Formula) -> int:
+        self._register(formula)
+        return self._past_number[formula]
+
+    def _register(self, formula: Formula) -> None:
+        """Number the past operators in `formula`, parts before wholes, and the tests that they ask for."""
         for part in subformulas(formula):
             if part in self._timed:
                 for arg in part.args:
@@ -245,7 +266,6 @@ class Table:
             if part.op in PAST and part not in self._past_number:
                 self._past_number[part] = len(self.past)
                 self.past.append(part)
-        return self._past_number[formula]
 
     def _temporal(self, formula: Formula, positive: bool) -> int:
         op = formula.op if positive else DUAL[formula.op]

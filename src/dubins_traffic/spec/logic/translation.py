@@ -177,9 +177,9 @@ def written_out(formula: Formula) -> Formula:
         low, high = (int(bound) for bound in part.bounds)
         if high > MAX_NEXT:
             raise FormulaError(
-                "a bound is too long to be written out with next",
-                value=high,
-                expected=f"at most {MAX_NEXT} ticks",
+                f"a bound of {high} ticks is too long to be written out with next",
+                value=str(part),
+                expected=f"at most {MAX_NEXT} ticks: a longer period, or a format that counts",
             )
         (arg,) = part.args
         found = arg
