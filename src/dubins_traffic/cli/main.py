@@ -52,6 +52,10 @@ app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 
+INTERRUPTED = 130
+"""What the library returns after Ctrl-C; our commands have failed then, like any that did not finish."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
@@ -66,4 +70,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except Exception as error:
         return faults.conclude(error, arguments)
-    return int(status or faults.OK)
+    return faults.FAILED if status == INTERRUPTED else int(status or faults.OK)

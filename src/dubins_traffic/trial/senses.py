@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 
-new: Callable[..., Any] = tuple.__new__
+new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknownMemberType]
 """Makes a named tuple from a sequence of all its fields, in half the time of a call; some ten are made a tick."""
 
 
