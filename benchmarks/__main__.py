@@ -1,6 +1,6 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single` and `startup` take about a minute; `lanes` runs 400 trials and takes some minutes.
+`motion`, `single`, `startup` and `judging` take about a minute; `lanes` runs 400 trials and takes some minutes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 
 from benchmarks.table import show
 
-NAMES = ("motion", "single", "startup", "lanes")
+NAMES = ("motion", "single", "startup", "judging", "lanes")
 
 
 def main(names: list[str]) -> int:

@@ -50,7 +50,8 @@ EXIT2: Final = 0
 WAY: Final = 1
 EXIT_GAP: Final = 2
 LANE_MIDDLE: Final = 3
-REALS: Final = 4
+NEAR2: Final = 4
+REALS: Final = 5
 
 OFF_ROAD: Final = 0
 LEFT_SINCE: Final = 1
@@ -88,8 +89,8 @@ class Terms(NamedTuple):
     ----------
     real : (B, REALS) float64
         Squared distance of a body, without its rounding, from a vertex up to which it is in the way of those who
-        leave (`EXIT2`); E5's way ahead (`WAY`); E4's free length of an exit (`EXIT_GAP`); distance of the right
-        lane's middle from the centre line (`LANE_MIDDLE`). Metres.
+        leave (`EXIT2`), and of its centre (`NEAR2`); E5's way ahead (`WAY`); E4's free length of an exit
+        (`EXIT_GAP`); distance of the right lane's middle from the centre line (`LANE_MIDDLE`). Metres.
     whole : (B, WHOLES) int64
         Whether the trial is judged at all, and the durations of the rules in ticks; E3's most new tickets.
     goal_off : (B + 1,) int64
@@ -177,7 +178,9 @@ def pack_terms(
     goal_off, goal = [0], list[int]()
     for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
         reach = radius + own.exit_gap + float(cars.rounding[b])
+        far = float(cars.reach[b] - cars.rounding[b])
         real[b, EXIT2] = reach * reach
+        real[b, NEAR2] = (reach + far) * (reach + far)
         real[b, WAY] = own.way_distance
         real[b, EXIT_GAP] = own.exit_gap
         real[b, LANE_MIDDLE] = cars.w[b]

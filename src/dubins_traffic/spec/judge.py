@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -56,8 +56,7 @@ class Arraigned(Posed, Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Breach:
+class Breach(NamedTuple):
     """A rule was broken: `rule` (a name in `RULES`) by the car with index `car`, in frame `tick`.
 
     `since` is the frame in which what led to it began. (x, y) is the centre of the car in frame `tick`, or the point
@@ -206,13 +205,17 @@ class Referee:
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._docket.filled[0] and not any(contacts):
             return [()] * len(self._judged)
-        breaches: list[list[Breach]] = [[] for _ in self._judged]
+        by_trial: dict[int, list[Breach]] = {}
         for row in self._found():
             b, n = row[OF_TRIAL], row[OF_CAR]
-            breaches[b].append(_breach(row, float(state.x[b, n]), float(state.y[b, n])))
+            by_trial.setdefault(b, []).append(_breach(row, float(state.x[b, n]), float(state.y[b, n])))
         for b, own in enumerate(contacts):
-            breaches[b] += _accused(own) if self._judged[b] else ()
-        return [sorted(own, key=_order) for own in breaches]
+            if own and self._judged[b]:
+                by_trial.setdefault(b, []).extend(_accused(own))
+        breaches: list[Sequence[Breach]] = [()] * len(self._judged)
+        for b, own in by_trial.items():
+            breaches[b] = sorted(own, key=_order)
+        return breaches
 
     def _block(self, frames: Frames) -> tuple[Bits, Bits, list[Breach]]:
         """Label and judge a block; return the flags of the frame before it, of its frames, and the breaches."""

@@ -8,10 +8,9 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
-from dubins_traffic.kernels.compile import jit
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.blocking import obstacle_narrows
 from dubins_traffic.spec.docket import (
     AT,
     AT_SINCE,
@@ -23,8 +22,6 @@ from dubins_traffic.spec.docket import (
     ENTER,
     ENTER_TICKS,
     EXIT,
-    EXIT2,
-    EXIT_GAP,
     EXIT_SINCE,
     EXIT_TICKS,
     FIRST_SINCE,
@@ -32,7 +29,6 @@ from dubins_traffic.spec.docket import (
     GOAL_TICKS,
     JUDGED,
     LANE,
-    LANE_MIDDLE,
     LEFT_SINCE,
     LEFT_UNBLOCKED,
     MOST_TICKETS,
@@ -57,6 +53,7 @@ from dubins_traffic.spec.docket import (
     Docket,
     Terms,
 )
+from dubins_traffic.spec.exits import has_exit
 from dubins_traffic.spec.frame import label_tables
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
@@ -73,18 +70,10 @@ from dubins_traffic.spec.propositions import (
     STANDS,
     STOPPED,
 )
-from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
     FORFEITS,
-    FREE_NEEDED,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LANE_WIDTH,
-    LEFT_SET,
     NET,
     PROGRESS,
-    RADIUS,
-    ROUNDING,
     TICKET,
     Memory,
     RuleTable,
@@ -123,39 +112,77 @@ def judge_frame(
             bits = np.int64(flags[n])
             lane = lanes[n]
             v = labels.crosses[b, n]
-            _judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
+            if bits & LEFT != 0:
+                _judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
+            else:
+                clock[LEFT_SINCE] = -1
+                clock[UNBLOCKED_SINCE] = -1
             if bits & ENTERS == ENTERS:
-                stopped = (
-                    past[n, BITS] & STOPPED != 0 and lane_end(roads, rules.whole[b, NET], past[n, LANE]) == v
-                )
+                stopped = False
+                if past[n, BITS] & STOPPED != 0:
+                    stopped = lane_end(roads, rules.whole[b, NET], past[n, LANE]) == v
                 _judge_entry(b, n, tick, v, stopped, cars, past, row, filled)
             if n == EGO:
                 _judge_road(b, tick, bits, lane, clock, row, filled)
                 continue
-            if bits & STOPPED != 0:
-                ahead = lane_end(roads, rules.whole[b, NET], lane)
-                _judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
-            else:
-                clock[STOPPED_SINCE] = -1
-                clock[FIRST_SINCE] = -1
-            if past[n, CROSSES] != v:
-                clock[EXIT_SINCE] = -1
-            free = v >= 0 and _has_exit(b, n, v, state, roads, obstacles, rules, terms, labels)
-            if _run(free, tick, clock, EXIT_SINCE) == whole[EXIT_TICKS]:
-                _add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, row, filled)
-            free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
-            free = free and _has_way(n, cars, terms.real[b, WAY], lanes, flags, memory.measure[b])
-            if _run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
-                _add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
+            _judge_agent(
+                b, n, tick, bits, lane, v, state, roads, obstacles, rules, terms, labels, memory, docket
+            )
             if past[n, AT] != labels.at[b, n]:
                 clock[AT_SINCE] = tick
         for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
-            _judge_goal(b, tick, cars, g, terms, labels.at[b], docket)
+            who = _at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
+            if who < 0:
+                docket.goal_clock[g] = -1
+            elif docket.goal_clock[g] < 0:
+                docket.goal_clock[g] = tick
+            if who >= 0 and tick - docket.goal_clock[g] == whole[GOAL_TICKS]:
+                _add(b, GOAL, who, tick, docket.goal_clock[g], terms.goal[g], -1, row, filled)
         for n in range(cars):
             past[n, BITS] = flags[n]
             past[n, LANE] = lanes[n]
             past[n, CROSSES] = labels.crosses[b, n]
             past[n, AT] = labels.at[b, n]
+
+
+@jit_inline
+def _judge_agent(
+    b: int,
+    n: int,
+    tick: int,
+    bits: Any,
+    lane: int,
+    v: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> None:
+    """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1)."""
+    whole, row, filled, clock = terms.whole[b], docket.row, docket.filled, docket.clock[b, n]
+    if bits & STOPPED != 0:
+        ahead = lane_end(roads, rules.whole[b, NET], lane)
+        _judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
+    else:
+        clock[STOPPED_SINCE] = -1
+        clock[FIRST_SINCE] = -1
+    if docket.past[b, n, CROSSES] != v or v < 0:
+        clock[EXIT_SINCE] = -1
+    if v >= 0:
+        free = has_exit(b, n, v, state, roads, obstacles, rules, terms, labels)
+        if _run(free, tick, clock, EXIT_SINCE) == whole[EXIT_TICKS]:
+            _add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, row, filled)
+    free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
+    if free:
+        free = _has_way(
+            n, state.count[b], terms.real[b, WAY], labels.lane[b], labels.bits[b], memory.measure[b]
+        )
+    if _run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
+        _add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
 
 
 @jit
@@ -209,7 +236,7 @@ def _add(
     filled[0] = k + 1
 
 
-@jit
+@jit_inline
 def _run(holds: bool, tick: int, clock: Ints, which: int) -> int:
     """Keep the clock of a run; return for how many ticks it has gone on, -1 if there is none."""
     if not holds:
@@ -251,7 +278,7 @@ def _judge_entry(
             return
 
 
-@jit
+@jit_inline
 def _judge_road(b: int, tick: int, bits: Any, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
     """Rule 1: the ego stays on the road from its first frame there."""
     if bits & ON_ROAD != 0:
@@ -284,58 +311,6 @@ def _judge_queue(
 
 
 @jit
-def _has_exit(
-    b: int,
-    n: int,
-    v: int,
-    state: State,
-    t: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: Terms,
-    labels: Labels,
-) -> bool:
-    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane."""
-    real = rules.real[b]
-    net = rules.whole[b, NET]
-    row = t.vert_off[net] + v
-    vx, vy = t.vert[row, 0], t.vert[row, 1]
-    mouth, middle = real[RADIUS], terms.real[b, LANE_MIDDLE]
-    taken = 0
-    for k in range(state.count[b]):
-        x, y, c, s = state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k]
-        near2 = distance2_to_body(vx, vy, x, y, c, s, real[HALF_LENGTH], real[HALF_WIDTH])
-        if k == n or near2 > terms.real[b, EXIT2]:
-            continue
-        for arm in range(t.degree[row]):
-            lane = t.arms[row, arm]
-            along, lateral = lane_coordinates(t, net, lane, x, y)
-            in_the_way = False
-            if labels.at[b, k] == v:
-                own, own_lateral = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
-                far2 = (along - mouth) * (along - mouth) + (lateral + middle) * (lateral + middle)
-                own2 = (own - mouth) * (own - mouth) + (own_lateral + middle) * (own_lateral + middle)
-                in_the_way = far2 < own2
-            elif labels.segment[b, k] == lane // 2:
-                tx, ty = lane_direction(t, net, lane)
-                half = half_extent(tx, ty, c, s, real[HALF_LENGTH], real[HALF_WIDTH], real[ROUNDING])
-                in_the_way = lateral - half < -real[LEFT_SET]
-            if in_the_way:
-                taken |= 1 << arm
-    for arm in range(t.degree[row]):
-        if taken & (1 << arm) != 0:
-            continue
-        lane = t.arms[row, arm]
-        length = t.seg[t.seg_off[net] + lane // 2, 4]
-        far = mouth + terms.real[b, EXIT_GAP]
-        if obstacles.base[b] < 0 or not obstacle_narrows(
-            obstacles, b, lane, length, mouth, far, real[LANE_WIDTH], real[FREE_NEEDED]
-        ):
-            return True
-    return False
-
-
-@jit
 def _has_way(n: int, cars: int, reach: float, lanes: Ints, flags: Bits, measure: Floats) -> bool:
     """E5: tell whether nobody stands or waits within `reach` ahead of car n in its lane."""
     own = measure[n, PROGRESS]
@@ -347,20 +322,11 @@ def _has_way(n: int, cars: int, reach: float, lanes: Ints, flags: Bits, measure:
     return True
 
 
-@jit
-def _judge_goal(b: int, tick: int, cars: int, g: int, terms: Terms, at: Ints, docket: Docket) -> None:
-    """E6: a goal is free again and again; of one that is not, the e-agent there longest is named."""
-    goal = terms.goal[g]
-    clock = docket.clock[b]
+@jit_inline
+def _at_goal(goal: int, cars: int, at: Ints, clock: Ints) -> int:
+    """E6: return the e-agent that has been at a goal longest, -1 if none is there."""
     who = -1
     for n in range(1, cars):
         if at[n] == goal and (who < 0 or clock[n, AT_SINCE] < clock[who, AT_SINCE]):
             who = n
-    if who < 0:
-        docket.goal_clock[g] = -1
-        return
-    if docket.goal_clock[g] < 0:
-        docket.goal_clock[g] = tick
-    since = docket.goal_clock[g]
-    if tick - since == terms.whole[b, GOAL_TICKS]:
-        _add(b, GOAL, who, tick, since, goal, -1, docket.row, docket.filled)
+    return who
