@@ -48,7 +48,8 @@ def wander(start, **more):
 
 
 def test_names_say_what_the_kinds_do() -> None:
-    assert set(names()) == set(KINDS) == {"wander", "loop", "follow", "parked", "scripted"}
+    own = {"wander", "loop", "follow", "parked", "scripted"}
+    assert set(names()) == set(KINDS) == own | {"lawful", "nemesis"}
     assert all(len(line) > 20 for line in names().values())
 
 

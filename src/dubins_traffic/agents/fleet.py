@@ -19,6 +19,7 @@ from dubins_traffic.agents.tables import (
     GAP,
     GOAL_X,
     INTS,
+    KEEP_RULES,
     KIND,
     KINDS,
     LANE,
@@ -45,6 +46,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
+from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import RoadTable, pack
 
 if TYPE_CHECKING:
@@ -83,6 +85,11 @@ class Fleet:
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin a batch, of one control rate, whose first frame is `state`."""
         trials, cars = state.x.shape
+        kinds = {agent.kind for instance in instances for agent in instance.e_agents}
+        self._lawful = _lawful() if kinds & KEEP_RULES else None
+        if self._lawful is not None:
+            self._lawful.reset(instances, state)
+        self._others = not kinds <= KEEP_RULES
         self._roads, net = _pack_roads(instances)
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         ints = np.zeros((trials, cars, INTS), dtype=np.int64)
@@ -92,6 +99,8 @@ class Fleet:
         script: list[tuple[float, float, float]] = []
         for b, instance in enumerate(instances):
             for n, agent in enumerate(instance.e_agents, start=1):
+                if agent.kind in KEEP_RULES:
+                    continue
                 given = _parameters(agent)
                 floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
                 _plan(instance, given, ints[b, n], agent.kind, cycle, script)
@@ -111,8 +120,14 @@ class Fleet:
         )
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
 
-    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:  # noqa: ARG002
+    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of the e-agents for [t_k, t_k+1) into `commands` (B, N, 2)."""
+        if self._others:
+            self._decide_others(tick, state, commands)
+        if self._lawful is not None:
+            self._lawful.decide(tick, state, labels, commands)
+
+    def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
         while done < commands.shape[0]:
             reached = decide(
@@ -130,6 +145,13 @@ class Fleet:
                 done = -1 - reached
                 pairs = 4 * len(self._work.pair)
                 self._work = self._work._replace(pair=np.zeros((pairs, 2), dtype=np.int64))
+
+
+def _lawful() -> Driver:
+    """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
+    from dubins_traffic.agents.lawful import Lawful
+
+    return Lawful()
 
 
 @cache

@@ -16,10 +16,12 @@ from dubins_traffic.protocols import Controller
 
 _BUILT_IN = {
     "lanes": ("dubins_traffic.controllers.lanes", "Lanes"),
+    "rules": ("dubins_traffic.controllers.rules", "Rules"),
     "simple": ("dubins_traffic.controllers.simple", "Simple"),
 }
 _DESCRIPTIONS = {
     "lanes": "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
+    "rules": "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
     "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
 }
 _OPTION = "--controller"

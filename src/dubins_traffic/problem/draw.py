@@ -13,6 +13,7 @@ from dubins_traffic.problem.configuration import Configuration, PlannedAgent, ch
 from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
 from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
+from dubins_traffic.problem.kinds import loops
 from dubins_traffic.problem.starts import Ground, Wish, draw_starts
 from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
 from dubins_traffic.roads.generate import random_network, thinned_grid
@@ -90,7 +91,7 @@ def complete_agents(
     agents: list[EAgent] = []
     for agent in (plan.agent for plan in planned):
         parameters = dict(agent.parameters)
-        if agent.kind == "loop" and parameters["cycle"] is None:
+        if loops(agent.kind, parameters) and parameters["cycle"] is None:
             parameters["cycle"] = draw_cycle(network, draws)
         agents.append(EAgent(agent.kind, agent.name, agent.type, parameters))
     return tuple(agents)
@@ -103,7 +104,7 @@ def agent_wishes(
     wishes: list[Wish] = []
     for plan, agent in zip(planned, agents, strict=True):
         lanes = None
-        if agent.kind == "loop":
+        if loops(agent.kind, agent.parameters):
             try:
                 lanes = cycle_lanes(network, agent.parameters["cycle"])
             except InputError as error:

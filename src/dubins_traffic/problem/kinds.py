@@ -7,7 +7,7 @@ parameters of the kind, defaults filled in, and for a `loop` the cycle that was 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -18,6 +18,7 @@ from dubins_traffic.problem.faults import Strict, parse
 Speed = Annotated[float, Field(gt=0, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
 Seconds = Annotated[float, Field(ge=0, le=limits.SECONDS)]
+Share = Annotated[float, Field(ge=0, le=1)]
 LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
 TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -103,12 +104,45 @@ class Scripted(Strict):
     repeat: bool = Field(default=False, description="whether the commands begin again after the last")
 
 
+class Lawful(Strict):
+    """Keeps the rules of the road: right lane, stops, order of arrival; may be made to break named ones."""
+
+    goes: Literal["wander", "loop", "places"] = Field(
+        default="wander", description="at random, round a cycle, or between random intersections"
+    )
+    cycle: list[LatticePoint] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=limits.GOALS,
+        description="for loop: lattice points of the intersections, in order; null: drawn",
+    )
+    speed: Speed = Field(default=0.5, description="speed, m/s")
+    rolls: Share = Field(
+        default=0.0, description="share of crossings entered without stopping or waiting (E1)"
+    )
+    left: Share = Field(default=0.0, description="share of roads driven on the left (E1)")
+    blocks: Share = Field(default=0.0, description="share of intersections in which it stands for 9 s (E4)")
+    tailgates: Share = Field(default=0.0, description="share of roads on which it keeps hardly any gap")
+    parks: Share = Field(
+        default=0.0, description="share of visits to a goal at which it parks there (E4, E6)"
+    )
+    parks_for: Seconds = Field(default=90.0, description="longest time for which it parks, s")
+
+
+class Nemesis(Strict):
+    """Spoils the ego's task within the assumption: gets to its goals first and is slow before it."""
+
+    speed: Speed = Field(default=0.7, description="speed while the ego is not behind it, m/s")
+
+
 KINDS: Mapping[str, type[Strict]] = {
     "wander": Wander,
     "loop": Loop,
     "follow": Follow,
     "parked": Parked,
     "scripted": Scripted,
+    "lawful": Lawful,
+    "nemesis": Nemesis,
 }
 """Kinds by name, each with the model of its parameters."""
 
@@ -134,3 +168,8 @@ def kind_of(name: str) -> str:
 def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the rest."""
     return parse(KINDS[kind], given, field="parameters").model_dump()
+
+
+def loops(kind: str, parameters: Mapping[str, Any]) -> bool:
+    """Tell whether an e-agent of `kind` drives round a cycle."""
+    return kind == "loop" or (kind == "lawful" and parameters["goes"] == "loop")

@@ -117,7 +117,7 @@ class AgentEntry(Open):
     """One e-agent, or `count` of them."""
 
     type: str = Field(
-        description='what drives it: wander, loop, follow, parked, scripted, or "wander/wander"'
+        description='what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, or "wander/wander"'
     )
     name: str = Field(
         default="agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."

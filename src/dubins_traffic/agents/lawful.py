@@ -1,0 +1,92 @@
+"""The e-agents `lawful` and `nemesis`: the law of the road (`driving.law`) with their own ways to go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dubins_traffic.agents.tables import KEEP_RULES
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.driving.law import decide
+from dubins_traffic.driving.law_tables import (
+    BLOCKS,
+    FIRST,
+    GOES,
+    KIND,
+    LAST,
+    LEFTS,
+    LOOP,
+    NEMESIS,
+    PARK_TIME,
+    PARKS,
+    ROLLS,
+    SPEED,
+    TAILGATES,
+    Drivers,
+    blank,
+    build_of,
+    desk,
+    pack_roads,
+)
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.problem.cycles import cycle_lanes
+from dubins_traffic.problem.kinds import parameters_of
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+
+class Lawful:
+    """Drives the e-agents of a batch that keep the rules (a `protocols.Driver`); all others are left alone."""
+
+    def reset(self, instances: Sequence[Instance], state: State) -> None:
+        """Begin a batch whose first frame is `state`."""
+        trials, cars = state.x.shape
+        self._roads, net = pack_roads(instances)
+        self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
+        rows = [blank(cars) for _ in range(trials)]
+        ints, floats = np.stack([row[0] for row in rows]), np.stack([row[1] for row in rows])
+        stage: list[int] = []
+        for b, instance in enumerate(instances):
+            for n, agent in enumerate(instance.e_agents, start=1):
+                if agent.kind in KEEP_RULES:
+                    given = {**parameters_of(agent.kind, {}), **agent.parameters}
+                    _describe(instance, agent.kind, given, ints[b, n], floats[b, n], stage)
+        self._drivers = Drivers(
+            active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
+            net=net,
+            seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
+            trial=np.array([instance.trial for instance in instances], dtype=np.int64),
+            build=build_of([instance.problem for instance in instances]),
+            ints=ints,
+            floats=floats,
+            stage=np.array(stage, dtype=np.int64),
+            distance=np.zeros((0, 0)),
+        )
+        self._desk = desk(cars, int(np.diff(self._roads.seg_off).max()))
+
+    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
+        """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
+        decide(tick, state, labels, self._roads, self._obstacles, self._drivers, self._desk, commands)
+
+
+def _describe(
+    instance: Instance, kind: str, given: Mapping[str, Any], ints: Ints, floats: Floats, stage: list[int]
+) -> None:
+    """Fill the rows of a car, and put its loop or the goals it may park at into `stage`."""
+    problem = instance.problem
+    floats[SPEED] = min(given["speed"], problem.car.bounds.speed)
+    ints[KIND] = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
+    ints[FIRST] = len(stage)
+    stage += (
+        cycle_lanes(problem.network, given["cycle"])
+        if ints[KIND] == LOOP
+        else dict.fromkeys(problem.goal_vertices)
+    )
+    ints[LAST] = len(stage)
+    if kind == "lawful":
+        shares = ("rolls", "left", "blocks", "tailgates", "parks", "parks_for")
+        floats[[ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME]] = [given[name] for name in shares]

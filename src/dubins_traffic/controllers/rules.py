@@ -1,0 +1,117 @@
+"""The controller `rules`: the shortest round through the goals under all the rules of the road."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, Propositions, State
+from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.driving.law import decide
+from dubins_traffic.driving.law_tables import (
+    FIRST,
+    KIND,
+    LAST,
+    PLACE,
+    ROUND,
+    SPEED,
+    Desk,
+    Drivers,
+    blank,
+    build_of,
+    desk,
+)
+from dubins_traffic.driving.tours import LaneGraph, find_round
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.problem.instance import Problem
+from dubins_traffic.roads.table import RoadTable, pack
+
+
+class Rules:
+    """Drives round the goals in the right lane, stops, waits its turn, and passes what stands.
+
+    Notes
+    -----
+    The goals are visited in the order of the shortest closed route along lanes (`driving.tours.find_round`), each by
+    the lane that this route takes; from wherever the car is, it goes the shortest way there. It enters a crossing when
+    it is its turn and there is room behind it; in time it takes another exit if there is none. A last look before
+    every tick rules out all motions that could bring about a contact. Without goals that can be reached it stands.
+    """
+
+    def __init__(self) -> None:
+        self._drivers: Drivers | None = None
+
+    def start(self, problem: Problem) -> None:
+        """Find the round."""
+        cars = 1 + len(problem.e_agents)
+        ints, floats = blank(cars)
+        stage, distance = _stages(problem)
+        self._state = State.zeros(1, cars)
+        self._labels = Labels.zeros(1, cars)
+        self._command = np.zeros((1, cars, 2))
+        self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
+        self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
+        self._desk: Desk = desk(cars, len(problem.network.segments))
+        if not len(stage):
+            return
+        ints[EGO, [KIND, FIRST, LAST]] = (ROUND, 0, len(stage))
+        floats[EGO, SPEED] = problem.car.bounds.speed
+        self._drivers = Drivers(
+            active=np.ones(1, dtype=np.int64),
+            net=np.zeros(1, dtype=np.int64),
+            seed=np.zeros(1, dtype=np.uint64),
+            trial=np.zeros(1, dtype=np.int64),
+            build=build_of([problem]),
+            ints=ints[None].copy(),
+            floats=floats[None].copy(),
+            stage=stage,
+            distance=distance,
+        )
+
+    def act(self, observation: Observation) -> Command:
+        """Drive on."""
+        drivers = self._drivers
+        if drivers is None:
+            return Command(0.0, 0.0)
+        state, labels = self._state, self._labels
+        state.count[0] = 1 + len(observation.others)
+        seen = [(observation.pose, observation.twist, observation.propositions)]
+        seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
+        for n, (pose, twist, propositions) in enumerate(seen):
+            state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
+            state.speed[0, n], state.yaw_rate[0, n] = twist
+            for array, value in zip(labels, propositions, strict=True):
+                array[0, n] = value
+        if drivers.ints[0, EGO, PLACE] < 0:
+            drivers.ints[0, EGO, PLACE] = _nearest(drivers.distance, observation.propositions)
+        decide(
+            observation.tick, state, labels, self._roads, self._obstacles, drivers, self._desk, self._command
+        )
+        speed, yaw_rate = self._command[0, EGO].tolist()
+        return Command(speed, yaw_rate)
+
+
+def _stages(problem: Problem) -> tuple[Ints, Floats]:
+    """Return the goals in the order of the round (M,), and the metres from the start of each lane to each (M, L)."""
+    graph = LaneGraph(problem.network)
+    goals = dict.fromkeys(problem.goal_vertices)
+    found = find_round(graph, tuple(goals)) if goals else None
+    if found is None:
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
+    rows: list[list[float]] = []
+    stage: list[int] = []
+    for place in found.arrivals:
+        target = found.lanes[place]
+        to_target = graph.distances(target)
+        rows.append(
+            [far + own if far < inf else inf for far, own in zip(to_target, graph.length, strict=True)]
+        )
+        stage.append(graph.end[target])
+    return np.array(stage, dtype=np.int64), np.array(rows)
+
+
+def _nearest(distance: Floats, place: Propositions) -> int:
+    """Return the goal that is nearest along lanes from where the ego starts."""
+    lane = place.lane if place.lane >= 0 else 2 * place.segment
+    return int(np.argmin(distance[:, lane]))

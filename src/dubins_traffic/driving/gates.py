@@ -1,0 +1,193 @@
+"""Whether a car may enter the disc at the end of its lane: its turn at a crossing, and room behind it (compiled)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.driving.exits import cheapest, price_exits, ticks_of
+from dubins_traffic.driving.law_tables import (
+    DEGREE,
+    DISC,
+    HALF_WIDTH,
+    KIND,
+    LANE,
+    MIDDLE,
+    MOOD,
+    NEMESIS,
+    NEXT,
+    PERIOD,
+    REACH,
+    ROLLING,
+    ROUND,
+    ROUNDING,
+    TURN,
+    WAITED,
+    Desk,
+    Drivers,
+)
+from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE, way_to_go
+from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end, lane_start
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.propositions import CLEAR, FIRST, STANDS, STOPPED
+
+MARGIN = 0.02
+"""What a car keeps from a disc that it may not enter, metres."""
+BRISK = 0.3
+"""A car that leaves the crossing at this speed will make room, m/s."""
+CHOOSY = 1.0
+"""Seconds for which a car whose turn it is waits for room in the lane it wants."""
+BUDGET = 4.0
+"""Metres of detour that a car on its round accepts for each second it has waited for room."""
+DUTY = 5.4
+"""Seconds after which an e-agent enters though there is room nowhere: else it breaks E3."""
+LINGER = 2.4
+"""Seconds for which a nemesis makes the ego wait at a crossing before it enters."""
+TRAIL = 3.5
+"""A nemesis minds the ego within this, metres."""
+GOES_NOW = STOPPED | FIRST | CLEAR
+
+
+@jit
+def mind_gate(
+    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: Way,
+    near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
+) -> float:  # fmt: skip
+    """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
+    net = drivers.net[b]
+    build = drivers.build[b]
+    ints = drivers.ints[b, n]
+    v = lane_end(roads, net, ints[LANE])
+    if part != BEFORE or labels.crosses[b, n] == v:
+        return speed
+    edge = build[DISC] + build[REACH] + MARGIN
+    aside = left - build[MIDDLE]
+    line = sqrt(max(edge * edge - aside * aside, 0.0))
+    to_line = -way_to_go(way, x, y) - line
+    row = roads.vert_off[net] + v
+    crossing = roads.degree[row] >= build[DEGREE]
+    bits = np.int64(labels.bits[b, n])
+    its_turn = crossing and bits & GOES_NOW == GOES_NOW
+    ints[TURN] = ints[TURN] + 1 if its_turn else 0
+    if to_line >= speed * build[PERIOD]:
+        return speed
+    if crossing:
+        free = its_turn and may_go(b, n, tick, state, labels, roads, drivers, desk)
+        free = free or ints[MOOD] & ROLLING != 0
+    else:
+        inside = 0
+        for k in range(near):
+            j = desk.near[k]
+            if labels.crosses[b, j] == v:
+                inside += shares_way(b, j, way, roads.degree[row], state, build)
+        free = (roads.degree[row] > 1 or inside == 0) and has_room(
+            b, n, ints[NEXT], inside, state, labels, roads, drivers, desk
+        )
+    return speed if free else max(0.0, to_line) / build[PERIOD]
+
+
+@jit_inline
+def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) -> int:
+    """Return 1 if a car in the disc is on this way, or in a dead end."""
+    if degree < 2:
+        return 1
+    _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+    return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+
+
+@jit
+def may_go(
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+) -> bool:
+    """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
+    ints = drivers.ints[b, n]
+    build = drivers.build[b]
+    if ints[KIND] == NEMESIS and ints[TURN] < ticks_of(LINGER, build):
+        dx = state.x[b, 0] - state.x[b, n]
+        dy = state.y[b, 0] - state.y[b, n]
+        if dx * dx + dy * dy < TRAIL * TRAIL:
+            return False
+    if has_room(b, n, ints[NEXT], 0, state, labels, roads, drivers, desk):
+        return True
+    waited = ints[TURN] - ticks_of(CHOOSY, build)
+    if waited < 0 or waited % 8 != 0:
+        return ints[KIND] != ROUND and ints[TURN] > ticks_of(DUTY, build)
+    net = drivers.net[b]
+    v = lane_end(roads, net, ints[LANE])
+    row = roads.vert_off[net] + v
+    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    allowed = 0
+    wanted = 0.0
+    for k in range(roads.degree[row]):
+        if roads.arms[row, k] == ints[NEXT]:
+            wanted = desk.cost[k]
+    budget = BUDGET * ints[TURN] * build[PERIOD]
+    for k in range(roads.degree[row]):
+        cheap = ints[KIND] != ROUND or desk.cost[k] - wanted < budget
+        if cheap and has_room(b, n, roads.arms[row, k], 0, state, labels, roads, drivers, desk):
+            allowed |= 1 << k
+    out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
+    if out >= 0:
+        ints[NEXT] = out
+        return True
+    return ints[KIND] != ROUND and ints[TURN] > ticks_of(DUTY, build)
+
+
+@jit
+def has_room(
+    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
+    desk: Desk,
+) -> bool:  # fmt: skip
+    """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
+
+    `inside` cars are still in the disc and will be before it.
+    """
+    net = drivers.net[b]
+    build = drivers.build[b]
+    edge = build[DISC] + build[REACH] + MARGIN
+    mouth = sqrt(max(edge * edge - build[MIDDLE] * build[MIDDLE], 0.0))
+    pitch = 2.0 * build[REACH] + QUEUE_GAP
+    last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
+    tx, ty = lane_direction(roads, net, out)
+    last -= pitch * inside
+    j = desk.head[out >> 1]
+    while j >= 0:
+        if j != n:
+            along, aside = lane_coordinates(roads, net, out, state.x[b, j], state.y[b, j])
+            there = aside < build[HALF_WIDTH] + build[ROUNDING] + 0.05
+            if there and along > build[DISC] and labels.crosses[b, j] != lane_start(roads, net, out):
+                heading = state.c[b, j] * tx + state.s[b, j] * ty
+                slow = abs(state.speed[b, j]) < BRISK or heading < 0.5
+                if slow and along < mouth + pitch:
+                    return False
+                if labels.bits[b, j] & STANDS != 0 or heading < 0.0:
+                    last = min(last, along)
+                last -= pitch
+        j = desk.link[j]
+    return last >= mouth
+
+
+@jit
+def turn_elsewhere(
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+) -> None:  # fmt: skip
+    """Choose another exit for a car that is held up in a disc."""
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    v = lane_end(roads, net, ints[LANE])
+    row = roads.vert_off[net] + v
+    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    allowed = 0
+    for k in range(roads.degree[row]):
+        out = roads.arms[row, k]
+        if out != ints[NEXT] and has_room(b, n, out, 0, state, labels, roads, drivers, desk):
+            allowed |= 1 << k
+    out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
+    if out >= 0:
+        ints[NEXT] = out
+        ints[WAITED] = 0

@@ -1,0 +1,139 @@
+"""What the law of the road (`driving.law`) reads and writes: the drivers of a batch, and room to work in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.spec.parameters import RuleParameters
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance, Problem
+
+ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
+GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
+
+KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, WAITED, MOOD = range(10)
+INTS = 10
+"""Columns of `Drivers.ints`.
+
+KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, LAST: its rows of `stage` are FIRST to
+LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the row of `stage` it is at, -1: none; GOAL:
+the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
+which it has been its turn to enter the crossing ahead; WAITED: ticks for which something has been in its way; MOOD:
+which rules it breaks on this lane.
+"""
+
+SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD = range(10)
+FLOATS = 10
+"""Columns of `Drivers.floats`.
+
+SPEED: how fast the car drives, m/s. ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS: on which share of its lanes it breaks a
+rule. PARK_TIME: for how long it parks at most, s. It remembers ASIDE: how far left of its way it passes what stands,
+metres, 0 if it passes nothing; UNTIL: metres before the end of the lane (negative) at which it returns; HOLD: for how
+long it will still stand in the disc ahead, s.
+"""
+
+REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD, DEGREE, FASTEST = range(
+    11
+)
+BUILD = 11
+"""Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
+driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
+crossing; the car's top speed, m/s.
+"""
+
+ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
+"""Bits of MOOD."""
+
+
+class Drivers(NamedTuple):
+    """The cars of a batch that the law drives.
+
+    `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
+    `trial` (B,): of the random numbers; `build` (B, BUILD), `ints` (B, N, INTS) and `floats` (B, N, FLOATS): columns
+    as above; `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from the beginning of each
+    lane to the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
+    """
+
+    active: Ints
+    net: Ints
+    seed: npt.NDArray[np.uint64]
+    trial: Ints
+    build: Floats
+    ints: Ints
+    floats: Floats
+    stage: Ints
+    distance: Floats
+
+
+class Desk(NamedTuple):
+    """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits."""
+
+    head: Ints
+    link: Ints
+    near: Ints
+    hops: Ints
+    queue: Ints
+    cost: Floats
+
+
+def blank(cars: int) -> tuple[Ints, Floats]:
+    """Return the rows (cars, INTS) and (cars, FLOATS) of cars that the law does not drive."""
+    ints = np.zeros((cars, INTS), dtype=np.int64)
+    ints[:, (PLACE, GOAL, LANE, NEXT)] = -1
+    return ints, np.zeros((cars, FLOATS))
+
+
+def desk(cars: int, segments: int) -> Desk:
+    """Return scratch for trials of up to `cars` cars on up to `segments` segments."""
+    return Desk(
+        head=np.full(segments, -1, dtype=np.int64),
+        link=np.zeros(cars, dtype=np.int64),
+        near=np.zeros(8 * cars, dtype=np.int64),
+        hops=np.zeros(2 * segments, dtype=np.int64),
+        queue=np.zeros(2 * segments, dtype=np.int64),
+        cost=np.zeros(4),
+    )
+
+
+def build_of(problems: Sequence[Problem]) -> Floats:
+    """Return `Drivers.build`."""
+    cars = pack_cars([problem.car for problem in problems])
+    columns = (
+        cars.reach,
+        cars.half_length,
+        cars.half_width,
+        cars.rounding,
+        cars.w,
+        np.array([problem.intersection_radius for problem in problems]),
+        cars.yaw_rate,
+        cars.turning_radius,
+        np.array([problem.period for problem in problems]),
+        np.array([RuleParameters.from_mapping(problem.rules).crossing_degree for problem in problems]),
+        cars.speed_high,
+    )
+    return np.ascontiguousarray(np.stack([column.astype(np.float64) for column in columns], axis=1))
+
+
+def pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, Ints]:
+    """Return the roads of a batch, each network once, and each trial's number in them."""
+    numbers: dict[tuple[int, float], int] = {}
+    networks: list[RoadNetwork] = []
+    widths: list[float] = []
+    net = np.zeros(len(instances), dtype=np.int64)
+    for b, instance in enumerate(instances):
+        key = (id(instance.problem.network), instance.problem.car.w)
+        if key not in numbers:
+            numbers[key] = len(networks)
+            networks.append(instance.problem.network)
+            widths.append(2.0 * instance.problem.car.w)
+        net[b] = numbers[key]
+    return pack(networks, widths), net

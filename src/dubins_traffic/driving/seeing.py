@@ -1,0 +1,199 @@
+"""What is ahead of a car on its way, and the gap to keep from it (compiled)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.law_tables import (
+    ASIDE,
+    DISC,
+    HALF_WIDTH,
+    KIND,
+    MOOD,
+    REACH,
+    ROUND,
+    ROUNDING,
+    TAILGATING,
+    UNTIL,
+    Desk,
+    Drivers,
+)
+from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.roads.lookup import lane_end, lane_start
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.propositions import APPROACH, EXCUSED, STANDS
+
+QUEUE_GAP = 0.12
+"""Gap kept behind a car that waits, metres."""
+MOVING_GAP = 0.25
+"""Gap kept behind a car that drives, metres."""
+STANDING_GAP = 0.72
+"""Gap kept behind what stands where there is room: enough to pull out, and for the e-agent of 2016 to drive off."""
+FACING_GAP = 0.8
+"""Gap kept from a car that comes, metres."""
+CLOSE_GAP = 0.06
+"""Gap kept by a car that tailgates, metres."""
+SIDE = 0.04
+"""What is kept free beside the body along the way, metres."""
+SIGHT = 3.0
+"""What is farther away than this does not matter to a car's next tick, metres."""
+HELD = 1e9
+
+
+@jit_inline
+def way_to_go(way: Way, x: float, y: float) -> float:
+    """Return minus the metres along the lane to the intersection at its end."""
+    return (x - way.x) * way.tx + (y - way.y) * way.ty
+
+
+@jit
+def gather(
+    b: int, n: int, lane: int, x: float, y: float, way: Way, labels: Labels, roads: RoadTable,
+    drivers: Drivers, desk: Desk,
+) -> int:  # fmt: skip
+    """List the cars on the car's segment, and on those that meet it where it is near an end; return how many."""
+    net = drivers.net[b]
+    disc = drivers.build[b, DISC]
+    count = add_segment(labels.segment[b, n], n, 0, desk)
+    if labels.segment[b, n] != lane >> 1:
+        count = add_segment(lane >> 1, n, count, desk)
+    to_go = -way_to_go(way, x, y)
+    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
+    for end in range(2):
+        far = to_go if end == 0 else length - to_go
+        if far > disc + (1.0 if end == 0 else 0.6):
+            continue
+        v = lane_end(roads, net, lane) if end == 0 else lane_start(roads, net, lane)
+        row = roads.vert_off[net] + v
+        for k in range(roads.degree[row]):
+            segment = roads.arms[row, k] >> 1
+            if segment != lane >> 1 and segment != labels.segment[b, n]:
+                count = add_segment(segment, n, count, desk)
+    return count
+
+
+@jit_inline
+def add_segment(segment: int, n: int, count: int, desk: Desk) -> int:
+    """Add the cars of a segment but n to `desk.near`; return how many there are now."""
+    other = desk.head[segment]
+    while other >= 0:
+        if other != n:
+            desk.near[count] = other
+            count += 1
+        other = desk.link[other]
+    return count
+
+
+@jit
+def look_ahead(
+    b: int, part: int, key: float, left: float, x: float, y: float, way: Way, near: int,
+    state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, desk: Desk,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
+
+    `who` is a car, or -2 - p for obstacle part p.
+    """
+    reach = build[REACH]
+    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE
+    low = left - wide if left < 0.0 else -wide
+    high = left + wide if left > 0.0 else wide
+    passing = floats[ASIDE] != 0.0
+    if passing and way_to_go(way, x, y) < floats[UNTIL]:
+        low = min(left, floats[ASIDE]) - 0.1
+        high = floats[ASIDE] + wide
+    gap = HELD
+    who = -1
+    close = False
+    touch = 2.0 * reach + 0.2
+    for k in range(near):
+        j = desk.near[k]
+        dx = state.x[b, j] - x
+        dy = state.y[b, j] - y
+        d2 = dx * dx + dy * dy
+        if d2 > SIGHT * SIGHT:
+            continue
+        if d2 < touch * touch:
+            close = True
+        there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+        if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
+            continue
+        if passing and labels.bits[b, j] & STANDS != 0 and its_left < floats[ASIDE] - wide + SIDE:
+            continue
+        far = sqrt(d2) if there - part < 2 else max(sqrt(d2), its_key - key)
+        its_gap = far - 2.0 * reach
+        if its_gap < gap:
+            gap = its_gap
+            who = j
+    return see_obstacles(
+        b, part, key, x, y, way, low, high, passing, gap, who, close, obstacles, build, floats
+    )
+
+
+@jit
+def see_obstacles(
+    b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float, passing: bool,
+    gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
+    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING])
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        dx = row[0] - x
+        dy = row[1] - y
+        d2 = dx * dx + dy * dy
+        far = SIGHT + row[7]
+        if d2 > far * far:
+            continue
+        if d2 < (build[REACH] + row[7] + 0.2) * (build[REACH] + row[7] + 0.2):
+            close = True
+        there, its_key, its_left, _, _ = on_way(way, row[0], row[1])
+        aside = row[7] - build[HALF_WIDTH] - build[ROUNDING]
+        if there < part or (there == part and its_key <= key):
+            continue
+        if its_left < low - aside or its_left > high + aside:
+            continue
+        if passing and its_left < floats[ASIDE] - wide - aside:
+            continue
+        its_gap = sqrt(d2) - build[REACH] - row[7]
+        if its_gap < gap:
+            gap = its_gap
+            who = -2 - p
+    return gap, who, close
+
+
+@jit
+def wanted_gap(
+    b: int,
+    n: int,
+    who: int,
+    px: float,
+    py: float,
+    state: State,
+    labels: Labels,
+    ints: Any,
+    part: int,
+) -> float:
+    """Return the gap to keep from `who`."""
+    if who == -1:
+        return 0.0
+    if who < -1:
+        return STANDING_GAP
+    if ints[MOOD] & TAILGATING != 0:
+        return CLOSE_GAP
+    its = np.int64(labels.bits[b, who])
+    along = state.c[b, who] * px + state.s[b, who] * py
+    if along < -0.3 and labels.crosses[b, who] < 0:
+        return FACING_GAP
+    in_disc = labels.crosses[b, n] >= 0
+    waits = its & EXCUSED != 0 or its & APPROACH != 0
+    if in_disc or waits:
+        return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
+    if its & STANDS != 0 or (ints[KIND] == ROUND and part == BEFORE):
+        return STANDING_GAP
+    return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 else MOVING_GAP
