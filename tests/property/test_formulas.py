@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from dubins_traffic.spec.logic.formula import (
     FALSE,
+    PAST,
     TRUE,
     Formula,
     FormulaError,
@@ -23,8 +24,8 @@ from dubins_traffic.spec.logic.formula import (
 )
 from dubins_traffic.spec.logic.parse import parse
 from dubins_traffic.spec.logic.printer import to_ascii, to_spin
-from dubins_traffic.spec.logic.rewrite import nnf, renamed, simplify
-from dubins_traffic.spec.logic.translation import in_ticks, until_and_release_only, written_out
+from dubins_traffic.spec.logic.rewrite import mapped, nnf, renamed, simplify
+from dubins_traffic.spec.logic.translation import in_ticks, until_and_release_only, without_past, written_out
 from tests.formulas import drawn, holds, words
 
 _UNARY = (Op.NOT, Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)
@@ -97,11 +98,15 @@ def _negations(formula: Formula) -> list[Formula]:
     return [part for part in subformulas(formula) if part.op is Op.NOT]
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6), st.booleans(), st.booleans())
 def test_rewriting_keeps_the_meaning(seed: int, past: bool, bounds: bool) -> None:
     names = ("a", "b")
-    formula = drawn(Random(seed), 4, names, past=past, bounds=bounds)
+    random = Random(seed)
+    raw = drawn(random, 4, names, past=past, bounds=bounds)
+    formula = mapped(
+        raw, lambda part: random.choice((part, part, part, TRUE, FALSE)) if not part.args else part
+    )
     plain = nnf(formula)
     assert all(part.args[0].op is Op.PROP for part in _negations(plain))
     assert not {Op.IMPLIES, Op.IFF} & {part.op for part in subformulas(plain)}
@@ -113,6 +118,29 @@ def test_rewriting_keeps_the_meaning(seed: int, past: bool, bounds: bool) -> Non
         value = holds(formula, found[:, :before], found[:, before:], names)
         for other in (plain, simple, counted, written_out(counted), until_and_release_only(formula)):
             assert np.array_equal(value, holds(other, found[:, :before], found[:, before:], names)), other
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.integers(0, 10**6))
+def test_memory_stands_for_past_operators(seed: int) -> None:
+    names = ("a", "b")
+    formula = drawn(Random(seed), 4, names, past=True, bounds=False)
+    (changed,), memories = without_past([formula])
+    assert not PAST & {part.op for part in subformulas(changed)}
+    known: dict[str, Formula] = {}
+    for memory in memories:
+        before = make(Op.Z if memory.first else Op.Y, (memory.meaning,))
+        known[memory.name] = memory.meaning if memory.meaning.op in (Op.Y, Op.Z) else before
+    found = words(4, 4)
+    value = holds(formula, found[:, :2], found[:, 2:], names)
+    for checked in (
+        changed,
+        *(memory.initially for memory in memories),
+        *(memory.step for memory in memories),
+    ):
+        back = mapped(checked, lambda part: known.get(part.name, part))
+        expected = value if checked is changed else np.ones_like(value)
+        assert np.array_equal(expected, holds(back, found[:, :2], found[:, 2:], names)), checked
 
 
 def test_renaming() -> None:

@@ -202,7 +202,6 @@ _FIXED_BY_RIGHT: Final = {
 }
 _UNARY_FORM: Final = {
     (Op.U, True): Op.F,
-    (Op.M, True): Op.F,
     (Op.S, True): Op.O,
     (Op.R, False): Op.G,
     (Op.W, True): None,
