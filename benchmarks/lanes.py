@@ -121,7 +121,7 @@ def instance(number: int, seed: int = 2016) -> Instance:
         "network": {
             "random": {
                 "intersections": intersections,
-                "segments": draws.between(intersections - 1, int(0.5 * (intersections + most))),
+                "segments": draws.between(intersections - 1, most),
                 "rigid_motion": True,
             }
         },

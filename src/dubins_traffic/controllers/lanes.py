@@ -12,8 +12,9 @@ import numpy as np
 
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.controllers import lanes_law as law
-from dubins_traffic.controllers.lanes_law import Desk, decide
+from dubins_traffic.controllers import lanes_desk as columns
+from dubins_traffic.controllers.lanes_desk import Desk
+from dubins_traffic.controllers.lanes_law import decide
 from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
 from dubins_traffic.driving.paths import FIELDS, LANE, LENGTH, PathMaker
 from dubins_traffic.driving.tours import LaneGraph, Round, find_round
@@ -101,7 +102,7 @@ class Lanes:
         problem = self._problem
         car = pack_cars([problem.car])
         obstacles = pack_obstacles([problem.obstacles])
-        row = np.zeros((1, law.CAR_FIELDS))
+        row = np.zeros((1, columns.CAR_FIELDS))
         reach = float(car.reach[0])
         row[0] = (
             car.half_length[0],
@@ -120,7 +121,7 @@ class Lanes:
             path=np.zeros((1, FIELDS)),
             span=np.zeros((1, 3), dtype=np.int64),
             row=np.zeros(1, dtype=np.int64),
-            memory=np.zeros((1, law.MEMORY_FIELDS)),
+            memory=np.zeros((1, columns.MEMORY_FIELDS)),
             ego=np.zeros((1, 4)),
             others=np.zeros((1, len(problem.e_agents), OTHER_FIELDS)),
             car=row,
@@ -153,10 +154,10 @@ class Lanes:
             approach += self._graph.route(lane, target, tables[k])
         lanes = [*approach, *tours.lanes[place + 1 :], *tours.lanes[: place + 1]]
         path = self._maker.path(lanes, progress, len(approach))
-        memory = np.zeros((1, law.MEMORY_FIELDS))
-        memory[0, law.BEGIN] = memory[0, law.LEFT] = left
-        memory[0, law.RAMP] = 0.2 + 0.8 * abs(left)
-        memory[0, law.UNTIL] = memory[0, law.RAMP]
+        memory = np.zeros((1, columns.MEMORY_FIELDS))
+        memory[0, columns.BEGIN] = memory[0, columns.LEFT] = left
+        memory[0, columns.RAMP] = 0.2 + 0.8 * abs(left)
+        memory[0, columns.UNTIL] = memory[0, columns.RAMP]
         span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
         return desk._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
 
@@ -211,7 +212,7 @@ class Lanes:
         time = observation.time
         old = [place for places in (self._blocked, self._closed) for place in places if places[place] <= time]
         row = desk.path[desk.row[0]]
-        if not old or row[LANE] < 0 or desk.memory[0, law.SIGMA] > 0.3 * row[LENGTH]:
+        if not old or row[LANE] < 0 or desk.memory[0, columns.SIGMA] > 0.3 * row[LENGTH]:
             return desk
         self._blocked = {lane: until for lane, until in self._blocked.items() if until > time}
         self._closed = {vertex: until for vertex, until in self._closed.items() if until > time}

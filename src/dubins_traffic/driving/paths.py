@@ -18,6 +18,7 @@ from dubins_traffic.kernels.arrays import Floats
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
+# These numbers are compiled into functions with @jit: the mark puts this file into the fingerprint of their cache.
 X, Y, C, S, LENGTH, BEND = range(6)
 """Start, unit heading, metres and curvature of a piece."""
 LOW, HIGH = 6, 7
@@ -135,7 +136,7 @@ class PathMaker:
         return rows
 
     def _bound(self, rows: Floats) -> None:
-        """Fill LOW and HIGH of the rows in turns by trying offsets at three places of each."""
+        """Fill LOW and HIGH of the rows in turns by trying offsets at three places; never up to a turn's centre."""
         w = self._problem.car.w
         turns = np.flatnonzero(rows[:, LANE] < 0)
         if not len(turns):
@@ -159,3 +160,7 @@ class PathMaker:
             while high < 60 and free[i][high + 1]:
                 high += 1
             rows[r, LOW], rows[r, HIGH] = offsets[low], offsets[high]
+            if rows[r, BEND] != 0.0:
+                inner = max(0.0, 1.0 / abs(rows[r, BEND]) - w)
+                rows[r, LOW] = max(rows[r, LOW], -inner) if rows[r, BEND] < 0.0 else rows[r, LOW]
+                rows[r, HIGH] = min(rows[r, HIGH], inner) if rows[r, BEND] > 0.0 else rows[r, HIGH]
