@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from dubins_traffic.roads.generate import generate as generate_network
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
+    from dubins_traffic.scoring.verdict import Judging, Verdict
     from dubins_traffic.viewer.plot import write_plot
     from dubins_traffic.viewer.replay import write_replay
 
@@ -47,6 +48,7 @@ _PLACES = {
     "roads.generate": ("generate_network=generate",),
     "roads.network": ("RoadNetwork",),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
+    "scoring.verdict": ("Judging", "Verdict"),
     "viewer.plot": ("write_plot",),
     "viewer.replay": ("write_replay",),
 }
@@ -76,6 +78,7 @@ __all__ = [
     "InputError",
     "Instance",
     "Job",
+    "Judging",
     "Observation",
     "Plan",
     "PolygonObstacle",
@@ -95,6 +98,7 @@ __all__ = [
     "Sink",
     "Trial",
     "Twist",
+    "Verdict",
     "__version__",
     "draw",
     "generate_network",
