@@ -2,7 +2,8 @@
 
 Reads ``{"names": [...], "formulas": [[formula, tail], ...]}`` from the standard input: a formula in Storm's syntax
 and the letters that follow the first one. Writes, for every formula, the verdicts after all words of one letter and
-the tail, by the first letter: as `automaton.VERDICTS` numbers them, but 1 for both undecided ones.
+the tail, by the first letter: as `automaton.VERDICTS` numbers them, but 1 for both undecided ones; null
+where Storm stumbles over the automaton that Spot gives it.
 
 The letters are the states of a Markov decision process in which any may follow any. So a formula can still be
 satisfied after a word if the greatest probability of "the formula, and the word first" is 1 in the first letter's
@@ -15,6 +16,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 
 def process_text(names: list[str]) -> str:
@@ -42,6 +44,13 @@ def tail_text(names: list[str], tail: list[int]) -> str:
     return " & ".join(parts)
 
 
+def chances(stormpy: Any, model: Any, formula: str, tail: str) -> list[float]:
+    """Return the greatest probability of a formula and a tail in each state."""
+    text = f"({formula}) & {tail}" if tail else formula
+    task = stormpy.parse_properties(f"Pmax=? [ {text} ]")[0]
+    return list(stormpy.model_checking(model, task).get_value_vector())
+
+
 def main() -> None:
     """Answer one request."""
     import stormpy
@@ -52,15 +61,17 @@ def main() -> None:
         file = Path(folder) / "letters.drn"
         file.write_text(process_text(names))
         model = stormpy.build_model_from_drn(str(file))
-    answers: list[list[int]] = []
+    answers: list[list[int] | None] = []
     for formula, tail in request["formulas"]:
-        values: list[list[float]] = []
-        for text in (f"({formula})", f"(!({formula}))"):
-            whole = f"{text} & {tail_text(names, tail)}" if tail else text
-            task = stormpy.parse_properties(f"Pmax=? [ {whole} ]")[0]
-            values.append(list(stormpy.model_checking(model, task).get_value_vector()))
+        try:
+            can, can_fail = (
+                chances(stormpy, model, text, tail_text(names, tail)) for text in (formula, f"!({formula})")
+            )
+        except RuntimeError:
+            answers.append(None)
+            continue
         answers.append(
-            [0 if good < 0.5 else 3 if bad < 0.5 else 1 for good, bad in zip(*values, strict=True)]
+            [0 if good < 0.5 else 3 if bad < 0.5 else 1 for good, bad in zip(can, can_fail, strict=True)]
         )
     sys.stdout.write("\n" + json.dumps(answers) + "\n")
 

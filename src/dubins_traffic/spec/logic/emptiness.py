@@ -11,6 +11,7 @@ from typing import Final, TypeAlias
 
 from dubins_traffic.spec.logic.formula import FormulaError
 from dubins_traffic.spec.logic.moves import PUT_OFF, Stepper
+from dubins_traffic.spec.logic.obligations import Letter
 
 MAX_STATES: Final = 20_000
 """Most states of the Büchi automaton of one part."""
@@ -39,8 +40,37 @@ class Emptiness:
         if not numbers:
             return True
         if state not in self._meetable:
-            self._search(state)
+            if self._steadily(memory, numbers):
+                self._meetable[state] = True
+            else:
+                self._search(state)
         return self._meetable[state]
+
+    def _steadily(self, memory: tuple[bool, ...], numbers: frozenset[int]) -> bool:
+        """Say whether one letter for ever meets the obligations; only asked where it leaves the memory as it is."""
+        for tests in self._outcomes:
+            letter, after = self._stepper.table.letter(tests, memory)
+            if after == memory:
+                known: dict[int, bool] = {}
+                if all(self._steady(number, letter, known) for number in numbers):
+                    return True
+        return False
+
+    def _steady(self, number: int, letter: Letter, known: dict[int, bool]) -> bool:
+        """Return the value of an obligation on the word that repeats one letter."""
+        found = known.get(number)
+        if found is None:
+            node = self._stepper.table.nodes[number]
+            if node.kind in ("test", "past"):
+                values = letter.tests if node.kind == "test" else letter.past
+                found = values[node.first] == node.strong
+            elif node.kind in ("and", "or"):
+                parts = (self._steady(part, letter, known) for part in node.parts)
+                found = all(parts) if node.kind == "and" else any(parts)
+            else:
+                found = self._steady(node.parts[-1], letter, known) if node.parts else node.kind == "true"
+            known[number] = found
+        return found
 
     def _edges(self, state: State) -> list[Edge]:
         memory, numbers = state

@@ -11,6 +11,9 @@ from dubins_traffic.spec.logic.obligations import DONE, NOTHING, Atom, Letter, M
 MAX_MOVES: Final = 400
 """Most alternatives that one step may leave open."""
 
+MAX_WORK: Final = 1_500_000
+"""Most comparisons of alternatives while one table is worked out: some seconds."""
+
 STRONG: Final = 1
 PUT_OFF: Final = 2
 
@@ -20,6 +23,7 @@ class Stepper:
 
     def __init__(self, table: Table) -> None:
         self.table = table
+        self.work = 0
         self._steps: dict[tuple[int, Letter], Moves] = {}
         self._implied: dict[tuple[Atom, Atom], bool] = {}
 
@@ -70,11 +74,15 @@ class Stepper:
         """
         kept: list[frozenset[Atom]] = []
         for move in sorted(set(moves), key=len):
+            self.work += 1 + len(kept)
             if not any(self._covers(other, move) for other in kept):
                 kept = [other for other in kept if not self._covers(move, other)]
                 kept.append(move)
-        if len(kept) > MAX_MOVES:
-            raise FormulaError("too large to be monitored", expected=f"at most {MAX_MOVES} open alternatives")
+        if len(kept) > MAX_MOVES or self.work > MAX_WORK:
+            raise FormulaError(
+                "too large to be monitored",
+                expected=f"at most {MAX_MOVES} open alternatives, and {MAX_WORK} steps to work out the table",
+            )
         return frozenset(kept)
 
     def _covers(self, weak: frozenset[Atom], strong: frozenset[Atom]) -> bool:
