@@ -20,6 +20,7 @@ demo: .venv/.installed-plot ## three trials with two controllers, scored, drawn 
 
 test: .venv/.installed-dev ## all checks, then all tests
 	@scripts/system-packages.sh
+	@scripts/crosscheck-tools.sh
 	@$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
