@@ -17,7 +17,9 @@ def test_a_drawn_instance_is_the_golden_one(name: str, seed: int, trial: int) ->
     golden = json.loads((HERE / f"{name}-{seed}-{trial}.json").read_text())
     instance = draw(load_config(name), seed, trial)
     found = instance_to_document(instance)
-    # Parameters of e-agents are those of the kind, whose defaults may grow.
+    # Parameters of e-agents are those of the kind, whose defaults may grow, and so may those of the rules.
+    if golden["rules"]:
+        found["rules"] = {name: found["rules"][name] for name in golden["rules"]}
     for document in (found, golden):
         for agent in document["e-agents"]:
             agent["parameters"] = agent["parameters"].get("cycle")
@@ -28,7 +30,9 @@ def test_a_drawn_instance_is_the_golden_one(name: str, seed: int, trial: int) ->
 def test_a_golden_instance_reads_and_writes_back_its_keys(file: Path) -> None:
     golden = json.loads(file.read_text())
     written = instance_to_document(instance_from_document(golden))
-    for key in golden.keys() - {"e-agents"}:
+    for key in golden.keys() - {"e-agents", "rules"}:
         assert written[key] == golden[key]
+    assert bool(written["rules"]) == bool(golden["rules"])
+    assert dict(golden["rules"] or {}).items() <= dict(written["rules"] or {}).items()
     for ours, theirs in zip(written["e-agents"], golden["e-agents"], strict=True):
         assert theirs["parameters"].items() <= ours["parameters"].items()
