@@ -42,7 +42,7 @@ from dubins_traffic.roads.table import RoadTable
 DRAW = 20
 """First of the draws of the law: exits take four, moods five, places one."""
 BACK = 30.0
-"""What turning round counts where another exit is open, metres."""
+"""What turning round at a crossing counts, metres; in a bend, where others may come, it is a last resort."""
 UNREACHABLE = 1e6
 STEP = 3.0
 """What a lane counts in choosing between exits, metres."""
@@ -140,7 +140,7 @@ def price_exits(
         elif known:
             cost += STEP * desk.hops[out] if desk.hops[out] != FAR else UNREACHABLE
         if out == lane ^ 1 and roads.degree[row] > 1:
-            cost += BACK
+            cost += BACK if roads.degree[row] > 2 else UNREACHABLE
         desk.cost[k] = cost
 
 

@@ -53,7 +53,7 @@ TRAIL = 3.5
 GOES_NOW = STOPPED | FIRST | CLEAR
 
 
-@jit
+@jit_inline
 def mind_gate(
     b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: Way,
     near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,

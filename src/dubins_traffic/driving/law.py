@@ -51,12 +51,15 @@ from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_way, way_between
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_end, lane_start
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.roads.lookup import lane_end, lane_start, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED
 
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another."""
+DESPAIR = 4.0
+"""The same for the ego, of which it is not asked."""
 IN_DISC = 0.65
 """Least speed in a disc, metres per second: a way through takes less than 2.6 m, and 5 s are allowed."""
 DAWDLE = 0.12
@@ -67,6 +70,8 @@ SLANT, STEEP = 0.7, 0.9
 """Sine of the largest angle to its way at which a car drives; the same when it pulls out."""
 ALIGNED = 0.8
 """Cosine of the angle to where it should head beyond which a car turns in place."""
+VERGE = 0.02
+"""What the ego's centre keeps from the edge of the road whatever happens, metres."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
@@ -98,7 +103,7 @@ def decide(
             desk.head[labels.segment[b, n]] = -1
 
 
-@jit
+@jit_inline
 def drive(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
     drivers: Drivers, desk: Desk,
@@ -133,8 +138,10 @@ def drive(
         speed = 0.0
     outside = labels.lane[b, n] == ints[LANE] and part == BEFORE
     offset = 2.0 * build[MIDDLE] if ints[MOOD] & LEFT_SIDE != 0 and outside else 0.0
-    waits = gap < kept + 0.05 and (part == THROUGH or who < 0 or bits & BLOCKED != 0)
-    ints[WAITED] = ints[WAITED] + 1 if waits else 0
+    stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
+    ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
+    if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
+        ints[MOOD] &= ~LEFT_SIDE
     if not outside:
         floats[ASIDE] = 0.0
     elif floats[ASIDE] != 0.0:
@@ -142,7 +149,8 @@ def drive(
         offset = floats[ASIDE] if way_to_go(way, x, y) < floats[UNTIL] else 0.0
     elif bits & BLOCKED != 0 and ints[WAITED] >= ticks_of(PASSING_WAIT, build) and ints[WAITED] % 4 == 0:
         find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
-    if part != BEFORE and ints[WAITED] > ticks_of(STUCK, build) and ints[KIND] != ROUND:
+    patience = STUCK if ints[KIND] != ROUND else DESPAIR
+    if part != BEFORE and ints[WAITED] > ticks_of(patience, build):
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
     speed, yaw_rate = steer(c, s, left - offset, px, py, part, way, speed, floats[ASIDE] != 0.0, build)
     if close and not is_safe(b, n, speed, yaw_rate, near, state, obstacles, build, desk):
@@ -151,10 +159,12 @@ def drive(
             b, n, speed, yaw_rate, near, state, obstacles, build, desk
         ):
             yaw_rate = 0.0
+    if speed != 0.0 and ints[KIND] == ROUND and leaves_road(x, y, c, s, speed, yaw_rate, net, roads, build):
+        speed = 0.0
     return speed, yaw_rate
 
 
-@jit
+@jit_inline
 def keep_place(
     b: int, n: int, tick: int, x: float, y: float, c: float, s: float, state: State, labels: Labels,
     roads: RoadTable, drivers: Drivers, desk: Desk,
@@ -196,7 +206,7 @@ def before_ego(b: int, n: int, state: State, labels: Labels, roads: RoadTable, d
     return behind and (its == lane or comes or labels.crosses[b, 0] == v)
 
 
-@jit
+@jit_inline
 def steer(
     c: float, s: float, left: float, px: float, py: float, part: int, way: Way, speed: float,
     steep: bool, build: Any,
@@ -226,6 +236,28 @@ def steer(
         if dot < 0.0:
             yaw_rate = limit if cross >= 0.0 else -limit
     return speed, min(max(yaw_rate, -limit), limit)
+
+
+@jit
+def leaves_road(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    speed: float,
+    yaw_rate: float,
+    net: int,
+    roads: RoadTable,
+    build: Any,
+) -> bool:
+    """Tell whether a command takes the centre over the edge of the road, or farther beyond it."""
+    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
+    edge = roads.half_width[net] - VERGE
+    _, after = nearest_segment(roads, net, nx, ny)
+    if after <= edge * edge:
+        return False
+    _, before = nearest_segment(roads, net, x, y)
+    return after >= before
 
 
 @jit

@@ -52,7 +52,7 @@ def way_to_go(way: Way, x: float, y: float) -> float:
     return (x - way.x) * way.tx + (y - way.y) * way.ty
 
 
-@jit
+@jit_inline
 def gather(
     b: int, n: int, lane: int, x: float, y: float, way: Way, labels: Labels, roads: RoadTable,
     drivers: Drivers, desk: Desk,
@@ -90,7 +90,7 @@ def add_segment(segment: int, n: int, count: int, desk: Desk) -> int:
     return count
 
 
-@jit
+@jit_inline
 def look_ahead(
     b: int, part: int, key: float, left: float, x: float, y: float, way: Way, near: int,
     state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, desk: Desk,
@@ -135,7 +135,7 @@ def look_ahead(
     )
 
 
-@jit
+@jit_inline
 def see_obstacles(
     b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float, passing: bool,
     gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
@@ -167,7 +167,7 @@ def see_obstacles(
     return gap, who, close
 
 
-@jit
+@jit_inline
 def wanted_gap(
     b: int,
     n: int,
