@@ -24,7 +24,7 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import APPROACH, EXCUSED, STANDS
