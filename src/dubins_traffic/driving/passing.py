@@ -31,10 +31,10 @@ PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
 BERTH = 0.12
 """What is kept free beside what stands, metres."""
-SLIP = 0.2
+SLIP = 0.25
 """So far past what stands a car begins to return, metres."""
-BACK = 0.75
-"""So far after that it is back in its lane, metres."""
+BACK = 0.4
+"""So far after that its body is back in the right lane, metres."""
 TURNING = 1.2
 """Seconds that passing takes beyond what the distance asks for."""
 SPARE = 0.6
