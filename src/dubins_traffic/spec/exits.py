@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit_inner
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import obstacle_narrows
-from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, LANE_MIDDLE, NEAR2, Terms
+from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, LANE_MIDDLE, Terms
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
@@ -23,7 +23,7 @@ from dubins_traffic.spec.tables import (
 )
 
 
-@jit_inline
+@jit_inner
 def has_exit(
     b: int,
     n: int,
@@ -35,37 +35,7 @@ def has_exit(
     terms: Terms,
     labels: Labels,
 ) -> bool:
-    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane.
-
-    Who is near with his centre outside the disc is in the way to one lane at most.
-    """
-    row = t.vert_off[rules.whole[b, NET]] + v
-    vx, vy = t.vert[row, 0], t.vert[row, 1]
-    far2 = terms.real[b, NEAR2]
-    near = 0
-    for k in range(state.count[b]):
-        dx = state.x[b, k] - vx
-        dy = state.y[b, k] - vy
-        near += 1 if k != n and dx * dx + dy * dy <= far2 else 0
-        near += 4 if k != n and labels.at[b, k] == v else 0
-    if near < t.degree[row] and obstacles.base[b] < 0:
-        return True
-    return _has_exit_among(b, n, v, state, t, obstacles, rules, terms, labels)
-
-
-@jit
-def _has_exit_among(
-    b: int,
-    n: int,
-    v: int,
-    state: State,
-    t: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: Terms,
-    labels: Labels,
-) -> bool:
-    """Tell the same where others are near."""
+    """Tell whether car n, whose body meets the disc of v, may leave by some lane."""
     real = rules.real[b]
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -190,9 +191,7 @@ class Referee:
 
     def _judge(self, tick: int, state: State) -> None:
         own = self._labeller
-        judge_frame(
-            tick,
-            state,
+        tables = (
             self._roads,
             self._obstacles,
             self._rules,
@@ -201,6 +200,7 @@ class Referee:
             own.memory,
             self._docket,
         )
+        judge_frame(tick, *state, *chain.from_iterable(tables))
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._docket.filled[0] and not any(contacts):
