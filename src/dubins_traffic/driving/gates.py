@@ -15,6 +15,7 @@ from dubins_traffic.driving.law_tables import (
     HALF_WIDTH,
     KIND,
     LANE,
+    LEFT_SIDE,
     MIDDLE,
     MOOD,
     NEMESIS,
@@ -34,7 +35,7 @@ from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import CLEAR, FIRST, STANDS, STOPPED
+from dubins_traffic.spec.propositions import CLEAR, FIRST, LEFT, STANDS, STOPPED
 
 MARGIN = 0.02
 """What a car keeps from a disc that it may not enter, metres."""
@@ -88,6 +89,8 @@ def mind_gate(
         free = (roads.degree[row] > 1 or inside == 0) and has_room(
             b, n, ints[NEXT], inside, state, labels, roads, drivers, desk
         )
+    if bits & LEFT != 0 and ints[MOOD] & LEFT_SIDE == 0:
+        free = False
     return speed if free else max(0.0, to_line) / build[PERIOD]
 
 

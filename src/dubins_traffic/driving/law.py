@@ -48,7 +48,7 @@ from dubins_traffic.driving.law_tables import (
 from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
 from dubins_traffic.driving.safety import motion_is_safe
 from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to_go
-from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_way, way_between
+from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -120,15 +120,17 @@ def drive(
         watch_ego(b, n, labels, drivers)
     way = keep_place(b, n, tick, x, y, c, s, state, labels, roads, drivers, desk)
     part, key, left, px, py = on_way(way, x, y)
+    outside = labels.lane[b, n] == ints[LANE]
+    if outside and part != BEFORE:
+        part, key, left, px, py = on_lane(way, x, y)
     near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, desk)
     gap, who, close = look_ahead(
         b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, desk
     )
-    bits = np.int64(labels.bits[b, n])
     speed = floats[SPEED]
     if labels.crosses[b, n] >= 0:
         speed = min(max(speed, IN_DISC), build[FASTEST])
-    kept = wanted_gap(b, n, who, px, py, state, labels, ints, part)
+    kept = wanted_gap(b, n, who, way, state, labels, ints, part)
     speed = min(speed, max(0.0, gap - kept) / build[PERIOD])
     speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
     if ints[KIND] == NEMESIS and before_ego(b, n, state, labels, roads, drivers):
@@ -136,19 +138,9 @@ def drive(
     if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, net, ints[LANE]):
         floats[HOLD] -= build[PERIOD]
         speed = 0.0
-    outside = labels.lane[b, n] == ints[LANE] and part == BEFORE
-    offset = 2.0 * build[MIDDLE] if ints[MOOD] & LEFT_SIDE != 0 and outside else 0.0
-    stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
-    ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
-    if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
-        ints[MOOD] &= ~LEFT_SIDE
-    if not outside:
-        floats[ASIDE] = 0.0
-    elif floats[ASIDE] != 0.0:
-        speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)
-        offset = floats[ASIDE] if way_to_go(way, x, y) < floats[UNTIL] else 0.0
-    elif bits & BLOCKED != 0 and ints[WAITED] >= ticks_of(PASSING_WAIT, build) and ints[WAITED] % 4 == 0:
-        find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
+    speed, offset = pass_what_stands(
+        b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
+    )
     patience = STUCK if ints[KIND] != ROUND else DESPAIR
     if part != BEFORE and ints[WAITED] > ticks_of(patience, build):
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
@@ -162,6 +154,32 @@ def drive(
     if speed != 0.0 and ints[KIND] == ROUND and leaves_road(x, y, c, s, speed, yaw_rate, net, roads, build):
         speed = 0.0
     return speed, yaw_rate
+
+
+@jit_inline
+def pass_what_stands(
+    b: int, n: int, speed: float, gap: float, kept: float, who: int, part: int, outside: bool, way: Way,
+    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
+    desk: Desk,
+) -> tuple[float, float]:  # fmt: skip
+    """Return (speed, offset to the left of the way): of a car that drives on the left, or passes, or waits to."""
+    build = drivers.build[b]
+    ints = drivers.ints[b, n]
+    floats = drivers.floats[b, n]
+    bits = np.int64(labels.bits[b, n])
+    offset = 2.0 * build[MIDDLE] if ints[MOOD] & LEFT_SIDE != 0 and outside else 0.0
+    stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
+    ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
+    if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
+        ints[MOOD] &= ~LEFT_SIDE
+    if not outside:
+        floats[ASIDE] = 0.0
+    elif floats[ASIDE] != 0.0:
+        speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)
+        offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0
+    elif bits & BLOCKED != 0 and ints[WAITED] >= ticks_of(PASSING_WAIT, build) and ints[WAITED] % 4 == 0:
+        find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
+    return speed, offset
 
 
 @jit_inline

@@ -172,8 +172,7 @@ def wanted_gap(
     b: int,
     n: int,
     who: int,
-    px: float,
-    py: float,
+    way: Way,
     state: State,
     labels: Labels,
     ints: Any,
@@ -187,6 +186,7 @@ def wanted_gap(
     if ints[MOOD] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
+    _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
     if along < -0.3 and labels.crosses[b, who] < 0:
         return FACING_GAP
