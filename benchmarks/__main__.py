@@ -1,6 +1,7 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single`, `startup` and `judging` take about a minute; `lanes` runs 400 trials and takes some minutes.
+`motion`, `single`, `startup` and `judging` take about a minute; `lanes` runs 400 trials and
+`rules` 1,400, which takes some minutes each.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import sys
 
 from benchmarks.table import show
 
-NAMES = ("motion", "single", "startup", "judging", "lanes")
+NAMES = ("motion", "single", "startup", "judging", "lanes", "rules")
 
 
 def main(names: list[str]) -> int:

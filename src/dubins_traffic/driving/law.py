@@ -133,7 +133,7 @@ def drive(
     kept = wanted_gap(b, n, who, way, state, labels, ints, part)
     speed = min(speed, max(0.0, gap - kept) / build[PERIOD])
     speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
-    if ints[KIND] == NEMESIS and before_ego(b, n, state, labels, roads, drivers):
+    if ints[KIND] == NEMESIS and before_ego(b, n, near, state, labels, roads, drivers, desk):
         speed = min(speed, DAWDLE)
     if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, net, ints[LANE]):
         floats[HOLD] -= build[PERIOD]
@@ -207,8 +207,10 @@ def keep_place(
 
 
 @jit_inline
-def before_ego(b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
-    """Tell whether the ego comes behind a nemesis that is outside the discs."""
+def before_ego(
+    b: int, n: int, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+) -> bool:
+    """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
     net = drivers.net[b]
     lane = labels.lane[b, n]
     if lane < 0 or labels.crosses[b, n] >= 0:
@@ -218,6 +220,9 @@ def before_ego(b: int, n: int, state: State, labels: Labels, roads: RoadTable, d
     if dx * dx + dy * dy > TRAIL * TRAIL:
         return False
     v = lane_start(roads, net, lane)
+    for k in range(near):
+        if desk.near[k] != 0 and labels.crosses[b, desk.near[k]] == v:
+            return False
     its = labels.lane[b, 0]
     behind = dx * state.c[b, n] + dy * state.s[b, n] < 0.0
     comes = its >= 0 and lane_end(roads, net, its) == v

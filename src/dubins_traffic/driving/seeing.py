@@ -67,7 +67,7 @@ def gather(
     length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
     for end in range(2):
         far = to_go if end == 0 else length - to_go
-        if far > disc + (1.0 if end == 0 else 0.6):
+        if far > disc + (1.0 if end == 0 else 0.8):
             continue
         v = lane_end(roads, net, lane) if end == 0 else lane_start(roads, net, lane)
         row = roads.vert_off[net] + v

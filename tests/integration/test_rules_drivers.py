@@ -1,0 +1,35 @@
+"""A sample of `benchmarks.rules`, which shows the bars on 1,000 trials and more."""
+
+import pytest
+from benchmarks.rules import Drive, drive
+
+SAMPLE = 12
+
+
+@pytest.fixture(scope="module")
+def lawful() -> list[Drive]:
+    return [drive(number, "lawful", 120.0) for number in range(SAMPLE)]
+
+
+def test_rules_is_clean_among_lawful_cars(lawful: list[Drive]) -> None:
+    assert [one.number for one in lawful if one.own or one.collisions] == []
+
+
+def test_lawful_cars_break_nothing(lawful: list[Drive]) -> None:
+    assert [(one.number, one.others) for one in lawful if one.others] == []
+
+
+def test_nobody_waits_long_and_the_rounds_are_made(lawful: list[Drive]) -> None:
+    assert max(one.waited for one in lawful) < 60.0
+    assert [one.number for one in lawful if one.rounds < 0.3 * one.free_rounds] == []
+
+
+def test_rules_is_clean_with_a_nemesis() -> None:
+    found = [drive(number, "nemesis", 120.0) for number in range(SAMPLE // 2)]
+    assert [(one.number, one.own, one.others) for one in found if one.own or one.others] == []
+
+
+def test_rules_is_never_at_fault_among_cars_that_break_rules() -> None:
+    found = [drive(number, "breakers", 120.0) for number in range(SAMPLE // 2)]
+    assert [one.number for one in found if one.at_fault] == []
+    assert all(one.others for one in found)
