@@ -27,7 +27,7 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from tests.unit import test_bad_documents as bad
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "documents_2016"
+GOLDEN = Path(__file__).parents[1] / "golden" / "data"
 SQUARE = {"version": 0, "length": 5, "transform": [0, 0, 0], "shape": [2, 2]}
 
 

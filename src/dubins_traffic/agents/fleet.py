@@ -47,11 +47,10 @@ from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.protocols import Driver
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import EAgent, Instance
-    from dubins_traffic.roads.network import RoadNetwork
 
 AS_FAR_AS_2016 = 3.5
 """Up to this far from its waypoint (metres, for w = 0.3 m) a car keeps the bearing tolerance of 2016."""
@@ -90,7 +89,10 @@ class Fleet:
         if self._lawful is not None:
             self._lawful.reset(instances, state)
         self._others = not kinds <= KEEP_RULES
-        self._roads, net = _pack_roads(instances)
+        self._roads, net = pack_distinct(
+            [instance.problem.network for instance in instances],
+            [instance.problem.car.lane_width for instance in instances],
+        )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         ints = np.zeros((trials, cars, INTS), dtype=np.int64)
         ints[:, :, (KIND, PATIENCE, TRAIL, LANE, PLACE, SINCE)] = (NOBODY, -1, -1, -1, -1, -1)
@@ -190,21 +192,6 @@ def _plan(
     elif ints[KIND] == PARKED:
         after = given["vacates_after"]
         ints[BEGIN] = NEVER if after is None else math.ceil(after * instance.problem.rate - 1e-9)
-
-
-def _pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, Ints]:
-    numbers: dict[tuple[int, float], int] = {}
-    networks: list[RoadNetwork] = []
-    widths: list[float] = []
-    net = np.zeros(len(instances), dtype=np.int64)
-    for b, instance in enumerate(instances):
-        key = (id(instance.problem.network), instance.problem.car.w)
-        if key not in numbers:
-            numbers[key] = len(networks)
-            networks.append(instance.problem.network)
-            widths.append(2.0 * instance.problem.car.w)
-        net[b] = numbers[key]
-    return pack(networks, widths), net
 
 
 def _habits(instance: Instance, kind: str, given: Mapping[str, Any]) -> tuple[float, ...]:

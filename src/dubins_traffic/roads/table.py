@@ -70,6 +70,17 @@ class RoadTable(NamedTuple):
     pave: Ints
 
 
+def pack_distinct(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> tuple[RoadTable, Ints]:
+    """Return the table of the distinct pairs of network and half width, and the number of each trial's pair in it."""
+    numbers: dict[tuple[int, float], int] = {}
+    for network, width in zip(networks, half_widths, strict=True):
+        numbers.setdefault((id(network), width), len(numbers))
+    given = [numbers[id(network), width] for network, width in zip(networks, half_widths, strict=True)]
+    first = [given.index(number) for number in range(len(numbers))]
+    table = pack([networks[k] for k in first], [half_widths[k] for k in first])
+    return table, np.array(given, dtype=np.int64)
+
+
 def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadTable:
     """Return the table of some networks with the half widths (2w, metres) of their roads.
 

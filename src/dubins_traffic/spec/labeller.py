@@ -13,7 +13,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.table import RoadTable, pack_distinct
 from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.frame import label_frame
 from dubins_traffic.spec.obstacles import ObstacleLanes, place_obstacles
@@ -114,19 +114,19 @@ class Labeller:
 
     def __init__(self, instances: Sequence[Posed]) -> None:
         problems = [instance.problem for instance in instances]
-        nets, networks, widths = _distinct_roads(problems)
+        networks = [problem.network for problem in problems]
         cars = pack_cars([problem.car for problem in problems])
-        self._roads = pack(networks, widths)
+        self._roads, nets = pack_distinct(networks, [problem.car.lane_width for problem in problems])
         self._rules = pack_rules(
             [RuleParameters.from_mapping(problem.rules) for problem in problems],
             [problem.intersection_radius for problem in problems],
             [problem.rate for problem in problems],
-            nets,
+            nets.tolist(),
             _judged3(problems),
             cars,
         )
         obstacles = pack_obstacles([problem.obstacles for problem in problems])
-        self._obstacles = place_obstacles(obstacles, self._roads, np.array(nets, dtype=np.int64))
+        self._obstacles = place_obstacles(obstacles, self._roads, nets)
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
         self._tick = -1
 
@@ -204,22 +204,6 @@ class Labeller:
 
     def _label(self, state: State) -> None:
         label_frame(self._tick, *state, *self._arrays)
-
-
-def _distinct_roads(problems: Sequence[Judged]) -> tuple[list[int], list[RoadNetwork], list[float]]:
-    """Return each problem's road number, and of each distinct pair of network and lane width these two."""
-    numbers: dict[tuple[int, float], int] = {}
-    nets: list[int] = []
-    networks: list[RoadNetwork] = []
-    widths: list[float] = []
-    for problem in problems:
-        key = (id(problem.network), problem.car.lane_width)
-        if key not in numbers:
-            numbers[key] = len(networks)
-            networks.append(problem.network)
-            widths.append(problem.car.lane_width)
-        nets.append(numbers[key])
-    return nets, networks, widths
 
 
 def _judged3(problems: Sequence[Judged]) -> list[bool]:
