@@ -8,7 +8,19 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import check, convert, faults, instance, listing, network, plot, replay, run, score
+from dubins_traffic.cli import (
+    check,
+    convert,
+    faults,
+    instance,
+    listing,
+    network,
+    plot,
+    replay,
+    run,
+    score,
+    spec,
+)
 
 app = typer.Typer(
     name=faults.PROGRAM,
@@ -46,6 +58,7 @@ app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
 app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)

@@ -1,0 +1,161 @@
+"""`dubins-traffic spec`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import options
+from dubins_traffic.errors import InputError
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.spec.logic.exports import Specification
+    from dubins_traffic.spec.logic.formula import Formula, FormulaError
+
+EXAMPLES = options.examples(
+    "spec first.json",
+    "spec out/trial-0000.mcap --guarantee",
+    "spec first.json --format spin --period 1",
+    "spec first.json --format tlsf -o first.tlsf",
+)
+
+
+class Format(StrEnum):
+    """Languages in which a task can be said."""
+
+    SPIN = "spin"
+    SPOT = "spot"
+    STL = "stl"
+    TLSF = "tlsf"
+    SLUGS = "slugs"
+    TULIP = "tulip"
+    LATEX = "latex"
+
+
+ONE_FORMULA = (Format.SPIN, Format.SPOT, Format.STL)
+"""Formats that have no place of their own for assumptions."""
+
+
+def spec(
+    instance: Annotated[
+        str, typer.Argument(metavar="INSTANCE", help="A problem instance or a record.", show_default=False)
+    ],
+    format: Annotated[
+        Format | None,
+        typer.Option(
+            "--format",
+            help="For which tool; without it, SPIN's syntax with past operators and bounds in seconds.",
+            show_default=False,
+        ),
+    ] = None,
+    assumption: Annotated[
+        bool | None,
+        typer.Option("--assumption/--guarantee", help="Only this part of the task.", show_default=False),
+    ] = None,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            "--period",
+            metavar="SECONDS",
+            help="Of a step, where bounds become steps; without it, the control period.",
+        ),
+    ] = None,
+    output: options.Output = None,
+) -> None:
+    """Print the task of a problem as temporal logic: what is assumed of the others, and what the ego guarantees."""
+    from dubins_traffic.spec.task import task
+
+    if period is not None and not 0.0 < period < math.inf:
+        raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
+    found = _instance(instance)
+    try:
+        whole = task(found.problem, found.names)
+    except InputError as error:
+        raise error.within(file=instance) from None
+    wanted = _part(whole, assumption)
+    if format is None:
+        text = _own(wanted, " &&\n" if found.problem.rules else " && ")
+    else:
+        text = _told(wanted, format, period or found.problem.period, instance)
+    options.write(text if text.endswith("\n") else text + "\n", output)
+
+
+def _instance(source: str) -> Instance:
+    from dubins_traffic.campaign.sources import load
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.record.reader import Record
+
+    found = load(source)
+    if isinstance(found, Record):
+        return found.instance
+    if isinstance(found, Instance):
+        return found
+    raise InputError("has no task", file=source, expected="a problem instance or a record")
+
+
+def _part(whole: Specification, assumption: bool | None) -> Specification:
+    """Return the assumptions of a task (true), its guarantees (false) or both, and their propositions."""
+    from dubins_traffic.spec.logic.formula import propositions
+
+    assumptions = () if assumption is False else whole.assumptions
+    guarantees = () if assumption else whole.guarantees
+    used = {name for formula in (*assumptions, *guarantees) for name in propositions(formula)}
+    inputs = tuple(name for name in whole.inputs if name in used)
+    return type(whole)(assumptions, guarantees, inputs, tuple(name for name in whole.outputs if name in used))
+
+
+def _own(spec: Specification, joint: str) -> str:
+    """Return a specification in the syntax that we read ourselves, its conjuncts joined by `joint`."""
+    from dubins_traffic.spec.logic.printer import to_spin
+
+    sides = [
+        joint.join(f"({to_spin(formula)})" for formula in formulas).replace("[] <>", "[]<>")
+        for formulas in (spec.assumptions, spec.guarantees)
+        if formulas
+    ]
+    return "(\n" + "\n) -> (\n".join(sides) + "\n)" if len(sides) == 2 else "".join(sides) or "true"
+
+
+def _told(spec: Specification, format: Format, period: float, source: str) -> str:
+    """Return a specification in another tool's language.
+
+    Raises
+    ------
+    InputError
+        If it can't say it; names the formula.
+    """
+    from dubins_traffic.spec.logic.exports import FORMATS
+    from dubins_traffic.spec.logic.formula import FormulaError
+
+    if format in ONE_FORMULA and not spec.guarantees:
+        spec = replace(spec, assumptions=(), guarantees=spec.assumptions)
+    write = FORMATS[format]
+    try:
+        return write(spec, period)
+    except FormulaError as error:
+        refused = error
+    sides = [(formula, replace(spec, assumptions=(formula,), guarantees=())) for formula in spec.assumptions]
+    sides += [(formula, replace(spec, assumptions=(), guarantees=(formula,))) for formula in spec.guarantees]
+    for formula, alone in sides:
+        try:
+            write(alone, period)
+        except FormulaError as error:
+            raise _refusal(error, formula, format, source) from None
+    raise refused.within(file=source, field=f"--format {format}")
+
+
+def _refusal(error: FormulaError, formula: Formula, format: Format, source: str) -> InputError:
+    from dubins_traffic.spec.logic.printer import to_spin
+
+    return InputError(
+        error.problem,
+        file=source,
+        field=f"--format {format}",
+        value=to_spin(formula),
+        expected=error.expected,
+    )
