@@ -42,7 +42,8 @@ from dubins_traffic.roads.table import RoadTable
 DRAW = 20
 """First of the draws of the law: exits take four, moods five, places one."""
 BACK = 30.0
-"""What turning round at a crossing counts, metres; in a bend, where others may come, it is a last resort."""
+"""What turning round at a crossing counts, metres (for a nemesis STEP); in a bend, where others may come, it is a
+last resort."""
 UNREACHABLE = 1e6
 STEP = 3.0
 """What a lane counts in choosing between exits, metres."""
@@ -140,7 +141,8 @@ def price_exits(
         elif known:
             cost += STEP * desk.hops[out] if desk.hops[out] != FAR else UNREACHABLE
         if out == lane ^ 1 and roads.degree[row] > 1:
-            cost += BACK if roads.degree[row] > 2 else UNREACHABLE
+            at_crossing = STEP if kind == NEMESIS else BACK
+            cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
         desk.cost[k] = cost
 
 
@@ -161,19 +163,64 @@ def aim(
     seeks_loop = kind == LOOP and ints[PLACE] < 0 and ints[LAST] > ints[FIRST]
     if not seeks_loop and (kind not in (PLACES, NEMESIS) or ints[GOAL] < 0):
         return False
-    lanes = 2 * (roads.seg_off[net + 1] - roads.seg_off[net])
-    for k in range(lanes):
-        desk.hops[k] = FAR
-    found = 0
     if seeks_loop:
+        forget(net, roads, desk)
+        found = 0
         for k in range(ints[FIRST], ints[LAST]):
             found = aim_for(drivers.stage[k], desk.hops, desk.queue, found)
-    else:
-        row = roads.vert_off[net] + ints[GOAL]
-        for k in range(roads.degree[row]):
-            found = aim_for(roads.arms[row, k] ^ 1, desk.hops, desk.queue, found)
-    spread(roads, net, desk.hops, desk.queue, found)
+        spread(roads, net, desk.hops, desk.queue, found)
+        return True
+    seek(net, ints[GOAL], roads, desk)
+    if kind == NEMESIS:
+        seek_ego(b, net, labels, roads, desk)
     return True
+
+
+@jit
+def forget(net: int, roads: RoadTable, desk: Desk) -> None:
+    """Make all lanes of a network far from everywhere."""
+    for k in range(2 * (roads.seg_off[net + 1] - roads.seg_off[net])):
+        desk.hops[k] = FAR
+
+
+@jit
+def seek(net: int, v: int, roads: RoadTable, desk: Desk) -> None:
+    """Fill `desk.hops` with the lanes from each lane to intersection v."""
+    forget(net, roads, desk)
+    row = roads.vert_off[net] + v
+    found = 0
+    for k in range(roads.degree[row]):
+        found = aim_for(roads.arms[row, k] ^ 1, desk.hops, desk.queue, found)
+    spread(roads, net, desk.hops, desk.queue, found)
+
+
+@jit
+def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, desk: Desk) -> None:
+    """Turn hops to the ego's goal into hops to the next lanes on its way there."""
+    lane = labels.lane[b, 0]
+    v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
+    count = 0
+    while v >= 0 and count < desk.chain.shape[0]:
+        row = roads.vert_off[net] + v
+        best = -1
+        for k in range(roads.degree[row]):
+            out = roads.arms[row, k]
+            back = lane >= 0 and out == lane ^ 1 and roads.degree[row] > 1
+            if not back and (best < 0 or desk.hops[out] < desk.hops[best]):
+                best = out
+        desk.chain[count] = best
+        count += 1
+        if desk.hops[best] == 0:
+            break
+        lane = best
+        v = lane_end(roads, net, lane)
+    if count == 0:
+        return
+    forget(net, roads, desk)
+    found = 0
+    for k in range(count):
+        found = aim_for(desk.chain[k], desk.hops, desk.queue, found)
+    spread(roads, net, desk.hops, desk.queue, found)
 
 
 @jit

@@ -12,6 +12,7 @@ from dubins_traffic.driving.exits import cheapest, price_exits, ticks_of
 from dubins_traffic.driving.law_tables import (
     DEGREE,
     DISC,
+    FORFEIT,
     HALF_WIDTH,
     KIND,
     LANE,
@@ -20,6 +21,7 @@ from dubins_traffic.driving.law_tables import (
     MOOD,
     NEMESIS,
     NEXT,
+    OWED,
     PERIOD,
     REACH,
     ROLLING,
@@ -35,7 +37,7 @@ from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import CLEAR, FIRST, LEFT, STANDS, STOPPED
+from dubins_traffic.spec.propositions import CLEAR, FIRST, FORFEITED, LEFT, STANDS, STOPPED
 
 MARGIN = 0.02
 """What a car keeps from a disc that it may not enter, metres."""
@@ -45,10 +47,11 @@ CHOOSY = 1.0
 """Seconds for which a car whose turn it is waits for room in the lane it wants."""
 BUDGET = 4.0
 """Metres of detour that a car on its round accepts for each second it has waited for room."""
-DUTY = 5.4
-"""Seconds after which an e-agent enters though there is room nowhere: else it breaks E3."""
-LINGER = 2.4
-"""Seconds for which a nemesis makes the ego wait at a crossing before it enters."""
+DUTY = 0.8
+"""An e-agent that has lost its place once enters after this share of the time in which it would lose it again, though
+there is room nowhere: else it breaks E3."""
+LINGER = 0.8
+"""For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
 TRAIL = 3.5
 """A nemesis minds the ego within this, metres."""
 GOES_NOW = STOPPED | FIRST | CLEAR
@@ -75,6 +78,7 @@ def mind_gate(
     bits = np.int64(labels.bits[b, n])
     its_turn = crossing and bits & GOES_NOW == GOES_NOW
     ints[TURN] = ints[TURN] + 1 if its_turn else 0
+    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
     if to_line >= speed * build[PERIOD]:
         return speed
     if crossing:
@@ -110,16 +114,22 @@ def may_go(
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
     ints = drivers.ints[b, n]
     build = drivers.build[b]
-    if ints[KIND] == NEMESIS and ints[TURN] < ticks_of(LINGER, build):
+    bits = np.int64(labels.bits[b, n])
+    due = ints[KIND] != ROUND and is_due(ints[TURN], bits, build)
+    if (
+        ints[KIND] == NEMESIS
+        and bits & FORFEITED == 0
+        and ints[TURN] < ticks_of(LINGER * build[FORFEIT], build)
+    ):
         dx = state.x[b, 0] - state.x[b, n]
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
     if has_room(b, n, ints[NEXT], 0, state, labels, roads, drivers, desk):
         return True
-    waited = ints[TURN] - ticks_of(CHOOSY, build)
+    waited = ints[OWED] - ticks_of(CHOOSY, build)
     if waited < 0 or waited % 8 != 0:
-        return ints[KIND] != ROUND and ints[TURN] > ticks_of(DUTY, build)
+        return due
     net = drivers.net[b]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
@@ -129,7 +139,7 @@ def may_go(
     for k in range(roads.degree[row]):
         if roads.arms[row, k] == ints[NEXT]:
             wanted = desk.cost[k]
-    budget = BUDGET * ints[TURN] * build[PERIOD]
+    budget = BUDGET * ints[OWED] * build[PERIOD]
     for k in range(roads.degree[row]):
         cheap = ints[KIND] != ROUND or desk.cost[k] - wanted < budget
         if cheap and has_room(b, n, roads.arms[row, k], 0, state, labels, roads, drivers, desk):
@@ -138,7 +148,17 @@ def may_go(
     if out >= 0:
         ints[NEXT] = out
         return True
-    return ints[KIND] != ROUND and ints[TURN] > ticks_of(DUTY, build)
+    return due
+
+
+@jit_inline
+def is_due(turn: int, bits: Any, build: Any) -> bool:
+    """Tell whether an e-agent whose turn it is has to enter now, or it loses its place a second time."""
+    if bits & FORFEITED == 0:
+        return False
+    forfeit = ticks_of(build[FORFEIT], build)
+    since = turn - forfeit if turn >= forfeit else turn
+    return since > ticks_of(DUTY * build[FORFEIT], build)
 
 
 @jit

@@ -130,9 +130,9 @@ def drive(
     speed = floats[SPEED]
     if labels.crosses[b, n] >= 0:
         speed = min(max(speed, IN_DISC), build[FASTEST])
+    speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
     kept = wanted_gap(b, n, who, way, state, labels, ints, part)
     speed = min(speed, max(0.0, gap - kept) / build[PERIOD])
-    speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
     if ints[KIND] == NEMESIS and before_ego(b, n, near, state, labels, roads, drivers, desk):
         speed = min(speed, DAWDLE)
     if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, net, ints[LANE]):

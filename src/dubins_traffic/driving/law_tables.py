@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
 
-KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, WAITED, MOOD = range(10)
-INTS = 10
+KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, MOOD = range(11)
+INTS = 11
 """Columns of `Drivers.ints`.
 
 KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, LAST: its rows of `stage` are FIRST to
 LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the row of `stage` it is at, -1: none; GOAL:
 the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
-which it has been its turn to enter the crossing ahead; WAITED: ticks for which something has been in its way; MOOD:
-which rules it breaks on this lane.
+which it has been its turn to enter the crossing ahead; OWED: the same, over all of this wait; WAITED: ticks for which
+something has been in its way; MOOD: which rules it breaks on this lane.
 """
 
 SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD = range(10)
@@ -41,13 +41,12 @@ metres, 0 if it passes nothing; UNTIL: metres before the end of the lane (negati
 long it will still stand in the disc ahead, s.
 """
 
-REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD, DEGREE, FASTEST = range(
-    11
-)
-BUILD = 11
+REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
+DEGREE, FASTEST, FORFEIT = 9, 10, 11
+BUILD = 12
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
-crossing; the car's top speed, m/s.
+crossing; the car's top speed, m/s; seconds after which who does not enter on its turn loses its place.
 """
 
 ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
@@ -75,7 +74,9 @@ class Drivers(NamedTuple):
 
 
 class Desk(NamedTuple):
-    """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits."""
+    """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
+    lanes that the ego will probably take.
+    """
 
     head: Ints
     link: Ints
@@ -83,6 +84,7 @@ class Desk(NamedTuple):
     hops: Ints
     queue: Ints
     cost: Floats
+    chain: Ints
 
 
 def blank(cars: int) -> tuple[Ints, Floats]:
@@ -101,12 +103,14 @@ def desk(cars: int, segments: int) -> Desk:
         hops=np.zeros(2 * segments, dtype=np.int64),
         queue=np.zeros(2 * segments, dtype=np.int64),
         cost=np.zeros(4),
+        chain=np.zeros(4, dtype=np.int64),
     )
 
 
 def build_of(problems: Sequence[Problem]) -> Floats:
     """Return `Drivers.build`."""
     cars = pack_cars([problem.car for problem in problems])
+    rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
     columns = (
         cars.reach,
         cars.half_length,
@@ -117,8 +121,9 @@ def build_of(problems: Sequence[Problem]) -> Floats:
         cars.yaw_rate,
         cars.turning_radius,
         np.array([problem.period for problem in problems]),
-        np.array([RuleParameters.from_mapping(problem.rules).crossing_degree for problem in problems]),
+        np.array([own.crossing_degree for own in rules]),
         cars.speed_high,
+        np.array([own.forfeit_time for own in rules]),
     )
     return np.ascontiguousarray(np.stack([column.astype(np.float64) for column in columns], axis=1))
 

@@ -41,6 +41,10 @@ CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
 SIDE = 0.04
 """What is kept free beside the body along the way, metres."""
+BACKWARD = -0.9
+"""Cosine of the angle between two lanes below which the way between them counts as turning round."""
+HALF_TURN = 3.1
+"""Length of the arc in which a car turns round, in units of its radius."""
 SIGHT = 3.0
 """What is farther away than this does not matter to a car's next tick, metres."""
 HELD = 1e9
@@ -125,7 +129,10 @@ def look_ahead(
             continue
         if passing and labels.bits[b, j] & STANDS != 0 and its_left < floats[ASIDE] - wide + SIDE:
             continue
-        far = sqrt(d2) if there - part < 2 else max(sqrt(d2), its_key - key)
+        far = sqrt(d2)
+        if there - part == 2:
+            round_it = way.tx * way.ux + way.ty * way.uy < BACKWARD
+            far = max(far, its_key - key + (HALF_TURN * way.radius if round_it else 0.0))
         its_gap = far - 2.0 * reach
         if its_gap < gap:
             gap = its_gap
