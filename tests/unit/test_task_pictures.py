@@ -1,0 +1,47 @@
+"""The pictures of docs/task.md: all there, all shown, small, and what the command draws."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "task.md"
+PICTURES = ROOT / "docs" / "pictures"
+SHOWN = re.findall(r"!\[[^\]]+\]\(pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pictures")
+    subprocess.run([sys.executable, PICTURES / "make.py", folder], check=True, timeout=120)
+    return folder
+
+
+def test_the_page_shows_each_picture_once_and_the_command_draws_them_all(drawn: Path) -> None:
+    assert len(SHOWN) == len(set(SHOWN)) > 10
+    assert sorted(SHOWN) == sorted(file.name for file in drawn.iterdir())
+    assert sorted(SHOWN) == sorted(file.name for file in PICTURES.glob("*.svg"))
+
+
+def test_pictures_are_small() -> None:
+    assert all((PICTURES / name).stat().st_size < 100_000 for name in SHOWN)
+
+
+def test_pictures_are_up_to_date(drawn: Path) -> None:
+    pinned = re.search(r"^matplotlib==(\S+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.M)
+    assert pinned is not None
+    if matplotlib.__version__ != pinned[1]:
+        pytest.skip(f"they were drawn with matplotlib {pinned[1]}")
+    stale = [name for name in SHOWN if (drawn / name).read_bytes() != (PICTURES / name).read_bytes()]
+    assert not stale, "run: python docs/pictures/make.py"
+
+
+def test_links_of_the_page_lead_somewhere() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", PAGE.read_text(encoding="utf-8")):
+        assert (PAGE.parent / target).is_file(), target
