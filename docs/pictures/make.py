@@ -32,6 +32,9 @@ from dubins_traffic.viewer.palette import AGENT_COLOURS, EGO_COLOUR
 HALF = (-2.6, -2.75, 2.9, 2.75)
 STRIP = (-4.2, -1.15, 4.2, 1.15)
 LOW = -W
+BEARINGS = (270, 90, 0, 180)
+ARRIVALS = ((120, 3), (63, 1), (122, 2), (138, 4))
+"""Ticket, in ticks of 1/30 s, and place in the order: the ego, A, B, C."""
 
 
 def ground() -> Figure:
@@ -179,18 +182,18 @@ def order() -> Figure:
     """Draw four cars with tickets and their places, and an entry out of turn."""
     figure, (left, right) = row(STAR, HALF, HALF)
     gap = 0.1
-    ego, first, second, last = inward(270, gap), inward(90, gap), inward(0, gap), inward(180, gap)
+    ego, first, second, last = (inward(bearing, gap) for bearing in BEARINGS)
     for panel in (left, right):
         panel.disc()
         panel.approach(0, 90, 180, 270)
-    left.cars(ego, first, second, last, notes=("4.00 s", "2.10 s", "4.05 s", "6.30 s"))
-    for p, number in ((first, 1), (second, 2), (ego, 3), (last, 4)):
+    left.cars(ego, first, second, last, notes=[f"{tick / 30:.2f} s" for tick, _ in ARRIVALS])
+    for p, (_, number) in zip((ego, first, second, last), ARRIVALS, strict=True):
         left.place(p, number)
     left.note(-2.45, 2.2, "tickets: when\neach stopped", ha="left")
     left.note(
         0.9,
         -1.85,
-        "4.00 and 4.05 s are\none group: B goes\nbefore the ego, as it\nis on the ego's right",
+        "4.00 and 4.07 s are\none group: B goes\nbefore the ego, as it\nis on the ego's right",
         ha="left",
     )
     left.title("The order of arrival")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
@@ -9,6 +10,8 @@ from pathlib import Path
 
 import matplotlib
 import pytest
+
+from tests.rules_scripts import Frame, flags, instance, label
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "task.md"
@@ -40,6 +43,30 @@ def test_pictures_are_up_to_date(drawn: Path) -> None:
         pytest.skip(f"they were drawn with matplotlib {pinned[1]}")
     stale = [name for name in SHOWN if (drawn / name).read_bytes() != (PICTURES / name).read_bytes()]
     assert not stale, "run: python docs/pictures/make.py"
+
+
+def test_the_order_drawn_is_the_order_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(PICTURES))
+    make, stage = importlib.import_module("make"), importlib.import_module("stage")
+    waits = [
+        (stage.inward(bearing, 0.1), *arrival)
+        for bearing, arrival in zip(make.BEARINGS, make.ARRIVALS, strict=True)
+    ]
+    while waits:
+        script: list[Frame] = []
+        for k in range(max(tick for _, tick, _ in waits) + 1):
+            back = [max(0.0, 0.01 * (tick - 15 - k)) + 0.3 * (k < tick - 15) for _, tick, _ in waits]
+            script.append(
+                [(p.x - d * p.c, p.y - d * p.s, p.c, p.s) for (p, _, _), d in zip(waits, back, strict=True)]
+            )
+        found = label([instance(stage.STAR, len(waits), rate=30.0)], [script])
+        seen = [flags(found, n) for n in range(len(waits))]
+        assert [next(k for k, at in enumerate(car) if "stopped" in at) for car in seen] == [
+            tick for _, tick, _ in waits
+        ]
+        first = min(waits, key=lambda wait: wait[2])
+        assert [wait for wait, car in zip(waits, seen, strict=True) if "first" in car[-1]] == [first]
+        waits.remove(first)
 
 
 def test_links_of_the_page_lead_somewhere() -> None:
