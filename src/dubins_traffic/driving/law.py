@@ -57,9 +57,8 @@ from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED
 
 STUCK = 2.0
-"""Seconds for which an e-agent in a disc waits for the way it wants before it takes another."""
-DESPAIR = 4.0
-"""The same for the ego, of which it is not asked."""
+"""Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
+asked, and on its way to another exit it might leave the disc outside its lane."""
 IN_DISC = 0.65
 """Least speed in a disc, metres per second: a way through takes less than 2.6 m, and 5 s are allowed."""
 DAWDLE = 0.12
@@ -141,8 +140,7 @@ def drive(
     speed, offset = pass_what_stands(
         b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
     )
-    patience = STUCK if ints[KIND] != ROUND else DESPAIR
-    if part != BEFORE and ints[WAITED] > ticks_of(patience, build):
+    if part != BEFORE and ints[WAITED] > ticks_of(STUCK, build) and ints[KIND] != ROUND:
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
     speed, yaw_rate = steer(c, s, left - offset, px, py, part, way, speed, floats[ASIDE] != 0.0, build)
     if close and not is_safe(b, n, speed, yaw_rate, near, state, obstacles, build, desk):
