@@ -223,7 +223,7 @@ def clear() -> Figure:
     left.cars(ego, tail, names=False)
     left.place(ego, 1)
     left.arrow([(tail.x + RHO, tail.y), (tail.x + 0.8, tail.y)], "#A86F00")
-    left.note(tail.x, tail.y + 0.34, "A", bold=True)
+    left.note(tail.x + 0.2, tail.y + 0.3, "A", bold=True)
     left.note(0.75, -1.55, "the ego is first, but\nA still meets the disc", ha="left")
     left.note(ego.x - 0.25, ego.y, "ego", ha="right", bold=True)
     left.title("waits until A is out", "good")
