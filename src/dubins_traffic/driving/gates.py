@@ -142,7 +142,7 @@ def may_go(
     budget = BUDGET * ints[OWED] * build[PERIOD]
     for k in range(roads.degree[row]):
         cheap = ints[KIND] != ROUND or desk.cost[k] - wanted < budget
-        if cheap and has_room(b, n, roads.arms[row, k], 0, state, labels, roads, drivers, desk):
+        if cheap and has_room(b, n, int(roads.arms[row, k]), 0, state, labels, roads, drivers, desk):
             allowed |= 1 << k
     out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
     if out >= 0:
@@ -181,7 +181,7 @@ def has_room(
     j = desk.head[out >> 1]
     while j >= 0:
         if j != n:
-            along, aside = lane_coordinates(roads, net, out, state.x[b, j], state.y[b, j])
+            along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
             there = aside < build[HALF_WIDTH] + build[ROUNDING] + 0.05
             if there and along > build[DISC] and labels.crosses[b, j] != lane_start(roads, net, out):
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
@@ -208,7 +208,7 @@ def turn_elsewhere(
     allowed = 0
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
-        if out != ints[NEXT] and has_room(b, n, out, 0, state, labels, roads, drivers, desk):
+        if out != ints[NEXT] and has_room(b, n, int(out), 0, state, labels, roads, drivers, desk):
             allowed |= 1 << k
     out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
     if out >= 0:

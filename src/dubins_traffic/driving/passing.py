@@ -78,8 +78,8 @@ def find_way_past(
     room = line - back
     j = desk.head[drivers.ints[b, n, LANE] >> 1]
     while j >= 0:
-        key = along(way, state.x[b, j], state.y[b, j])
-        left = aside(way, state.x[b, j], state.y[b, j])
+        key = along(way, float(state.x[b, j]), float(state.y[b, j]))
+        left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
         if j != n and key > own - 0.5:
             stands = labels.bits[b, j] & STANDS != 0
             if abs(left - offset) < 2.0 * reach + 0.1 and key < back + (0.5 if stands else comes):
@@ -101,7 +101,7 @@ def find_way_past(
                 dx = state.x[b, j] - way.x
                 dy = state.y[b, j] - way.y
                 if j != n and dx * dx + dy * dy < (comes + 1.0) * (comes + 1.0) and j != who:
-                    inbound = labels.lane[b, j] < 0 or lane_end(roads, net, labels.lane[b, j]) == v
+                    inbound = labels.lane[b, j] < 0 or lane_end(roads, net, int(labels.lane[b, j])) == v
                     if inbound and labels.segment[b, j] != drivers.ints[b, n, LANE] >> 1:
                         return
                     if labels.crosses[b, j] == v:
@@ -126,8 +126,8 @@ def extent(
         horizon = max(own, end) + 1.5
         j = desk.head[lane >> 1]
         while j >= 0:
-            key = along(way, state.x[b, j], state.y[b, j])
-            left = aside(way, state.x[b, j], state.y[b, j])
+            key = along(way, float(state.x[b, j]), float(state.y[b, j]))
+            left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
             if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < build[MIDDLE]:
                 end = max(end, key)
                 offset = max(offset, left + wide)

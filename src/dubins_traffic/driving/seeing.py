@@ -78,7 +78,7 @@ def gather(
         for k in range(roads.degree[row]):
             segment = roads.arms[row, k] >> 1
             if segment != lane >> 1 and segment != labels.segment[b, n]:
-                count = add_segment(segment, n, count, desk)
+                count = add_segment(int(segment), n, count, desk)
     return count
 
 
