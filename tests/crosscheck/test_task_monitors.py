@@ -30,6 +30,8 @@ def compared(instance: Instance, frames: Frames) -> dict[Key, int]:
     breaches, contacts = Referee([instance]).judge(frames)
     spec = task(instance.problem, instance.names)
     formulas = stated(instance, (*spec.assumptions, *spec.guarantees))
+    crossings = int((instance.problem.network.degrees >= 3).sum())
+    assert len(formulas) == 4 + 3 * crossings + (len(instance.names) - 1) * (3 + 4 * crossings)
     values = signals(instance, replace(frames, contacts=contacts))
     found = first_broken(formulas, values, instance.problem.period)
     assert found == first_breaches(formulas, breaches)
