@@ -121,6 +121,10 @@ class Fleet:
             last=last,
         )
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
+        self._gather()
+
+    def _gather(self) -> None:
+        self._arrays = (*self._roads, *self._obstacles, *self._agents, *self._work)
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of the e-agents for [t_k, t_k+1) into `commands` (B, N, 2)."""
@@ -132,21 +136,13 @@ class Fleet:
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
         while done < commands.shape[0]:
-            reached = decide(
-                tick,
-                done,
-                state,
-                self._roads,
-                self._obstacles,
-                self._agents,
-                self._work,
-                commands,
-            )
+            reached = decide(tick, done, commands, *state, *self._arrays)
             done = reached
             if reached < 0:
                 done = -1 - reached
                 pairs = 4 * len(self._work.pair)
                 self._work = self._work._replace(pair=np.zeros((pairs, 2), dtype=np.int64))
+                self._gather()
 
 
 def _lawful() -> Driver:

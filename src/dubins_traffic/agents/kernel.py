@@ -61,8 +61,30 @@ BACK = -0.99
 """Cosine of the turn between two lanes below which it counts as turning round."""
 
 
+# Where each table begins and ends among the arrays of a call.
+STATE_END = len(State._fields)
+ROADS_END = STATE_END + len(RoadTable._fields)
+OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
+AGENTS_END = OBSTACLES_END + len(Agents._fields)
+
+
 @jit
-def decide(
+def decide(tick: int, begin: int, commands: Floats, *arrays: Any) -> int:
+    """Write the commands of all e-agents of the trials from `begin` on.
+
+    `arrays` are those of State, RoadTable, ObstacleTable, Agents and Workspace, one after another: a call from Python
+    with arrays takes a third of the time of one with tables of them. Returns the number of trials, or -1 - b where
+    the room for pairs of neighbours was too small for trial b, which is then untouched, like those after it.
+    """
+    return _decide(
+        tick, begin, State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
+        ObstacleTable(*arrays[ROADS_END:OBSTACLES_END]), Agents(*arrays[OBSTACLES_END:AGENTS_END]),
+        Workspace(*arrays[AGENTS_END:]), commands,
+    )  # fmt: skip
+
+
+@jit
+def _decide(
     tick: int,
     begin: int,
     state: State,
@@ -72,11 +94,6 @@ def decide(
     work: Workspace,
     commands: Floats,
 ) -> int:
-    """Write the commands of all e-agents of the trials from `begin` on.
-
-    Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which
-    is then untouched, like those after it.
-    """
     for b in range(begin, state.count.shape[0]):
         if state.count[b] < 2:
             continue

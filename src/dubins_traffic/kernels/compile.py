@@ -59,6 +59,11 @@ def cache_folder() -> Path:
     return folder
 
 
+def nothing_compiled() -> bool:
+    """Whether the cache holds no kernel of these sources yet, though kernels are to be compiled."""
+    return not cast(Any, numba).config.DISABLE_JIT and next(cache_folder().rglob("*.nbi"), None) is None
+
+
 def jit(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` on first use, without fast-math and without exceptions on division.
 
