@@ -60,8 +60,11 @@ def cache_folder() -> Path:
 
 
 def nothing_compiled() -> bool:
-    """Whether the cache holds no kernel of these sources yet, though kernels are to be compiled."""
-    return not cast(Any, numba).config.DISABLE_JIT and next(cache_folder().rglob("*.nbi"), None) is None
+    """Whether the cache is there, holds no kernel of these sources yet, and kernels are to be compiled."""
+    folder = cache_folder()
+    readable = os.access(folder, os.R_OK | os.X_OK)
+    compiles = not cast(Any, numba).config.DISABLE_JIT
+    return compiles and readable and next(folder.rglob("*.nbi"), None) is None
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
