@@ -5,6 +5,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=build/crosscheck
+# Old source packages are built with a setuptools that still has pkg_resources, also where pip builds apart.
+export PIP_CONSTRAINT="$PWD/scripts/crosscheck-constraints.txt"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
@@ -24,8 +26,8 @@ environment() { # name, module, packages...
 
 mkdir -p "$folder"
 environment stormpy stormpy 'stormpy==2.0.0'
-environment rtamt rtamt 'rtamt==0.4.10' 'setuptools<81'
-environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' 'setuptools<80'
+environment rtamt rtamt 'rtamt==0.4.10' setuptools
+environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 
 if ! command -v spin >/dev/null 2>&1; then
   as_root=""
