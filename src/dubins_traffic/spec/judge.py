@@ -8,6 +8,7 @@ from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
@@ -188,6 +189,11 @@ class Referee:
                 others.add("E6")
             found.append(Running(ego, frozenset(others)))
         return found
+
+    @property
+    def may_leave(self) -> npt.NDArray[np.bool_]:
+        """Which e-agents meet, with their bodies, a disc out of which some exit is free (E4), (B, N)."""
+        return self._docket.clock[:, :, EXIT_SINCE] >= 0
 
     def _judge(self, tick: int, state: State) -> None:
         own = self._labeller

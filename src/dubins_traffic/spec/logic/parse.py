@@ -118,6 +118,20 @@ def parse(text: str, *, file: str | None = None) -> Formula:
     return _Parser(text, file).whole()
 
 
+def place_of(text: str, name: str) -> tuple[int, int]:
+    """Return line and column, both from 1, at which a proposition first stands in the text of a formula.
+
+    Raises
+    ------
+    ValueError
+        If it does not stand there.
+    """
+    found = re.search(rf"(?<![A-Za-z0-9_]){re.escape(name)}(?![A-Za-z0-9_])", text)
+    if found is None:
+        raise ValueError(f"no {name!r} in {text!r}")
+    return _place(text, found.start())
+
+
 class _Parser:
     """Reads one text by operator precedence, with stacks of its own in place of recursion."""
 
