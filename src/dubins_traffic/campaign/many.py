@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.single import Result, run_trial
+from dubins_traffic.campaign.warm import companion
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -84,8 +85,9 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     is raised after the results that were ready have been yielded.
     """
     if workers <= 1 or len(jobs) <= 1:
-        for job in jobs:
-            yield job.run()
+        with companion():
+            for job in jobs:
+                yield job.run()
         return
     context = multiprocessing.get_context("spawn")
     cancelled = context.Event()

@@ -19,16 +19,19 @@ from dubins_traffic.kernels.compile import nothing_compiled
 
 
 @contextlib.contextmanager
-def companion() -> Generator[None]:
-    """Compile in a second process while the body runs, if this is a first run and there is a second core."""
+def companion() -> Generator[subprocess.Popen[bytes] | None]:
+    """Compile in a second process while the body runs, if this is a first run and there is a second core.
+
+    Yields that process, or None where there is none. It is ended with the body.
+    """
     if (os.cpu_count() or 1) < 2 or not nothing_compiled():
-        yield
+        yield None
         return
     command = [sys.executable, "-m", "dubins_traffic.campaign.warm"]
     quiet = subprocess.DEVNULL
     process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
     try:
-        yield
+        yield process
     finally:
         process.terminate()
         process.wait()

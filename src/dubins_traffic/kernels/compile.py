@@ -60,11 +60,14 @@ def cache_folder() -> Path:
 
 
 def nothing_compiled() -> bool:
-    """Whether the cache is there, holds no kernel of these sources yet, and kernels are to be compiled."""
-    folder = cache_folder()
-    readable = os.access(folder, os.R_OK | os.X_OK)
-    compiles = not cast(Any, numba).config.DISABLE_JIT
-    return compiles and readable and next(folder.rglob("*.nbi"), None) is None
+    """Whether the cache can be looked into, holds no kernel of these sources yet, and kernels are to be compiled."""
+    if cast(Any, numba).config.DISABLE_JIT:
+        return False
+    try:
+        folders = list(cache_folder().iterdir())
+        return all(next(folder.glob("*.nbi"), None) is None for folder in folders)
+    except OSError:
+        return False
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
