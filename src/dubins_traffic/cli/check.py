@@ -10,7 +10,11 @@ import typer
 from dubins_traffic.cli import options
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
     from dubins_traffic.scoring.score import Score
+    from dubins_traffic.scoring.verdict import Verdict
 
 EXAMPLES = options.examples("check out/*.mcap", "check out/trial-0000.mcap --json")
 
@@ -21,7 +25,7 @@ def check(
     ],
     json: options.Json = False,
 ) -> None:
-    """Judge recorded trials by the rules of the road: the verdict, and every breach of every car."""
+    """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car."""
     from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.scoring.score import score
 
@@ -36,7 +40,7 @@ def check(
 
 def _document(record: str, score: Score) -> dict[str, Any]:
     verdict = score.verdict
-    return {
+    document = {
         "record": record,
         "verdict": None if verdict is None else verdict.verdict.value,
         "clean": None if verdict is None else verdict.clean,
@@ -44,19 +48,30 @@ def _document(record: str, score: Score) -> dict[str, Any]:
         "rounds": score.rounds,
         "longest_gap_s": max((goal.longest_gap_s for goal in score.goals), default=None),
     }
+    if score.formulas:
+        document["formulas"] = [found.to_json() for found in score.formulas]
+    return document
 
 
 def _show(record: str, score: Score) -> None:
-    """Print a verdict for people: one line, why, and a table of the breaches."""
-    from rich import box
+    """Print a verdict for people: one line, why, the formulas' verdicts, and a table of the breaches."""
     from rich.console import Console
-    from rich.table import Table
+
+    from dubins_traffic.cli.tables import verdict_text
 
     console = Console(highlight=False, soft_wrap=True)
     verdict = score.verdict
     if verdict is None:
         console.print(f"{record}: not judged, the problem does not ask for the rules", markup=False)
-        return
+    else:
+        _show_verdict(record, verdict, console)
+    for found in score.formulas:
+        console.print(f"  {found.name}: {verdict_text(found)}", markup=False)
+    if verdict is not None and verdict.violations:
+        console.print(_breaches(verdict))
+
+
+def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
     clean = "clean" if verdict.clean else "not clean"
     gap = "" if verdict.longest_gap_s is None else f", longest gap {verdict.longest_gap_s:.1f} s"
     limit = "" if verdict.gap_limit_s is None else f" of {verdict.gap_limit_s:.1f} s allowed"
@@ -67,12 +82,17 @@ def _show(record: str, score: Score) -> None:
         sensed = "within" if excuse.sensed else "beyond"
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
         console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
-    if not verdict.violations:
-        return
+
+
+def _breaches(verdict: Verdict) -> Table:
+    """Return the breaches as a table."""
+    from rich import box
+    from rich.table import Table
+
     table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
     for heading in ("time", "since", "car", "rule", "x", "y"):
         table.add_column(heading, justify="left" if heading in ("car", "rule") else "right", no_wrap=True)
     for entry in verdict.violations:
         x, y = f"{entry.where.x:.2f}", f"{entry.where.y:.2f}"
         table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y)
-    console.print(table)
+    return table

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from dubins_traffic.scoring.formulas import FormulaVerdict
     from dubins_traffic.scoring.score import Score, ScoreSheet
 
 
@@ -38,7 +39,10 @@ def show(sheet: ScoreSheet, *, json: bool) -> None:
         return
     from rich.console import Console
 
-    Console().print(score_table(sheet))
+    console = Console()
+    console.print(score_table(sheet))
+    if any(score.formulas for score in sheet.trials):
+        console.print(formula_table(sheet))
 
 
 def summary(score: Score) -> dict[str, str]:
@@ -46,7 +50,13 @@ def summary(score: Score) -> dict[str, str]:
     return {
         "controller": score.controller or "-",
         **{heading: cell(score) for heading, cell in _cells([score]).items()},
+        **{f"formula {found.name}": verdict_text(found) for found in score.formulas},
     }
+
+
+def verdict_text(found: FormulaVerdict) -> str:
+    """Return the verdict on a formula, and since when it is definite."""
+    return found.verdict if found.time is None else f"{found.verdict} since {found.time:.3f} s"
 
 
 def score_table(sheet: ScoreSheet) -> Table:
@@ -69,6 +79,22 @@ def score_table(sheet: ScoreSheet) -> Table:
     for score in sheet.trials:
         leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
         table.add_row(*leading, *(_narrow(cell(score), 10) for cell in cells.values()))
+    return table
+
+
+def formula_table(sheet: ScoreSheet) -> Table:
+    """Return a table with one row for each formula of each trial."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
+    table.add_column("trial", justify="right", no_wrap=True)
+    table.add_column("formula", overflow="fold")
+    table.add_column("verdict", no_wrap=True)
+    for score in sheet.trials:
+        for found in score.formulas:
+            table.add_row(str(score.trial), Text(found.name), verdict_text(found))
     return table
 
 

@@ -22,6 +22,7 @@ from dubins_traffic.problem.draw import (
 )
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import Kind, detect, parse_json, plain, read_source
+from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.parts import CarModel, ObstacleModel
 from dubins_traffic.problem.settings import INSTANCE_0_KEYS, InstanceModel, InstanceModel0
@@ -72,6 +73,7 @@ def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]
         "disturbances": asdict(instance.disturbances),
         "end_on_collision": instance.end_on_collision,
         "simulator": instance.simulator,
+        **({"formulas": dict(problem.formulas)} if problem.formulas else {}),
         **instance.extra,
     }
 
@@ -152,7 +154,9 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         obstacles=model.obstacle_values,
         e_agents=names[1:],
         rules=rules,
+        formulas=model.formulas,
     )
+    check_formulas(problem, names)
     planned, ego = _placed(model, network, planned)
     wishes = [ego, *agent_wishes(network, planned, agents)]
     ground = Ground(network, car, model.radius, problem.obstacles)

@@ -12,6 +12,7 @@ from dubins_traffic.problem import limits
 from dubins_traffic.problem.configuration import Configuration, PlannedAgent, check_goal, pose_of
 from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
 from dubins_traffic.problem.demands import check_demands
+from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import loops
 from dubins_traffic.problem.starts import Ground, Wish, draw_starts
@@ -134,7 +135,9 @@ def _draw(configuration: Configuration, seed: int, trial: int) -> Instance:
         obstacles=settings.obstacle_values,
         e_agents=names[1:],
         rules=rules,
+        formulas=settings.formulas,
     )
+    check_formulas(problem, names)
     ego = Wish(_ego_start(network, configuration), None, "ego.start")
     wishes = [ego, *agent_wishes(network, configuration.agents, agents)]
     ground = Ground(network, car, radius, problem.obstacles)

@@ -58,7 +58,8 @@ class Problem:
     """What a controller is told before a trial.
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
-    `rules` holds the parameters of RULES by name, empty where the rules are not to be judged.
+    `rules` holds the parameters of RULES by name, empty where the rules are not to be judged; `formulas` the texts of
+    what is judged beside the task, by name.
     """
 
     network: RoadNetwork
@@ -71,6 +72,7 @@ class Problem:
     obstacles: tuple[Obstacle, ...]
     e_agents: tuple[str, ...]
     rules: Mapping[str, Any]
+    formulas: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def goal_vertices(self) -> tuple[int, ...]:

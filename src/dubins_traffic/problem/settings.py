@@ -12,6 +12,7 @@ from dubins_traffic.cars.body import Obstacle
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Open, Strict, fault
+from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.problem.parts import (
     CarModel,
@@ -245,6 +246,9 @@ class World(Open):
     )
     end_on_collision: bool = Field(default=False, description="whether a collision of the ego ends the trial")
     rules: Rules = Field(default=None, description="rules to judge; true: with all defaults")
+    formulas: Formulas = Field(
+        default={}, description="formulas to judge beside the task, by name: temporal logic over propositions"
+    )
     simulator: Annotated[str, Field(min_length=1)] = Field(
         default="embedded", description="name of the simulator"
     )

@@ -17,6 +17,7 @@ from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
+from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
 from dubins_traffic.scoring.verdict import Judging, Verdict
@@ -53,6 +54,8 @@ class Score:
         Wall-clock seconds of the controller's `start`; None if not measured.
     verdict : Verdict or None
         The verdict by the rules of the road; None if the problem does not ask for them.
+    formulas : tuple of FormulaVerdict
+        The verdicts on the formulas that the problem carries beside its task.
     """
 
     trial: int
@@ -71,6 +74,7 @@ class Score:
     min_clearance_m: float | None
     time_to_begin_s: float | None
     verdict: Verdict | None
+    formulas: tuple[FormulaVerdict, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as a JSON object; the fields of `driven` stand beside the others."""
@@ -79,6 +83,8 @@ class Score:
             value = getattr(self, name)
             if name == "collisions":
                 document[name] = [collision.to_json() for collision in self.collisions]
+            elif name == "formulas":
+                document[name] = [formula.to_json() for formula in self.formulas]
             elif name == "goals":
                 document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
             elif name == "driven":
@@ -103,6 +109,7 @@ class Scorer:
         self._driving = Driving()
         self._clearance = Clearance()
         self._judging = Judging()
+        self._formulas = FormulaVerdicts()
         self._metrics = (
             self._icra2016,
             self._collisions,
@@ -110,6 +117,7 @@ class Scorer:
             self._driving,
             self._clearance,
             self._judging,
+            self._formulas,
         )
 
     def begin(self, instance: Instance) -> None:
@@ -169,6 +177,7 @@ class Scorer:
             min_clearance_m=self._clearance.result(),
             time_to_begin_s=None if wall is None else wall.time_to_begin_s,
             verdict=self._judging.result(),
+            formulas=self._formulas.result(),
         )
 
     def _show(self) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,14 +16,14 @@ from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.collisions import Collision, Collisions
+from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import GoalDiscs, Visiting, Visits
+from dubins_traffic.spec.exceptions import Exceptions
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.tables import ticks
 
 if TYPE_CHECKING:
     from dubins_traffic.spec.judge import Breach, Running
-
-Status = Literal["true", "presumably true", "presumably false", "false"]
 
 EGO_RULES = ("1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear")
 """The rules of the ego that a finite run can break."""
@@ -281,22 +281,16 @@ def assumed(rules: RuleParameters) -> tuple[str, ...]:
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
     """Return which part of the assumption falls first, and with which breach; None if it holds.
 
-    Breaches of E1 that a car is allowed (`exceptions` within `exception_time`) don't count; what one car does against
-    one rule in one frame counts once.
+    Breaches of E1 that a car is allowed (`spec.exceptions`) don't count.
     """
     made = assumed(rules)
-    window = ticks(rules.exception_time, rate)
-    allowed: dict[int, list[tuple[int, str]]] = {}
+    exceptions = Exceptions(rules, rate)
     for breach in breaches:
         part = assumption_of(breach.rule)
         if breach.car == EGO or part not in made:
             continue
-        if part == "E1":
-            recent = [entry for entry in allowed.get(breach.car, []) if breach.tick - entry[0] < window]
-            entry = (breach.tick, breach.rule[0])
-            allowed[breach.car] = recent if entry in recent else [*recent, entry]
-            if len(allowed[breach.car]) <= rules.exceptions:
-                continue
+        if part == "E1" and not exceptions.exceeded(breach):
+            continue
         return part, breach
     return None
 

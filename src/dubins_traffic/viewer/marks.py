@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.scoring.formulas import FormulaVerdict
 from dubins_traffic.scoring.verdict import Violation
 
 
@@ -63,6 +64,15 @@ def breach_marks(instance: Instance, violations: Sequence[Violation]) -> list[Ma
             violation.since if violation.since < violation.time else None,
         )
         for violation in violations
+    ]
+
+
+def formula_marks(verdicts: Sequence[FormulaVerdict]) -> list[Mark]:
+    """Return the marks of the instants in which verdicts on formulas became definite."""
+    return [
+        Mark(found.time, "formula", f"{found.name} is {found.verdict}")
+        for found in verdicts
+        if found.time is not None
     ]
 
 

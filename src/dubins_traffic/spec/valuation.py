@@ -1,0 +1,212 @@
+"""Which propositions hold in which frame: what `spec.vocabulary` names, found from poses and contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.spec.exceptions import Exceptions
+from dubins_traffic.spec.judge import Arraigned, Breach, Referee
+from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.propositions import BLOCKED, ENTERED, EXCUSED, NAMES, STANDS, STOPPED
+from dubins_traffic.spec.vocabulary import (
+    AT,
+    FREE,
+    LANE,
+    OF_INTERSECTION,
+    OF_JUDGED,
+    SEGMENT,
+    Proposition,
+    Vocabulary,
+)
+
+Mask = npt.NDArray[np.bool_]
+
+_E1: Final = ("2", "3")
+"""How the names of the rules begin that e-agents break as E1."""
+
+
+class Named(Arraigned, Protocol):
+    """What is asked of an instance (`problem.instance.Instance`)."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the cars, the ego's first."""
+        ...
+
+
+class _Scene(NamedTuple):
+    """What is known of a block of frames, (F, N) each; `bits` as in `Labels`, `progress` in metres."""
+
+    at: Ints
+    crosses: Ints
+    segment: Ints
+    lane: Ints
+    bits: Ints
+    progress: Floats
+    touches: Mask
+    guilty: Mask
+    may_leave: Mask
+    renewed: Mask
+    excess: Mask
+
+    @staticmethod
+    def empty(frames: int, cars: int) -> _Scene:
+        def numbers() -> Ints:
+            return np.zeros((frames, cars), dtype=np.int64)
+
+        def masks() -> Mask:
+            return np.zeros((frames, cars), dtype=np.bool_)
+
+        return _Scene(
+            at=numbers(),
+            crosses=numbers(),
+            segment=numbers(),
+            lane=numbers(),
+            bits=numbers(),
+            progress=np.zeros((frames, cars)),
+            touches=masks(),
+            guilty=masks(),
+            may_leave=masks(),
+            renewed=masks(),
+            excess=masks(),
+        )
+
+
+class Valuation:
+    """Finds propositions in the frames of one trial, block by block from frame 0.
+
+    Labels and faults are found again from the poses, as the referee does, whoever recorded the trial.
+
+    Parameters
+    ----------
+    instance : Instance
+        The trial.
+    names : sequence of str
+        The propositions wanted.
+
+    Raises
+    ------
+    FormulaError
+        If the problem lacks one of them.
+    """
+
+    def __init__(self, instance: Named, names: Sequence[str]) -> None:
+        problem = instance.problem
+        vocabulary = Vocabulary(problem, instance.names)
+        self._wanted = [vocabulary[name] for name in names]
+        self._rules = RuleParameters.from_mapping(problem.rules)
+        self._labeller = Labeller([instance])
+        judged = any(proposition.word in OF_JUDGED for proposition in self._wanted)
+        self._referee = Referee([instance], self._labeller) if judged else None
+        self._exceptions = Exceptions(self._rules, problem.rate)
+        network = problem.network
+        self._ends = np.array([network.lane_ends(lane)[1] for lane in range(network.lanes)] + [-1])
+        self._state = State.zeros(1, len(instance.names))
+        self._next = 0
+
+    def values(self, frames: Frames) -> Mask:
+        """Return which of the propositions hold in each frame of the next block, (F, P).
+
+        Raises
+        ------
+        ValueError
+            If frames have been left out.
+        """
+        if frames.first != self._next:
+            raise ValueError(f"frame {self._next} must follow, got {frames.first}")
+        self._next += len(frames)
+        scene = self._scene(frames)
+        found = np.zeros((len(frames), len(self._wanted)), dtype=np.bool_)
+        for column, proposition in enumerate(self._wanted):
+            found[:, column] = self._value(scene, proposition)
+        return found
+
+    def _scene(self, frames: Frames) -> _Scene:
+        contacts: dict[int, list[Contact]] = {}
+        for contact in frames.contacts:
+            contacts.setdefault(contact.tick, []).append(contact)
+        scene = _Scene.empty(len(frames), frames.x.shape[1])
+        for row in range(len(frames)):
+            tick = frames.first + row
+            for name in ("x", "y", "c", "s"):
+                getattr(self._state, name)[0] = getattr(frames, name)[row]
+            own = self._label(tick, contacts.get(tick, []))
+            self._note(scene, row, tick, own)
+        return scene
+
+    def _label(self, tick: int, contacts: Sequence[Contact]) -> Sequence[Contact]:
+        if tick == 0:
+            self._labeller.reset(self._state)
+            return contacts
+        return self._labeller.update(tick, self._state, [contacts])[0]
+
+    def _note(self, scene: _Scene, row: int, tick: int, contacts: Sequence[Contact]) -> None:
+        labels: Labels = self._labeller.labels
+        for name in ("at", "crosses", "segment", "lane", "bits"):
+            getattr(scene, name)[row] = getattr(labels, name)[0]
+        scene.progress[row] = self._labeller.progress[0]
+        for contact in contacts:
+            for car, guilty in zip((contact.car, contact.other), contact.at_fault, strict=True):
+                if car >= 0:
+                    scene.touches[row, car] = True
+                    scene.guilty[row, car] |= guilty
+        if self._referee is None:
+            return
+        if tick == 0:
+            breaches = self._referee.reset(self._state)[0]
+        else:
+            breaches = self._referee.update(tick, self._state, [contacts])[0]
+        scene.may_leave[row] = self._referee.may_leave[0]
+        over = self._labeller.forfeits[0] == self._rules.tickets + 1
+        scene.renewed[row] = over & (self._labeller.tickets[0] == tick)
+        for breach in breaches:
+            if _of_e1(breach) and self._exceptions.exceeded(breach):
+                scene.excess[row, breach.car] = True
+
+    def _value(self, scene: _Scene, wanted: Proposition) -> Mask:
+        word, car, place = wanted
+        if word == FREE:
+            return ~(scene.at[:, EGO + 1 :] == place).any(axis=1)
+        if word in OF_INTERSECTION:
+            return self._of_intersection(scene, wanted)
+        if word in NAMES:
+            flag = scene.bits[:, car] & NAMES[word] != 0
+            return flag if place < 0 else flag & (self._ends[scene.lane[:, car]] == place)
+        masks = {"collision": scene.touches, "at_fault": scene.guilty, "exit": scene.may_leave}
+        masks |= {"renewed": scene.renewed, "excess": scene.excess}
+        if word in masks:
+            return masks[word][:, car]
+        if word == "way":
+            return self._way(scene, car)
+        return {AT: scene.at, SEGMENT: scene.segment, LANE: scene.lane}[word][:, car] == place
+
+    def _of_intersection(self, scene: _Scene, wanted: Proposition) -> Mask:
+        word, car, place = wanted
+        if place < 0:
+            return scene.bits[:, car] & NAMES[word] != 0
+        crosses = scene.crosses == place
+        if word == "clear":
+            return ~np.delete(crosses, car, axis=1).any(axis=1)
+        if word == "enter":
+            return crosses[:, car] & (scene.bits[:, car] & ENTERED != 0)
+        return crosses[:, car]
+
+    def _way(self, scene: _Scene, car: int) -> Mask:
+        """Return in which frames a car is in a lane with a free way ahead (E5)."""
+        lane = scene.lane[:, [car]]
+        ahead = scene.progress - scene.progress[:, [car]]
+        waits = scene.bits & (STANDS | EXCUSED | STOPPED) != 0
+        taken = waits & (scene.lane == lane) & (ahead > 0.0) & (ahead <= self._rules.way_distance)
+        own = scene.bits[:, car] & (BLOCKED | STOPPED) == 0
+        return (lane[:, 0] >= 0) & own & ~taken.any(axis=1)
+
+
+def _of_e1(breach: Breach) -> bool:
+    return breach.car != EGO and breach.rule.startswith(_E1)
