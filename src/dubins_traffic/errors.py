@@ -86,6 +86,18 @@ class ControllerError(DubinsTrafficError):
         super().__init__(f"{reason}: {detail}")
 
 
+class PeerError(ControllerError):
+    """What drives a car from another process ended the trial; `reason` is one of the named ends of a trial."""
+
+
+class TransportError(DubinsTrafficError):
+    """A transport can't be opened: no master, port in use, no route."""
+
+
+class ClusterLostError(DubinsTrafficError):
+    """The cluster on which a campaign ran is gone; what had been finished is kept."""
+
+
 class MissingExtraError(DubinsTrafficError):
     """A feature needs an optional extra of the package that is not installed."""
 

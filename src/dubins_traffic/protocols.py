@@ -5,7 +5,7 @@ The order of events in a tick is that of `docs/semantics.md`: sense, decide, cli
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -14,7 +14,22 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import End, Ending, Sink
 
-__all__ = ["Capabilities", "Closes", "Controller", "Driver", "End", "Ending", "Simulator", "Sink"]
+__all__ = [
+    "Capabilities",
+    "Clock",
+    "Closes",
+    "Controller",
+    "Driver",
+    "End",
+    "Ending",
+    "Mailbox",
+    "Simulator",
+    "Sink",
+    "Streams",
+    "Transport",
+    "View",
+    "Watcher",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,4 +92,151 @@ class Closes(Protocol):
 
     def close(self) -> None:
         """Free what is held."""
+        ...
+
+
+class Watcher(Protocol):
+    """Is shown every frame of a trial at once, before anyone decides on it; a Sink gets them in blocks."""
+
+    def begin(self, instance: Instance) -> None:
+        """A trial has been placed; its first frame follows."""
+        ...
+
+    def watch(self, tick: int, state: State, labels: Labels) -> None:
+        """Frame `tick` has been reached; the arrays are the simulator's own and change with the next tick.
+
+        Raises
+        ------
+        ControllerError
+            To end the trial for a named reason.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One frame as a transport sends it.
+
+    `time` is in simulated seconds; `state` and `labels` hold every car of the trial, (1, N). `observe(n)` makes car
+    n's own observation, once however often it is asked: what a controller in this process would be handed. `running`
+    is false while the cars are only shown and nobody drives.
+    """
+
+    tick: int
+    time: float
+    state: State
+    labels: Labels
+    observe: Callable[[int], Observation]
+    running: bool
+
+
+class Mailbox(Protocol):
+    """Where a transport puts what arrives. Any thread may call these; none of them waits, keeps a queue or raises."""
+
+    def command(self, car: str, speed: float, yaw_rate: float, tick: int | None = None) -> None:
+        """`car` shall drive at `speed` (m/s) and `yaw_rate` (rad/s); `tick` is the frame that this answers, if known.
+
+        Numbers that are not finite are passed on: they are that driver's fault. Unknown cars are counted, no more.
+        """
+        ...
+
+    def fault(self, car: str, end: End, detail: str) -> None:
+        """The peer of `car` has done something that ends its driving, such as `End.PEER_GARBAGE`."""
+        ...
+
+    def joined(self, car: str) -> None:
+        """A peer of `car` is there, or there again."""
+        ...
+
+    def left(self, car: str) -> None:
+        """The last peer of `car` has gone; it may come back within the link's patience."""
+        ...
+
+    def stop(self, end: End, detail: str) -> None:
+        """End the trial that is running, if one is, for a reason that is no single peer's."""
+        ...
+
+    def pause(self, paused: bool) -> None:
+        """Let simulated time stand still, or go on."""
+        ...
+
+
+class Transport(Protocol):
+    """Carries frames to drivers elsewhere and their commands back; one for all remote cars of a session.
+
+    All methods are called from the trial's thread, in the order open, (begin, frame..., announce, frame..., end)...,
+    close. What arrives goes to the mailbox, from whatever thread it arrives in.
+    """
+
+    @property
+    def name(self) -> str:
+        """Short name, such as `ros1`; stands in the record as the controller's."""
+        ...
+
+    @property
+    def tagged(self) -> bool:
+        """Whether commands carry the tick that they answer; without, the first after a frame is its answer."""
+        ...
+
+    def open(self, mailbox: Mailbox) -> None:
+        """Begin to listen. InputError or TransportError if that can't be."""
+        ...
+
+    def begin(self, instance: Instance, remote: Sequence[str]) -> None:
+        """The world of `instance` has been put up; commands of the cars `remote` are wanted."""
+        ...
+
+    def announce(self, instance: Instance) -> None:
+        """Tell the peers the problem: the trial begins. `time to begin` counts from here."""
+        ...
+
+    def frame(self, view: View) -> None:
+        """Send a frame to all peers. What can't be sent at once is dropped: never wait for a peer."""
+        ...
+
+    def end(self, ending: Ending) -> None:
+        """The trial is over; tell the peers."""
+        ...
+
+    def close(self) -> None:
+        """Leave nothing behind. May be called twice."""
+        ...
+
+
+@runtime_checkable
+class Streams(Protocol):
+    """A transport that sends the world more often than once a tick while wall-clock time passes."""
+
+    @property
+    def interval(self) -> float:
+        """Seconds of wall clock between two views."""
+        ...
+
+    def stream(self, view: View) -> None:
+        """Send the world as it is between two frames: `view.time` and `view.state` lie between those of ticks."""
+        ...
+
+
+class Clock(Protocol):
+    """Says when frames are due and how long commands are waited for; times are those of `time.monotonic`."""
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether the simulation waits for the command of every tick; then due times are always past."""
+        ...
+
+    def start(self, period: float, now: float) -> None:
+        """Simulated time 0 is now; a tick takes `period` simulated seconds."""
+        ...
+
+    def due(self, tick: int) -> float:
+        """Return when frame `tick` is to be sent."""
+        ...
+
+    def until(self, tick: int, now: float) -> float:
+        """Return until when the commands that answer frame `tick` are waited for."""
+        ...
+
+    def shift(self, seconds: float) -> None:
+        """Move all that is to come by `seconds`: the trial was paused, or the machine stood still."""
         ...

@@ -45,7 +45,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import parameters_of
+from dubins_traffic.problem.kinds import REMOTE, parameters_of
 from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 
@@ -69,7 +69,7 @@ class Fleet:
     """Drives the e-agents of every instance of a batch (a `protocols.Driver`).
 
     The commands are a function of the states since `reset`, the instances and their seeds, and of nothing else:
-    trials of a batch do not touch each other. The ego's commands are left alone.
+    trials of a batch do not touch each other. The ego's commands are left alone; those of remote cars are whatever.
 
     Notes
     -----
@@ -88,7 +88,8 @@ class Fleet:
         self._lawful = _lawful() if kinds & KEEP_RULES else None
         if self._lawful is not None:
             self._lawful.reset(instances, state)
-        self._others = not kinds <= KEEP_RULES
+        elsewhere = KEEP_RULES | {REMOTE}
+        self._others = not kinds <= elsewhere
         self._roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
@@ -101,7 +102,7 @@ class Fleet:
         script: list[tuple[float, float, float]] = []
         for b, instance in enumerate(instances):
             for n, agent in enumerate(instance.e_agents, start=1):
-                if agent.kind in KEEP_RULES:
+                if agent.kind in elsewhere:
                     continue
                 given = _parameters(agent)
                 floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)

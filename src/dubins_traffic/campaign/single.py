@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.protocols import Controller, Ending, Simulator, Sink
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
+from dubins_traffic.transports.drivers import RemoteAgents, RemoteController
+from dubins_traffic.transports.link import Link
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
 
@@ -31,6 +35,13 @@ class Trial(BareTrial):
         Where to write a record.
     simulator : Simulator, optional
         Instead of the one that the instance names.
+    link : Link, optional
+        To the drivers of remote cars.
+
+    Raises
+    ------
+    InputError
+        If an e-agent is remote and there is no link.
 
     Examples
     --------
@@ -49,14 +60,30 @@ class Trial(BareTrial):
         sinks: Sequence[Sink] = (),
         record: Path | str | None = None,
         simulator: Simulator | None = None,
+        link: Link | None = None,
     ) -> None:
+        agents = _agents(instance, link)
         writer = () if record is None else (RecordWriter(record),)
         super().__init__(
             instance,
             simulator=simulator or simulators.load(instance.simulator),
-            agents=[Fleet()] if instance.e_agents else [],
+            agents=agents,
             sinks=(*writer, *sinks),
+            watchers=() if link is None else (link,),
         )
+
+
+def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
+    remote = [agent for agent in instance.e_agents if agent.kind == REMOTE]
+    if remote and link is None:
+        raise InputError(
+            f"{remote[0].name} is driven by a program elsewhere, and none can be reached",
+            field="e-agents",
+            value=remote[0].type,
+            expected="a type of ours, or a run over a transport, such as dubins-traffic ros1 run",
+        )
+    local: list[Driver] = [Fleet()] if len(remote) < len(instance.e_agents) else []
+    return local if link is None or not remote else [*local, RemoteAgents(link)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +106,7 @@ def run_trial(
     overwrite: bool = False,
     deadline: float | None = None,
     sinks: Sequence[Sink] = (),
+    link: Link | None = None,
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -96,22 +124,33 @@ def run_trial(
         Seconds within which each `act` must answer; by default it may take its time.
     sinks : sequence of Sink
         Further sinks.
+    link : Link, optional
+        To the drivers of remote cars. If the ego is one, `controller` is not looked at.
 
     Raises
     ------
     InputError
         If the controller can't be loaded or the record can't be written.
     """
-    name = controller if isinstance(controller, str) else type(controller).__name__
-    driver = controllers.load(controller) if isinstance(controller, str) else controller
+    if link is not None and link.ego:
+        name, driver = link.transport.name, RemoteController(link)
+    else:
+        name = controller if isinstance(controller, str) else type(controller).__name__
+        driver = controllers.load(controller) if isinstance(controller, str) else controller
     scorer = Scorer()
     writer = None
     if record is not None:
         writer = RecordWriter(record, controller=name, overwrite=overwrite)
     first = () if writer is None else (writer,)
     try:
-        with Trial(instance, sinks=(*first, scorer, *sinks)) as trial:
-            ending, measured = run(trial, driver, deadline)
+        with Trial(instance, sinks=(*first, scorer, *sinks), link=link) as trial:
+            try:
+                ending, measured = run(trial, driver, deadline)
+            finally:
+                if link is not None and trial.ending is not None:
+                    link.finish(trial.ending)
+        if link is not None:
+            measured = _over(link, measured)
     finally:
         if writer is not None:
             writer.close()
@@ -120,3 +159,10 @@ def run_trial(
         wall.write(path, measured)
     score = scorer.result(controller=name, record=path, wall=measured)
     return Result(instance, name, ending, score, measured, path)
+
+
+def _over(link: Link, measured: wall.Wall) -> wall.Wall:
+    """Add to what was measured here what the link has measured."""
+    begin = link.time_to_begin if link.ego else measured.time_to_begin_s
+    reproducible = measured.reproducible and link.clock.lockstep
+    return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=link.report())

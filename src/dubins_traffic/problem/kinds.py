@@ -6,6 +6,7 @@ parameters of the kind, defaults filled in, and for a `loop` the cycle that was 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -135,6 +136,11 @@ class Nemesis(Strict):
     speed: Speed = Field(default=0.7, description="speed while the ego is not behind it, m/s")
 
 
+class Remote(Strict):
+    """Is driven by a program of its own, over a transport."""
+
+
+REMOTE = "remote"
 KINDS: Mapping[str, type[Strict]] = {
     "wander": Wander,
     "loop": Loop,
@@ -143,15 +149,19 @@ KINDS: Mapping[str, type[Strict]] = {
     "scripted": Scripted,
     "lawful": Lawful,
     "nemesis": Nemesis,
+    REMOTE: Remote,
 }
 """Kinds by name, each with the model of its parameters."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}
 """Types (package/executable) of 2016, and what they are called here."""
 
+PROGRAM = r"^[A-Za-z][A-Za-z0-9_]*/[A-Za-z0-9_.-]+$"
+"""A type package/executable; one that is not ours is a program of the user's."""
+
 
 def kind_of(name: str) -> str:
-    """Return the kind that `name`, ours or of 2016, stands for.
+    """Return the kind that `name`, ours or of 2016, stands for; a package/executable that is not ours is remote.
 
     Raises
     ------
@@ -159,10 +169,14 @@ def kind_of(name: str) -> str:
         If there is none.
     """
     kind = NAMES_2016.get(name, name)
-    if kind not in KINDS:
-        known = ", ".join([*KINDS, *NAMES_2016])
-        raise InputError("unknown type of e-agent", field="type", value=name, expected=f"one of {known}")
-    return kind
+    if kind in KINDS:
+        return kind
+    if re.fullmatch(PROGRAM, name):
+        return REMOTE
+    known = ", ".join([*KINDS, *NAMES_2016])
+    raise InputError(
+        "unknown type of e-agent", field="type", value=name, expected=f"one of {known}, or package/executable"
+    )
 
 
 def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from dubins_traffic.problem.faults import Open, Strict
-from dubins_traffic.problem.kinds import KINDS, NAMES_2016
+from dubins_traffic.problem.kinds import KINDS, NAMES_2016, PROGRAM
 from dubins_traffic.problem.parts import LatticePoint, Length
 from dubins_traffic.problem.settings import InstanceModel, InstanceModel0, Settings, Settings0
 from dubins_traffic.problem.trial_data import TrialDataModel
@@ -128,7 +128,7 @@ def _describe_parameters(definitions: dict[str, Any]) -> None:
     known = [*KINDS, *(name for name, _ in NAMES_2016.items())]
     for entry in ("AgentEntry0", "AgentEntry"):
         if entry in definitions:
-            definitions[entry]["properties"]["type"]["enum"] = known
+            definitions[entry]["properties"]["type"]["anyOf"] = [{"enum": known}, {"pattern": PROGRAM}]
 
 
 def _trial_data() -> dict[str, Any]:

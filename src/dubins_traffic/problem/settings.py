@@ -118,7 +118,8 @@ class AgentEntry(Open):
     """One e-agent, or `count` of them."""
 
     type: str = Field(
-        description='what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, or "wander/wander"'
+        description="what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, "
+        '"wander/wander", or remote or package/executable: a program elsewhere'
     )
     name: str = Field(
         default="agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."

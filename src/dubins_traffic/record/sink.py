@@ -14,7 +14,12 @@ from dubins_traffic.problem.instance import Instance
 
 
 class End(StrEnum):
-    """Why a trial ended."""
+    """Why a trial ended.
+
+    The `peer_` ends are of drivers in other processes: no command for too long, gone and not back, more messages than
+    anyone needs, what is no message. `transport_lost`: what carried the messages has failed. `world_lost`: the
+    poses of a world that is not simulated here were missing, late, frozen or jumped.
+    """
 
     DURATION = "duration"
     COLLISION = "collision"
@@ -24,6 +29,12 @@ class End(StrEnum):
     DEADLINE = "deadline"
     INTERRUPTED = "interrupted"
     RESET = "reset"
+    PEER_SILENT = "peer_silent"
+    PEER_LOST = "peer_lost"
+    PEER_FLOOD = "peer_flood"
+    PEER_GARBAGE = "peer_garbage"
+    TRANSPORT_LOST = "transport_lost"
+    WORLD_LOST = "world_lost"
 
 
 @dataclass(frozen=True, slots=True)

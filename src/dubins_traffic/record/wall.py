@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
+
+import numpy as np
 
 from dubins_traffic.errors import RecordError
 from dubins_traffic.files import replace_file
@@ -23,8 +25,9 @@ class Wall:
 
     `time_to_begin_s` is the wall-clock time of the controller's `start`, None if it did not return; `act_s` sums
     up the latencies of its `act` (count, mean, median, p99, max; empty without calls); `reproducible` is false for
-    a trial that a wall clock ended; `date` is UTC, ISO 8601; `machine` tells the system, processor, number of cores
-    and version of Python.
+    a trial that a wall clock ended or that ran in real time; `date` is UTC, ISO 8601; `machine` tells the system,
+    processor, number of cores and version of Python; `transport` is empty unless a driver was in another process, and
+    then says how punctual everyone was (docs/records.md).
     """
 
     time_to_begin_s: float | None
@@ -32,6 +35,21 @@ class Wall:
     reproducible: bool
     date: str
     machine: Mapping[str, Any]
+    transport: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+def summary(values: Sequence[float]) -> dict[str, float]:
+    """Return count, mean, median, p99 and max of `values`; nothing of none."""
+    if not values:
+        return {}
+    array = np.array(values)
+    return {
+        "count": float(len(values)),
+        "mean": float(array.mean()),
+        "median": float(np.median(array)),
+        "p99": float(np.percentile(array, 99)),
+        "max": float(array.max()),
+    }
 
 
 def measured(time_to_begin_s: float | None, act_s: Mapping[str, float], *, reproducible: bool = True) -> Wall:
@@ -55,7 +73,10 @@ def sidecar(record: Path | str) -> Path:
 
 def write(record: Path | str, wall: Wall) -> None:
     """Write the sidecar of `record`, atomically."""
-    text = json.dumps({"version": VERSION, **asdict(wall)}, indent=2) + "\n"
+    fields = asdict(wall)
+    if not wall.transport:
+        del fields["transport"]
+    text = json.dumps({"version": VERSION, **fields}, indent=2) + "\n"
     replace_file(sidecar(record), lambda path: path.write_text(text, encoding="utf-8"))
 
 

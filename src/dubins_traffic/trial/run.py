@@ -9,11 +9,9 @@ from collections.abc import Generator
 from time import perf_counter
 from types import FrameType
 
-import numpy as np
-
-from dubins_traffic.errors import ControllerError
+from dubins_traffic.errors import ControllerError, PeerError
 from dubins_traffic.protocols import Closes, Controller, End, Ending
-from dubins_traffic.record.wall import Wall, measured
+from dubins_traffic.record.wall import Wall, measured, summary
 from dubins_traffic.trial.trial import Trial
 
 
@@ -43,7 +41,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
     except ControllerError as error:
         trial.end(End(error.reason), error.detail)
     ending = _close(controller, trial.end(End.DURATION))
-    return ending, measured(begin, _summary(latencies), reproducible=ending.end is not End.DEADLINE)
+    return ending, measured(begin, summary(latencies), reproducible=ending.end is not End.DEADLINE)
 
 
 def _drive(trial: Trial, controller: Controller, deadline: float | None, latencies: list[float]) -> None:
@@ -69,7 +67,10 @@ def _drive(trial: Trial, controller: Controller, deadline: float | None, latenci
 
 
 class _Answerable:
-    """Whatever the controller raises in the body is its fault, and becomes the named end of its trial."""
+    """Whatever the controller raises in the body is its fault, and becomes the named end of its trial.
+
+    A PeerError names the end by itself.
+    """
 
     __slots__ = ("_trial",)
 
@@ -84,7 +85,7 @@ class _Answerable:
     ) -> None:
         if isinstance(error, _TooLateError):
             raise _late(self._trial, error.deadline) from None
-        if isinstance(error, Exception):
+        if isinstance(error, Exception) and not isinstance(error, PeerError):
             detail = f"{type(error).__name__}: {error} at tick {self._trial.tick}"
             raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
 
@@ -120,16 +121,3 @@ def _close(controller: Controller, ending: Ending) -> Ending:
             detail = f"{ending.detail}; close raised {type(error).__name__}: {error}".lstrip("; ")
             return Ending(ending.end, ending.ticks, detail)
     return ending
-
-
-def _summary(latencies: list[float]) -> dict[str, float]:
-    if not latencies:
-        return {}
-    values = np.array(latencies)
-    return {
-        "count": float(len(latencies)),
-        "mean": float(values.mean()),
-        "median": float(np.median(values)),
-        "p99": float(np.percentile(values, 99)),
-        "max": float(values.max()),
-    }

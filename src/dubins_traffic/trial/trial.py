@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Self, cast
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Contact, Event, Observation
+from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
-from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink
+from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink, Watcher
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
-from dubins_traffic.trial.senses import Senses
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -33,6 +33,8 @@ class Trial:
         Drive the e-agents.
     sinks : sequence of Sink
         Receive instance, frames, contacts, events and ending.
+    watchers : sequence of Watcher
+        Are shown every frame at once.
 
     Examples
     --------
@@ -48,11 +50,13 @@ class Trial:
         simulator: Simulator,
         agents: Sequence[Driver] = (),
         sinks: Sequence[Sink] = (),
+        watchers: Sequence[Watcher] = (),
     ) -> None:
         self.instance = instance
         self.ending: Ending | None = None
         self._simulator = simulator
         self._agents = tuple(agents)
+        self._watchers = tuple(watchers)
         self._state = simulator.reset([instance])
         self._commands = np.zeros((1, len(instance.starts), 2))
         self._ticks = instance.ticks
@@ -66,6 +70,9 @@ class Trial:
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0
         self._observation: Observation | None = None
+        for watcher in self._watchers:
+            watcher.begin(instance)
+            watcher.watch(0, self._state, self._labels)
 
     @property
     def tick(self) -> int:
@@ -115,6 +122,8 @@ class Trial:
             self.end(End.DURATION)
         elif contacts and self.instance.end_on_collision:
             self._end_on_collision(contacts)
+        for watcher in self._watchers:
+            watcher.watch(self._tick, self._state, self._labels)
         return contacts
 
     def end(self, end: End, detail: str = "") -> Ending:

@@ -1,4 +1,4 @@
-"""The ego's senses: observations from the state of a trial, with the instance's noise."""
+"""A driver's senses: observations from the state of a trial, with the instance's noise."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import Instance, Laser
 
 
 new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknownMemberType]
@@ -22,20 +22,35 @@ new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknown
 
 
 class Senses:
-    """Makes the ego's observation of each tick of one trial."""
+    """Makes one car's observation of each tick of one trial.
 
-    def __init__(self, instance: Instance) -> None:
+    Parameters
+    ----------
+    instance : Instance
+        What is run.
+    car : int
+        Whose senses these are; the ego's by default. Only the ego's are noisy.
+    radius : float, optional
+        From where other cars are seen, metres; by default the problem's sensing radius.
+    laser : Laser, optional
+        Instead of the problem's laser.
+    """
+
+    def __init__(
+        self, instance: Instance, car: int = EGO, radius: float | None = None, laser: Laser | None = None
+    ) -> None:
         problem = instance.problem
+        self._car = car
         self._instance = instance
         self._names = instance.names
         self._body = problem.car.body
-        self._radius = problem.sensing_radius
+        self._radius = problem.sensing_radius if radius is None else radius
         self._rate = problem.rate
         self._reals = np.zeros((len(instance.starts), SEEN_REALS))
         self._wholes = np.zeros((len(instance.starts), SEEN_WHOLES), dtype=np.int64)
         noise = instance.disturbances
-        self._noisy = noise.position_noise > 0.0 or noise.heading_noise > 0.0
-        self._laser = problem.laser
+        self._noisy = car == EGO and (noise.position_noise > 0.0 or noise.heading_noise > 0.0)
+        self._laser = laser or problem.laser
         if self._laser is not None:
             angles = np.linspace(self._laser.angle_min, self._laser.angle_max, self._laser.rays)
             self._rays = np.array([sincos(float(angle)) for angle in angles])
@@ -45,8 +60,8 @@ class Senses:
         self._scan: Floats | None = None
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
-        """Return what the ego knows at the beginning of the tick that starts in `state`."""
-        count = neighbours(0, EGO, self._radius, self._reals, self._wholes, *state, *labels)
+        """Return what the car's driver knows at the beginning of the tick that starts in `state`."""
+        count = neighbours(0, self._car, self._radius, self._reals, self._wholes, *state, *labels)
         if self._noisy:
             noise = self._instance.disturbances
             blur(
@@ -86,7 +101,7 @@ class Senses:
             scan(
                 state,
                 0,
-                EGO,
+                self._car,
                 self._cars,
                 self._obstacles,
                 self._rays,

@@ -1,0 +1,47 @@
+"""What a controller is told, as a document: for controllers in other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
+from dubins_traffic.problem.instance import EAgent, Instance, Problem
+from dubins_traffic.problem.kinds import REMOTE
+
+SECRET = ("starts", "duration", "seed", "trial", "disturbances", "end_on_collision", "simulator")
+"""Fields of an instance that a controller is not told."""
+
+
+def problem_to_document(problem: Problem) -> dict[str, Any]:
+    """Return the document of `problem`: that of an instance, version 1, without what a controller is not told.
+
+    Of the e-agents it gives the names alone; their type is said to be `remote`, whatever drives them.
+    """
+    cars = 1 + len(problem.e_agents)
+    agents = tuple(EAgent(REMOTE, name, REMOTE) for name in problem.e_agents)
+    instance = Instance(problem, (Pose(0.0, 0.0, 1.0, 0.0),) * cars, 1.0, agents, seed=0, trial=0)
+    return {key: value for key, value in instance_to_document(instance).items() if key not in SECRET}
+
+
+def problem_from_document(document: Mapping[str, Any], file: str | None = None) -> Problem:
+    """Return the problem that `problem_to_document` described; of an instance of version 1, its problem.
+
+    Raises
+    ------
+    InputError
+        For the first thing wrong, with its field.
+    """
+    alone: dict[str, Any] = {key: value for key, value in document.items() if key not in SECRET}
+    alone |= {"e-agents": [], "duration": 1.0}
+    problem = instance_from_document(alone, file).problem
+    entries = document.get("e-agents", [])
+    try:
+        return replace(problem, e_agents=tuple(str(entry["name"]) for entry in entries))
+    except (TypeError, KeyError) as error:
+        raise InputError(
+            "not e-agents", file=file, field="e-agents", expected="a list of objects with type and name"
+        ) from error

@@ -1,0 +1,136 @@
+"""What has arrived from remote drivers: the latest command of each car and nothing more, whatever they send."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Condition
+from time import monotonic
+
+from dubins_traffic.protocols import End
+
+
+@dataclass(slots=True)
+class Slot:
+    """The latest command of one car, and what is counted of its peer.
+
+    `tick` is the frame that it says it answers; `fresh` whether it came since the last frame was sent; `arrived` when,
+    monotonic seconds, None before the first. `gone_since` is set while a peer that was there is away.
+    """
+
+    speed: float = 0.0
+    yaw_rate: float = 0.0
+    tick: int | None = None
+    fresh: bool = False
+    arrived: float | None = None
+    gone_since: float | None = None
+    fault: tuple[End, str] | None = None
+    commands: int = 0
+    reconnections: int = 0
+    window: float = 0.0
+    in_window: int = 0
+
+
+class Inbox:
+    """A `protocols.Mailbox` of bounded memory: one slot a car.
+
+    Parameters
+    ----------
+    flood : int
+        Commands a second of one car above which its peer is at fault.
+    """
+
+    def __init__(self, flood: int) -> None:
+        self.condition = Condition()
+        self.paused = False
+        self.unknown = 0
+        self._flood = flood
+        self._slots: dict[str, Slot] = {}
+        self._peers: dict[str, int] = {}
+        self._stop: tuple[End, str] | None = None
+
+    def expect(self, cars: Sequence[str]) -> None:
+        """Begin a trial in which the commands of `cars` are wanted; peers that are there stay there."""
+        with self.condition:
+            self._slots = {car: Slot() for car in cars}
+            self.unknown = 0
+            if self._stop is not None and self._stop[0] is not End.TRANSPORT_LOST:
+                self._stop = None
+
+    def slot(self, car: str) -> Slot:
+        """Return the slot of `car`; hold `condition` while reading more than one field."""
+        return self._slots[car]
+
+    @property
+    def stopped(self) -> tuple[End, str] | None:
+        """Why all is to end, if it is."""
+        return self._stop
+
+    def stale(self) -> None:
+        """A frame is about to be sent: what is here does not answer it."""
+        with self.condition:
+            for slot in self._slots.values():
+                slot.fresh = False
+
+    def command(self, car: str, speed: float, yaw_rate: float, tick: int | None = None) -> None:
+        """Keep a command in place of the one before."""
+        now = monotonic()
+        with self.condition:
+            slot = self._slots.get(car)
+            if slot is None:
+                self.unknown += 1
+                return
+            slot.commands += 1
+            if now - slot.window >= 1.0:
+                slot.window, slot.in_window = now, 0
+            slot.in_window += 1
+            if slot.in_window > self._flood and slot.fault is None:
+                slot.fault = (End.PEER_FLOOD, f"more than {self._flood} commands in a second")
+            slot.speed, slot.yaw_rate, slot.tick = speed, yaw_rate, tick
+            slot.fresh, slot.arrived = True, now
+            self.condition.notify_all()
+
+    def fault(self, car: str, end: End, detail: str) -> None:
+        """Keep the first fault of a car's peer."""
+        with self.condition:
+            slot = self._slots.get(car)
+            if slot is not None and slot.fault is None:
+                slot.fault = (end, detail)
+            self.condition.notify_all()
+
+    def joined(self, car: str) -> None:
+        """Count a peer in."""
+        with self.condition:
+            self._peers[car] = self._peers.get(car, 0) + 1
+            slot = self._slots.get(car)
+            if slot is not None and slot.gone_since is not None:
+                slot.gone_since = None
+                slot.reconnections += 1
+            self.condition.notify_all()
+
+    def left(self, car: str) -> None:
+        """Count a peer out."""
+        with self.condition:
+            self._peers[car] = max(0, self._peers.get(car, 0) - 1)
+            slot = self._slots.get(car)
+            if slot is not None and self._peers[car] == 0:
+                slot.gone_since = monotonic()
+            self.condition.notify_all()
+
+    def stop(self, end: End, detail: str) -> None:
+        """Keep the first reason to stop; a lost transport overrides it."""
+        with self.condition:
+            if self._stop is None or end is End.TRANSPORT_LOST:
+                self._stop = (end, detail)
+            self.condition.notify_all()
+
+    def pause(self, paused: bool) -> None:
+        """Keep it."""
+        with self.condition:
+            self.paused = paused
+            self.condition.notify_all()
+
+    def wake(self) -> None:
+        """Let who waits look again."""
+        with self.condition:
+            self.condition.notify_all()

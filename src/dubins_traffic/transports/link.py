@@ -1,0 +1,326 @@
+"""One session's dealings with all remote drivers: frames out, commands in, and names for what goes wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from dubins_traffic.cars.state import EGO, Labels, Observation, State
+from dubins_traffic.driving.senses import Senses
+from dubins_traffic.errors import PeerError
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import Clock, End, Ending, Streams, Transport, View
+from dubins_traffic.record.wall import summary
+from dubins_traffic.transports.inbox import Inbox, Slot
+from dubins_traffic.transports.shown import between, kept, onward
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+EGO_NAME = "ego"
+IDLE = 0.1
+"""Seconds between two looks at what has arrived, and two views of a world that stands still."""
+AGAIN = 1.0
+"""Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
+SIGHT = 1e150
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long peers are waited for, in seconds of wall clock, and how much they may send.
+
+    `begin`: for the first command after the announcement. `silence`: in real time, without any command. `absence`:
+    for a peer that went to come back. `settle`: in lockstep without tags, for further answers to the first frame,
+    which is shown until it is answered. `flood`: commands a second of one car.
+    """
+
+    begin: float = 60.0
+    silence: float = 5.0
+    absence: float = 2.0
+    settle: float = 0.2
+    flood: int = 1000
+
+
+class Link:
+    """What a trial knows of a transport: a `protocols.Watcher` with commands.
+
+    Parameters
+    ----------
+    transport : Transport
+        Carries the messages; opened here.
+    clock : Clock
+        `clocks.Lockstep` or `clocks.RealTime`.
+    ego : bool
+        Whether the ego is remote. E-agents are if their kind is `remote`.
+    patience : Patience
+        How long peers are waited for.
+    """
+
+    def __init__(
+        self, transport: Transport, clock: Clock, *, ego: bool = True, patience: Patience | None = None
+    ) -> None:
+        self.transport = transport
+        self.clock = clock
+        self.ego = ego
+        self._patience = patience or Patience()
+        self.inbox = Inbox(self._patience.flood)
+        self._stream = transport if isinstance(transport, Streams) else None
+        self._interval = IDLE if self._stream is None else self._stream.interval
+        transport.open(self.inbox)
+
+    def begin(self, instance: Instance) -> None:
+        """Put the world of a trial up."""
+        self._instance = instance
+        self._remote = [agent.name for agent in instance.e_agents if agent.kind == REMOTE]
+        if self.ego:
+            self._remote.insert(0, EGO_NAME)
+        self._senses: dict[int, Senses] = {}
+        self._running = False
+        self._moving = False
+        self._announced = 0.0
+        self._begun: float | None = None
+        self._sent = 0.0
+        self._late = dict.fromkeys(self._remote, 0)
+        self._answers: dict[str, list[float]] = {car: [] for car in self._remote}
+        self._behind: list[float] = []
+        self._slipped = 0.0
+        self.inbox.expect(self._remote)
+        self.transport.begin(instance, self._remote)
+
+    def watch(self, tick: int, state: State, labels: Labels) -> None:
+        """Send frame `tick` when it is due."""
+        if self._running:
+            due = self.clock.due(tick)
+            self._pass_time(due, state)
+            self._slip(due)
+        self._tick, (self._state, self._labels) = tick, kept(state, labels)
+        if self._running:
+            self._halt()
+        self._send()
+
+    def announce(self) -> None:
+        """Tell the problem once, and wait for the ego's first command if it is remote."""
+        if self._running:
+            return
+        self._running = True
+        self.inbox.stale()
+        self.transport.announce(self._instance)
+        self._announced = monotonic()
+        self._send()
+        if self.ego:
+            self._first_command(self.inbox.slot(EGO_NAME))
+        self.clock.start(self._instance.problem.period, monotonic())
+        self._sent = monotonic()
+        self._moving = True
+
+    def command(self, car: str, tick: int) -> tuple[float, float]:
+        """Return the speed and yaw rate of `car` that answer frame `tick`, or that are in force.
+
+        Raises
+        ------
+        PeerError
+            If there are none: the peer is silent, gone or at fault, or all is to end.
+        """
+        slot = self.inbox.slot(car)
+        until = self.clock.until(tick, self._sent)
+        if tick == 0 and self.clock.lockstep:
+            until = max(until, self._announced + self._patience.begin)
+        answered = self._wait(lambda: self._answers_frame(slot, tick), until, car)
+        if answered and slot.arrived is not None:
+            self._answers[car].append(max(0.0, slot.arrived - self._sent))
+        elif self.clock.lockstep:
+            raise PeerError(
+                End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
+            )
+        else:
+            self._late[car] += 1
+            self._check_silence(slot, tick)
+        with self.inbox.condition:
+            return slot.speed, slot.yaw_rate
+
+    def idle(self, done: Callable[[], bool]) -> None:
+        """Show the world as it stands until `done`, or PeerError if all is to end."""
+        while not self._wait(done, monotonic() + IDLE, None):
+            if self._stream is None and not self._running:
+                self._send()
+
+    def finish(self, ending: Ending) -> None:
+        """Tell the peers that the trial is over."""
+        self._running = self._moving = False
+        self.transport.end(ending)
+
+    def close(self) -> None:
+        """Close the transport."""
+        self.transport.close()
+
+    @property
+    def time_to_begin(self) -> float | None:
+        """Seconds from the announcement to the ego's first command; None before, and for an ego that is here."""
+        return self._begun
+
+    def report(self) -> Mapping[str, Any]:
+        """Return how punctual the trial was, for the sidecar of its record (docs/records.md)."""
+        drivers = {
+            car: {
+                "commands": slot.commands,
+                "late": self._late[car],
+                "reconnections": slot.reconnections,
+                "answer_s": summary(self._answers[car]),
+            }
+            for car, slot in ((car, self.inbox.slot(car)) for car in self._remote)
+        }
+        return {
+            "name": self.transport.name,
+            "clock": "lockstep" if self.clock.lockstep else "real time",
+            "drivers": drivers,
+            "frame_lateness_s": summary(self._behind),
+            "slipped_s": self._slipped,
+            "unknown_commands": self.inbox.unknown,
+        }
+
+    def _answers_frame(self, slot: Slot, tick: int) -> bool:
+        if not slot.fresh:
+            return False
+        return slot.tick is None or slot.tick == tick or not self.clock.lockstep
+
+    def _first_command(self, slot: Slot) -> None:
+        until = self._announced + self._patience.begin
+        repeat = AGAIN if self.transport.tagged else IDLE
+        while not self._wait(lambda: slot.fresh, min(until, monotonic() + repeat), EGO_NAME):
+            if monotonic() >= until:
+                detail = f"no command within {self._patience.begin:g} s of the announcement"
+                raise PeerError(End.PEER_SILENT.value, detail)
+            self._send_again()
+        self._begun = (slot.arrived or self._announced) - self._announced
+        self._settle()
+
+    def _check_silence(self, slot: Slot, tick: int) -> None:
+        since = slot.arrived if slot.arrived is not None else self.clock.due(0)
+        if monotonic() - since > self._patience.silence:
+            detail = f"no command for {self._patience.silence:g} s at tick {tick}"
+            raise PeerError(End.PEER_SILENT.value, detail)
+
+    def _wait(self, done: Callable[[], bool], until: float, car: str | None, *, still: bool = False) -> bool:
+        """Wait for `done` until then, streaming in between; return whether it came. Faults of `car` end it."""
+        inbox = self.inbox
+        sent_again = monotonic() + AGAIN
+        while True:
+            with inbox.condition:
+                self._check(car)
+                if done():
+                    return True
+                now = monotonic()
+                if now < until:
+                    inbox.condition.wait(min(until, now + IDLE, self._wake(still)) - now)
+            now = monotonic()
+            if now >= until and not done():
+                return False
+            if self._streams(still) and now >= self._next_view:
+                self._show(onward(self._state, self._elapsed(now)), self._elapsed(now), now)
+            if now >= sent_again and self._running and self.transport.tagged and self.clock.lockstep:
+                sent_again = now + AGAIN
+                self._send_again()
+
+    def _check(self, car: str | None) -> None:
+        stopped = self.inbox.stopped
+        if stopped is not None:
+            raise PeerError(stopped[0].value, stopped[1])
+        if car is None:
+            return
+        slot = self.inbox.slot(car)
+        if slot.fault is not None:
+            raise PeerError(slot.fault[0].value, slot.fault[1])
+        if slot.gone_since is not None and monotonic() - slot.gone_since > self._patience.absence:
+            raise PeerError(End.PEER_LOST.value, f"its peer has gone, at tick {self._tick}")
+
+    def _streams(self, still: bool) -> bool:
+        """Whether views between frames are sent now: in lockstep only of a world that nobody drives."""
+        if self._stream is None or still:
+            return False
+        return not self._running or not self.clock.lockstep or not self._moving
+
+    def _wake(self, still: bool) -> float:
+        return self._next_view if self._streams(still) else math.inf
+
+    def _elapsed(self, now: float) -> float:
+        """Simulated seconds since the frame last sent, while time runs."""
+        if not self._moving or self.clock.lockstep:
+            return 0.0
+        period = self._instance.problem.period
+        wall = self.clock.due(self._tick + 1) - self.clock.due(self._tick)
+        return min(period, max(0.0, (now - self._sent) * period / wall))
+
+    def _settle(self) -> None:
+        """Let further answers to what has been shown more than once arrive, where they say not what they answer."""
+        if self.clock.lockstep and not self.transport.tagged:
+            self._wait(lambda: False, monotonic() + self._patience.settle, None, still=True)
+
+    def _pass_time(self, due: float, state: State) -> None:
+        """Wait until the frame `state` is due, streaming what lies between it and the frame before."""
+        while True:
+            now = monotonic()
+            if now >= due:
+                return
+            if self._stream is not None and now >= self._next_view:
+                share = self._elapsed(now) / self._instance.problem.period
+                self._show(between(self._state, state, share), self._elapsed(now), now)
+                now = monotonic()
+            wake = min(due, self._next_view) if self._stream is not None else due
+            with self.inbox.condition:
+                self._check(None)
+                if wake > now:
+                    self.inbox.condition.wait(wake - now)
+
+    def _halt(self) -> None:
+        """Let time stand still while the world is paused."""
+        if not self.inbox.paused:
+            return
+        began = monotonic()
+        self._moving = False
+        self.idle(lambda: not self.inbox.paused)
+        self._settle()
+        self._moving = True
+        self.clock.shift(monotonic() - began)
+
+    def _slip(self, due: float) -> None:
+        """Note how late the frame is; if by more than a tick, what is to come is put off instead of hurried."""
+        if self.clock.lockstep:
+            return
+        behind = monotonic() - due
+        self._behind.append(behind)
+        if behind > self.clock.due(1) - self.clock.due(0):
+            self._slipped += behind
+            self.clock.shift(behind)
+
+    def _send(self) -> None:
+        self.inbox.stale()
+        self._sent = monotonic()
+        self._send_again()
+
+    def _send_again(self) -> None:
+        self._next_view = monotonic() + self._interval
+        self.transport.frame(self._view(self._state, 0.0))
+
+    def _show(self, state: State, elapsed: float, now: float) -> None:
+        self._next_view = max(self._next_view + self._interval, now)
+        if self._stream is not None:
+            self._stream.stream(self._view(state, elapsed))
+
+    def _view(self, state: State, elapsed: float) -> View:
+        time = self._tick / self._instance.problem.rate + elapsed
+        made: dict[int, Observation] = {}
+
+        def observe(car: int) -> Observation:
+            if car not in made:
+                senses = self._senses.get(car) or self._sense(car)
+                made[car] = senses.observe(self._tick, state, self._labels)
+            return made[car]
+
+        return View(self._tick, time, state, self._labels, observe, self._running)
+
+    def _sense(self, car: int) -> Senses:
+        self._senses[car] = Senses(self._instance, car, None if car == EGO else SIGHT)
+        return self._senses[car]

@@ -1,0 +1,126 @@
+import math
+
+import pytest
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.problem.kinds import kind_of
+from dubins_traffic.protocols import End
+from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.inbox import Inbox
+from dubins_traffic.transports.maestro import Maestro, Mode, Next, Phase
+from dubins_traffic.transports.shown import between, kept, onward
+
+
+def maestro(phase: Phase) -> Maestro:
+    made = Maestro()
+    made.enter(phase)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("phase", "mode", "granted", "following"),
+    [
+        (Phase.PREPARING, Mode.READY, False, None),
+        (Phase.PREPARING, Mode.START, False, None),
+        (Phase.PREPARING, Mode.RESET, False, None),
+        (Phase.READY, Mode.READY, True, None),
+        (Phase.READY, Mode.START, True, Next.RUN),
+        (Phase.READY, Mode.RESET, True, Next.DRAW),
+        (Phase.READY, Mode.RESTART, True, None),
+        (Phase.READY, 77, False, None),
+        (Phase.RUNNING, Mode.READY, False, None),
+        (Phase.RUNNING, Mode.START, False, None),
+        (Phase.RUNNING, Mode.RESET, True, Next.DRAW),
+        (Phase.RUNNING, Mode.RESTART, True, Next.REPEAT),
+    ],
+)
+def test_what_the_maestro_grants(phase: Phase, mode: int, granted: bool, following: Next | None) -> None:
+    asked = maestro(phase)
+    assert asked.request(mode) is granted
+    assert asked.next is following
+
+
+def test_a_start_is_granted_once() -> None:
+    asked = maestro(Phase.READY)
+    assert [asked.request(Mode.START), asked.request(Mode.START), asked.request(Mode.READY)] == [
+        True,
+        False,
+        False,
+    ]
+
+
+def test_only_what_ends_a_trial_interrupts_it() -> None:
+    heard: list[str] = []
+    asked = maestro(Phase.READY)
+    asked.interrupt = heard.append
+    asked.request(Mode.START)
+    asked.enter(Phase.RUNNING)
+    asked.request(Mode.RESET)
+    assert heard == ["", "reset asked for"]
+
+
+def test_an_inbox_keeps_one_command_a_car() -> None:
+    inbox = Inbox(flood=50)
+    inbox.expect(["ego"])
+    for k in range(60):
+        inbox.command("ego", float(k), 0.0)
+        inbox.command("nobody", 1.0, 0.0)
+    slot = inbox.slot("ego")
+    assert (slot.speed, slot.commands, inbox.unknown) == (59.0, 60, 60)
+    assert slot.fault is not None
+    assert slot.fault[0] is End.PEER_FLOOD
+
+
+def test_a_lost_transport_outlives_the_trial() -> None:
+    inbox = Inbox(flood=50)
+    inbox.stop(End.RESET, "reset")
+    inbox.stop(End.TRANSPORT_LOST, "no master")
+    inbox.expect(["ego"])
+    assert inbox.stopped == (End.TRANSPORT_LOST, "no master")
+
+
+def test_real_time_runs_at_its_factor_and_can_be_put_off() -> None:
+    clock = RealTime(2.0)
+    clock.start(0.1, 100.0)
+    assert clock.due(10) == pytest.approx(100.5)
+    clock.shift(3.0)
+    assert clock.until(9, 0.0) == pytest.approx(103.5)
+
+
+def test_lockstep_is_never_early() -> None:
+    assert Lockstep(2.0).due(10**9) == -math.inf
+    assert Lockstep(2.0).until(5, 10.0) == 12.0
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+def test_clocks_refuse_what_is_no_time(bad: float) -> None:
+    for clock in (Lockstep, RealTime):
+        with pytest.raises(InputError, match="positive"):
+            clock(bad)
+
+
+def test_states_between_frames_lie_on_the_way() -> None:
+    before, after = State.zeros(1, 1), State.zeros(1, 1)
+    before.speed[:], before.yaw_rate[:] = 0.5, 0.9
+    x, y, c, s = advance(0.0, 0.0, 1.0, 0.0, 0.5, 0.9, 1 / 30)
+    after.x[:], after.y[:], after.c[:], after.s[:], after.speed[:] = x, y, c, s, 0.5
+    middle = between(before, after, 0.5)
+    exact = advance(0.0, 0.0, 1.0, 0.0, 0.5, 0.9, 1 / 60)
+    for seen in (middle, onward(before, 1 / 60)):
+        assert [float(row[0, 0]) for row in seen[:4]] == pytest.approx(exact, abs=1e-4)
+    assert onward(before, 0.0) is before
+    copy, _ = kept(before, Labels.zeros(1, 1))
+    before.x[:] = 7.0
+    assert copy.x[0, 0] == 0.0
+
+
+def test_a_package_and_executable_that_is_not_ours_is_remote() -> None:
+    assert [kind_of("wander/wander"), kind_of("my_pkg/node.py"), kind_of("remote")] == [
+        "wander",
+        "remote",
+        "remote",
+    ]
+    with pytest.raises(InputError, match="package/executable"):
+        kind_of("my pkg/node")
