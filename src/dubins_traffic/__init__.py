@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dubins_traffic.campaign.batch import Batch, run_batch
     from dubins_traffic.campaign.many import Job, run_trials
     from dubins_traffic.campaign.plan import Plan, plan
     from dubins_traffic.campaign.single import Result, Trial, run_trial
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from dubins_traffic.viewer.replay import write_replay
 
 _PLACES = {
+    "campaign.batch": ("Batch", "run_batch"),
     "campaign.many": ("Job", "run_trials"),
     "campaign.plan": ("Plan", "plan"),
     "campaign.single": ("Result", "Trial", "run_trial"),
@@ -61,6 +63,7 @@ _NAMES = {
 __version__: str
 
 __all__ = [
+    "Batch",
     "Bounds",
     "Car",
     "Command",
@@ -109,6 +112,7 @@ __all__ = [
     "load_instance",
     "load_record",
     "plan",
+    "run_batch",
     "run_trial",
     "run_trials",
     "score",

@@ -83,7 +83,7 @@ class Fleet:
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin a batch, of one control rate, whose first frame is `state`."""
-        trials, cars = state.x.shape
+        cars = state.x.shape[1]
         kinds = {agent.kind for instance in instances for agent in instance.e_agents}
         self._lawful = _lawful() if kinds & KEEP_RULES else None
         if self._lawful is not None:
@@ -95,32 +95,7 @@ class Fleet:
             [instance.problem.car.lane_width for instance in instances],
         )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
-        ints = np.zeros((trials, cars, INTS), dtype=np.int64)
-        ints[:, :, (KIND, PATIENCE, TRAIL, LANE, PLACE, SINCE)] = (NOBODY, -1, -1, -1, -1, -1)
-        floats = np.zeros((trials, cars, FLOATS))
-        cycle: list[int] = []
-        script: list[tuple[float, float, float]] = []
-        for b, instance in enumerate(instances):
-            for n, agent in enumerate(instance.e_agents, start=1):
-                if agent.kind in elsewhere:
-                    continue
-                given = _parameters(agent)
-                floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
-                _plan(instance, given, ints[b, n], agent.kind, cycle, script)
-        path, mark, last = _trails(ints, floats, min(instance.problem.car.w for instance in instances))
-        self._agents = Agents(
-            net=net,
-            seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
-            trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-            build=_builds(instances, floats),
-            ints=ints,
-            floats=floats,
-            cycle=np.array(cycle, dtype=np.int64),
-            script=np.array(script, dtype=np.float64).reshape(len(script), 3),
-            path=path,
-            mark=mark,
-            last=last,
-        )
+        self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
         self._gather()
 
@@ -144,6 +119,40 @@ class Fleet:
                 pairs = 4 * len(self._work.pair)
                 self._work = self._work._replace(pair=np.zeros((pairs, 2), dtype=np.int64))
                 self._gather()
+
+
+def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
+    """Return the e-agents of a batch with `cars` places a trial, but for those that keep the rules.
+
+    `net` holds the number of each trial's road network.
+    """
+    trials = len(instances)
+    ints = np.zeros((trials, cars, INTS), dtype=np.int64)
+    ints[:, :, (KIND, PATIENCE, TRAIL, LANE, PLACE, SINCE)] = (NOBODY, -1, -1, -1, -1, -1)
+    floats = np.zeros((trials, cars, FLOATS))
+    cycle: list[int] = []
+    script: list[tuple[float, float, float]] = []
+    for b, instance in enumerate(instances):
+        for n, agent in enumerate(instance.e_agents, start=1):
+            if agent.kind in KEEP_RULES or agent.kind == REMOTE:
+                continue
+            given = _parameters(agent)
+            floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
+            _plan(instance, given, ints[b, n], agent.kind, cycle, script)
+    path, mark, last = _trails(ints, floats, min(instance.problem.car.w for instance in instances))
+    return Agents(
+        net=net,
+        seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
+        trial=np.array([instance.trial for instance in instances], dtype=np.int64),
+        build=_builds(instances, floats),
+        ints=ints,
+        floats=floats,
+        cycle=np.array(cycle, dtype=np.int64),
+        script=np.array(script, dtype=np.float64).reshape(len(script), 3),
+        path=path,
+        mark=mark,
+        last=last,
+    )
 
 
 def _lawful() -> Driver:

@@ -47,7 +47,7 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
 from dubins_traffic.driving.waypoint import pursue, turn_then_drive
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.kernels.random import below
 from dubins_traffic.roads.table import RoadTable
 
@@ -95,53 +95,68 @@ def _decide(
     commands: Floats,
 ) -> int:
     for b in range(begin, state.count.shape[0]):
-        if state.count[b] < 2:
-            continue
-        build = agents.build[b]
-        ints = agents.ints[b]
-        floats = agents.floats[b]
-        if look(state, b, build, ints, floats, obstacles, work) > work.pair.shape[0]:
+        if state.count[b] > 1 and not decide_trial(b, tick, state, roads, obstacles, agents, work, commands):
             return -1 - b
-        ego = (state.x[b, 0], state.y[b, 0], state.c[b, 0], state.s[b, 0])
-        for n in range(1, state.count[b]):
-            speed = 0.0
-            yaw_rate = 0.0
-            pose = (state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-            held = hold(tick, n, pose, ego, work.held[n], ints, floats)
-            free = tick >= ints[n, BEGIN] and held & SEES == 0
-            seen = False
-            if ints[n, KIND] == SCRIPTED:
-                speed, yaw_rate = play(tick, n, ints, agents.script)
-                free = False
-            elif ints[n, KIND] == FOLLOW:
-                seen, free, speed, yaw_rate = follow(
-                    tick, n, pose, ego, free, build, ints, floats, agents.path, agents.mark, agents.last
-                )
-            if free and build[CURVES] != 0.0:
-                navigate_arcs(
-                    tick, n, pose, ego, seen, build, roads, agents.net[b], ints, floats, agents.cycle,
+    return state.count.shape[0]
+
+
+@jit_inner
+def decide_trial(
+    b: int,
+    tick: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleTable,
+    agents: Agents,
+    work: Workspace,
+    commands: Floats,
+) -> bool:
+    """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
+    build = agents.build[b]
+    ints = agents.ints[b]
+    floats = agents.floats[b]
+    if look(state, b, build, ints, floats, obstacles, work) > work.pair.shape[0]:
+        return False
+    ego = (state.x[b, 0], state.y[b, 0], state.c[b, 0], state.s[b, 0])
+    for n in range(1, state.count[b]):
+        speed = 0.0
+        yaw_rate = 0.0
+        pose = (state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
+        held = hold(tick, n, pose, ego, work.held[n], ints, floats)
+        free = tick >= ints[n, BEGIN] and held & SEES == 0
+        seen = False
+        if ints[n, KIND] == SCRIPTED:
+            speed, yaw_rate = play(tick, n, ints, agents.script)
+            free = False
+        elif ints[n, KIND] == FOLLOW:
+            seen, free, speed, yaw_rate = follow(
+                tick, n, pose, ego, free, build, ints, floats, agents.path, agents.mark, agents.last
+            )
+        if free and build[CURVES] != 0.0:
+            navigate_arcs(
+                tick, n, pose, ego, seen, build, roads, agents.net[b], ints, floats, agents.cycle,
+                work.hops, work.queue, agents.seed[b], agents.trial[b],
+            )  # fmt: skip
+            speed, yaw_rate = pursue(
+                pose[0], pose[1], pose[2], pose[3], floats[n, GOAL_X], floats[n, GOAL_Y],
+                floats[n, SPEED], build[SLOWEST], floats[n, YAW_RATE], build[RADIUS],
+            )  # fmt: skip
+        elif free:
+            dx = floats[n, GOAL_X] - pose[0]
+            dy = floats[n, GOAL_Y] - pose[1]
+            weary = held & WEARY != 0 and tires(tick, n, build[PERIOD], agents.seed[b], agents.trial[b])
+            if weary or ints[n, LANE] < 0 or dx * dx + dy * dy < floats[n, REACHED] * floats[n, REACHED]:
+                navigate(
+                    tick, n, pose, ego, seen, weary, roads, agents.net[b], ints, floats, agents.cycle,
                     work.hops, work.queue, agents.seed[b], agents.trial[b],
                 )  # fmt: skip
-                speed, yaw_rate = pursue(
-                    pose[0], pose[1], pose[2], pose[3], floats[n, GOAL_X], floats[n, GOAL_Y],
-                    floats[n, SPEED], build[SLOWEST], floats[n, YAW_RATE], build[RADIUS],
-                )  # fmt: skip
-            elif free:
-                dx = floats[n, GOAL_X] - pose[0]
-                dy = floats[n, GOAL_Y] - pose[1]
-                weary = held & WEARY != 0 and tires(tick, n, build[PERIOD], agents.seed[b], agents.trial[b])
-                if weary or ints[n, LANE] < 0 or dx * dx + dy * dy < floats[n, REACHED] * floats[n, REACHED]:
-                    navigate(
-                        tick, n, pose, ego, seen, weary, roads, agents.net[b], ints, floats, agents.cycle,
-                        work.hops, work.queue, agents.seed[b], agents.trial[b],
-                    )  # fmt: skip
-                speed, yaw_rate = turn_then_drive(
-                    pose[0], pose[1], pose[2], pose[3], floats[n, GOAL_X], floats[n, GOAL_Y],
-                    floats[n, TANGENT], floats[n, MISS], floats[n, SPEED], floats[n, YAW_RATE], build[PERIOD],
-                )  # fmt: skip
-            commands[b, n, 0] = speed if held & BARRED == 0 else 0.0
-            commands[b, n, 1] = yaw_rate if held & TIGHT == 0 else 0.0
-    return state.count.shape[0]
+            speed, yaw_rate = turn_then_drive(
+                pose[0], pose[1], pose[2], pose[3], floats[n, GOAL_X], floats[n, GOAL_Y],
+                floats[n, TANGENT], floats[n, MISS], floats[n, SPEED], floats[n, YAW_RATE], build[PERIOD],
+            )  # fmt: skip
+        commands[b, n, 0] = speed if held & BARRED == 0 else 0.0
+        commands[b, n, 1] = yaw_rate if held & TIGHT == 0 else 0.0
+    return True
 
 
 @jit

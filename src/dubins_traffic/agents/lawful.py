@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.agents.tables import KEEP_RULES
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
@@ -23,6 +23,7 @@ from dubins_traffic.driving.law_tables import (
     PARK_TIME,
     PARKS,
     ROLLS,
+    ROUND,
     SPEED,
     TAILGATES,
     Drivers,
@@ -44,33 +45,65 @@ class Lawful:
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin a batch whose first frame is `state`."""
-        trials, cars = state.x.shape
+        cars = state.x.shape[1]
         self._roads, net = pack_roads(instances)
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
-        rows = [blank(cars) for _ in range(trials)]
-        ints, floats = np.stack([row[0] for row in rows]), np.stack([row[1] for row in rows])
-        stage: list[int] = []
-        for b, instance in enumerate(instances):
-            for n, agent in enumerate(instance.e_agents, start=1):
-                if agent.kind in KEEP_RULES:
-                    given = {**parameters_of(agent.kind, {}), **agent.parameters}
-                    _describe(instance, agent.kind, given, ints[b, n], floats[b, n], stage)
-        self._drivers = Drivers(
-            active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
-            net=net,
-            seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
-            trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-            build=build_of([instance.problem for instance in instances]),
-            ints=ints,
-            floats=floats,
-            stage=np.array(stage, dtype=np.int64),
-            distance=np.zeros((0, 0)),
-        )
+        self._drivers = pack_drivers(instances, cars, net)
         self._desk = desk(cars, int(np.diff(self._roads.seg_off).max()))
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
         decide(tick, state, labels, self._roads, self._obstacles, self._drivers, self._desk, commands)
+
+
+def pack_drivers(
+    instances: Sequence[Instance], cars: int, net: Ints, rounds: Sequence[tuple[Ints, Floats]] = ()
+) -> Drivers:
+    """Return the cars of a batch with `cars` places a trial that keep the rules.
+
+    Parameters
+    ----------
+    instances
+        One per trial.
+    cars
+        Places for cars in a trial.
+    net : (B,)
+        Number of each trial's road network.
+    rounds
+        What `driving.rounds.stages` returns for each trial whose ego keeps the rules; by default no ego does.
+    """
+    trials = len(instances)
+    whole, real = blank(cars)
+    ints, floats = np.repeat(whole[None], trials, axis=0), np.repeat(real[None], trials, axis=0)
+    stage: list[int] = []
+    for b, (own, _) in enumerate(rounds):
+        if len(own):
+            ints[b, EGO, [KIND, FIRST, LAST]] = ROUND, len(stage), len(stage) + len(own)
+            floats[b, EGO, SPEED] = instances[b].problem.car.bounds.speed
+            stage += own.tolist()
+    lanes = max((distance.shape[1] for _, distance in rounds), default=0)
+    distance = np.full((len(stage), lanes), np.inf)
+    done = 0
+    for own, far in rounds:
+        distance[done : done + len(own), : far.shape[1]] = far
+        done += len(own)
+    defaults = {kind: parameters_of(kind, {}) for kind in KEEP_RULES}
+    for b, instance in enumerate(instances):
+        for n, agent in enumerate(instance.e_agents, start=1):
+            if agent.kind in KEEP_RULES:
+                given = {**defaults[agent.kind], **agent.parameters}
+                _describe(instance, agent.kind, given, ints[b, n], floats[b, n], stage)
+    return Drivers(
+        active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
+        net=net,
+        seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
+        trial=np.array([instance.trial for instance in instances], dtype=np.int64),
+        build=build_of([instance.problem for instance in instances]),
+        ints=ints,
+        floats=floats,
+        stage=np.array(stage, dtype=np.int64),
+        distance=distance,
+    )
 
 
 def _describe(

@@ -10,17 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.near import FEW, candidates
-from dubins_traffic.cars.rows import Rows, clip, look, move
+from dubins_traffic.cars.rows import Rows, any_near, clip, look, move
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.kernels.trig import advance
 
 PARTED = 0.01
 """Two bodies that touched count as touching until they are this far apart, metres."""
 PARTNERS = 12
+MOVED, FULL, CROWDED = range(3)
 VACANT = -(2**62)
 CONTACT_FIELDS = 12
 
@@ -147,6 +148,47 @@ def _step(
         _pass_on(state, cars, obstacles, dt, work, begin, last)
         b = last
     return trials
+
+
+@jit_inner
+def step_trial(
+    b: int,
+    dt: float,
+    state: State,
+    commands: Floats,
+    cars: CarTable,
+    obstacles: ObstacleTable,
+    r: Rows,
+    work: Workspace,
+) -> int:
+    """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
+
+    Returns MOVED, or what is too small, FULL for the buffer of contacts or CROWDED for that of pairs: then nothing
+    has moved.
+    """
+    n = state.x.shape[1]
+    if work.found[0] + n > work.contact.shape[0]:
+        return FULL
+    cars_here = state.count[b]
+    clip(r, b, commands[b], state.speed[b], state.yaw_rate[b], 0, cars_here)
+    pairs = 0
+    close = n > FEW or obstacles.off[b] != obstacles.off[b + 1]
+    if close or any_near(state.x[b], state.y[b], cars_here, r.near[b]):
+        pairs = candidates(
+            state, b, 2.0 * r.far[b], obstacles, r.far[b], work.pair, work.head, work.link, work.cell
+        )
+        if pairs > work.pair.shape[0]:
+            return CROWDED
+    if pairs > 0:
+        _resolve(state, commands, cars, obstacles, dt, work, b, pairs)
+        _part(state, cars, obstacles, work, b)
+        return MOVED
+    move(
+        state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt, 0, cars_here
+    )  # fmt: skip
+    if work.touching[b] > 0:
+        _part(state, cars, obstacles, work, b)
+    return MOVED
 
 
 @jit

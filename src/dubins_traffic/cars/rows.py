@@ -110,6 +110,18 @@ def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -
 
 
 @jit
+def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
+    """Tell whether the squared distance of any two of the first `cars` cars is less than `near`."""
+    close = 0
+    for i in range(cars - 1):
+        for j in range(i + 1, cars):
+            dx = x[j] - x[i]
+            dy = y[j] - y[i]
+            close |= 1 if dx * dx + dy * dy < near else 0
+    return close != 0
+
+
+@jit
 def move(
     x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float, first: int, last: int
 ) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import (
+    batch,
     check,
     convert,
     faults,
@@ -56,6 +57,7 @@ def _options(  # pyright: ignore[reportUnusedFunction]
 app.command("network", epilog=network.EXAMPLES)(network.network)
 app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
 app.command("run", epilog=run.EXAMPLES)(run.run)
+app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)

@@ -107,7 +107,7 @@ def run(
     )
     results: list[Result] = []
     try:
-        with _progress(len(todo.jobs)) as advance:
+        with progress(len(todo.jobs)) as advance:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 advance()
@@ -126,7 +126,7 @@ def run(
 
 
 @contextmanager
-def _progress(trials: int) -> Generator[Callable[[], object]]:
+def progress(trials: int) -> Generator[Callable[[], object]]:
     """Show how many of the trials are done, on standard error and only to people."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TimeElapsedColumn

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from math import inf
-
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, Propositions, State
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
@@ -22,8 +20,7 @@ from dubins_traffic.driving.law_tables import (
     build_of,
     desk,
 )
-from dubins_traffic.driving.tours import LaneGraph, find_round
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.driving.rounds import nearest_stage, stages
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
 
@@ -46,7 +43,7 @@ class Rules:
         """Find the round."""
         cars = 1 + len(problem.e_agents)
         ints, floats = blank(cars)
-        stage, distance = _stages(problem)
+        stage, distance = stages(problem)
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
         self._command = np.zeros((1, cars, 2))
@@ -84,34 +81,11 @@ class Rules:
             for array, value in zip(labels, propositions, strict=True):
                 array[0, n] = value
         if drivers.ints[0, EGO, PLACE] < 0:
-            drivers.ints[0, EGO, PLACE] = _nearest(drivers.distance, observation.propositions)
+            drivers.ints[0, EGO, PLACE] = nearest_stage(
+                drivers.distance, observation.propositions.lane, observation.propositions.segment
+            )
         decide(
             observation.tick, state, labels, self._roads, self._obstacles, drivers, self._desk, self._command
         )
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)
-
-
-def _stages(problem: Problem) -> tuple[Ints, Floats]:
-    """Return the goals in the order of the round (M,), and the metres from the start of each lane to each (M, L)."""
-    graph = LaneGraph(problem.network)
-    goals = dict.fromkeys(problem.goal_vertices)
-    found = find_round(graph, tuple(goals)) if goals else None
-    if found is None:
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-    rows: list[list[float]] = []
-    stage: list[int] = []
-    for place in found.arrivals:
-        target = found.lanes[place]
-        to_target = graph.distances(target)
-        rows.append(
-            [far + own if far < inf else inf for far, own in zip(to_target, graph.length, strict=True)]
-        )
-        stage.append(graph.end[target])
-    return np.array(stage, dtype=np.int64), np.array(rows)
-
-
-def _nearest(distance: Floats, place: Propositions) -> int:
-    """Return the goal that is nearest along lanes from where the ego starts."""
-    lane = place.lane if place.lane >= 0 else 2 * place.segment
-    return int(np.argmin(distance[:, lane]))

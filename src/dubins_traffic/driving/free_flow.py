@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.state import Pose
-from dubins_traffic.driving.tours import LaneGraph, find_round
+from dubins_traffic.driving.tours import LaneGraph, find_round, lane_graph
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -63,7 +63,7 @@ class FreeFlow:
 def free_flow(instance: Instance) -> FreeFlow:
     """Return the free flow of an instance."""
     problem = instance.problem
-    graph = LaneGraph(problem.network)
+    graph = lane_graph(problem.network)
     tour = find_round(graph, problem.goal_vertices)
     speed = problem.car.bounds.speed
     if tour is None:

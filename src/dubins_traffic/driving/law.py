@@ -50,7 +50,7 @@ from dubins_traffic.driving.safety import motion_is_safe
 from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to_go
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import lane_end, lane_start, nearest_segment
 from dubins_traffic.roads.table import RoadTable
@@ -88,18 +88,55 @@ def decide(
 ) -> None:
     """Write the commands of all cars that the law drives."""
     for b in range(drivers.active.shape[0]):
-        if drivers.active[b] == 0:
+        if drivers.active[b] != 0:
+            decide_trial(b, tick, -1.0, state, labels, roads, obstacles, drivers, desk, commands)
+
+
+@jit_inner
+def decide_trial(
+    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
+) -> None:  # fmt: skip
+    """Write the commands of the cars of one trial that the law drives.
+
+    The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
+    given if that is negative.
+    """
+    hidden = list_cars(b, sight2, state, labels, desk)
+    for n in range(state.count[b]):
+        if n == 1 and hidden > 0:
+            unlist_cars(b, state, labels, desk)
+            list_cars(b, -1.0, state, labels, desk)
+        if drivers.ints[b, n, KIND] != ABSENT:
+            speed, yaw_rate = drive(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+            commands[b, n, 0] = speed
+            commands[b, n, 1] = yaw_rate
+    unlist_cars(b, state, labels, desk)
+
+
+@jit_inline
+def list_cars(b: int, sight2: float, state: State, labels: Labels, desk: Desk) -> int:
+    """Enter the cars that the ego sees (all if `sight2` is negative) in the lists of their segments.
+
+    Returns how many it does not see.
+    """
+    hidden = 0
+    for n in range(state.count[b]):
+        dx = state.x[b, n] - state.x[b, 0]
+        dy = state.y[b, n] - state.y[b, 0]
+        if sight2 >= 0.0 and dx * dx + dy * dy > sight2:
+            hidden += 1
             continue
-        for n in range(state.count[b]):
-            desk.link[n] = desk.head[labels.segment[b, n]]
-            desk.head[labels.segment[b, n]] = n
-        for n in range(state.count[b]):
-            if drivers.ints[b, n, KIND] != ABSENT:
-                speed, yaw_rate = drive(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-                commands[b, n, 0] = speed
-                commands[b, n, 1] = yaw_rate
-        for n in range(state.count[b]):
-            desk.head[labels.segment[b, n]] = -1
+        desk.link[n] = desk.head[labels.segment[b, n]]
+        desk.head[labels.segment[b, n]] = n
+    return hidden
+
+
+@jit_inline
+def unlist_cars(b: int, state: State, labels: Labels, desk: Desk) -> None:
+    """Empty the lists of the segments on which there are cars."""
+    for n in range(state.count[b]):
+        desk.head[labels.segment[b, n]] = -1
 
 
 @jit_inline

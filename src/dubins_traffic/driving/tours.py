@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise, permutations
 from math import inf
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -24,6 +25,7 @@ EXACT = 7
 """Up to so many goals the shortest of all rounds is found; more are taken each time nearest first."""
 
 TurnCost = Callable[[int, int], float]
+_GRAPHS: WeakKeyDictionary[RoadNetwork, LaneGraph] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,14 @@ class LaneGraph:
             if lane >= 0:
                 lanes.append(lane)
         return lanes
+
+
+def lane_graph(network: RoadNetwork) -> LaneGraph:
+    """Return the graph of a network's lanes in which turning is free; made once for each network."""
+    graph = _GRAPHS.get(network)
+    if graph is None:
+        graph = _GRAPHS[network] = LaneGraph(network)
+    return graph
 
 
 def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:

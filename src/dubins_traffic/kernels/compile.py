@@ -20,6 +20,8 @@ import numba
 import numpy as np
 from platformdirs import user_cache_path
 
+from dubins_traffic.kernels import linking
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -99,6 +101,10 @@ def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
 def _compiled(function: Callable[P, R], *, inlined: bool = False, inner: bool = False) -> Callable[P, R]:
     library = cast(Any, numba)
     library.config.CACHE_DIR = str(cache_folder())
+    linking.install()
+    inner = inner or function.__name__.startswith("_")
+    if inner or inlined:
+        linking.mark_inner(function.__module__, function.__qualname__)
     compiler = library.njit(
         cache=True,
         error_model="numpy",
@@ -106,6 +112,6 @@ def _compiled(function: Callable[P, R], *, inlined: bool = False, inner: bool = 
         forceinline=inlined,
         _nrt=False,
         no_cfunc_wrapper=True,
-        no_cpython_wrapper=inner or function.__name__.startswith("_"),
+        no_cpython_wrapper=inner,
     )
     return cast(Callable[P, R], compiler(function))

@@ -13,6 +13,8 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 
 _Gap = Callable[[np.ndarray, np.ndarray], Floats]
+_SLACK = 1e-9
+"""Metres by which rounding may make a bound larger than the gap: what is found never depends on the order of looks."""
 
 
 class Clearance:
@@ -71,10 +73,10 @@ class Clearance:
         if not bound.size:
             return
         nearest = np.unravel_index(np.argmin(bound), bound.shape)
-        if bound[nearest] >= self._best:
+        if bound[nearest] >= self._best + _SLACK:
             return
         self._best = min(self._best, float(gap(*(index.reshape(1) for index in nearest))[0]))
-        rows, columns = np.nonzero(bound < self._best)
+        rows, columns = np.nonzero(bound < self._best + _SLACK)
         if len(rows):
             self._best = min(self._best, float(gap(rows, columns).min()))
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.cars.state import EGO, Contact, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 
@@ -48,7 +49,11 @@ class Collisions:
 
     def frames(self, frames: Frames) -> None:
         """Take the contacts of a block."""
-        for contact in frames.contacts:
+        self.take(frames.contacts)
+
+    def take(self, contacts: Sequence[Contact]) -> None:
+        """Take the next contacts."""
+        for contact in contacts:
             if EGO not in (contact.car, contact.other):
                 self.among_others += 1
                 continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -205,67 +205,112 @@ class Judging:
         """Return the verdict up to the last frame, None if the problem carries no rules."""
         if self._referee is None:
             return None
-        violations = tuple(self._violation(breach) for breach in self._breaches)
-        own = [breach for breach in self._breaches if breach.car == EGO]
-        fall = first_fall(self._breaches, self._rules, self._instance.problem.rate)
-        visits = self._visiting.result()
-        gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
-        flow = free_flow(self._instance)
-        limit = self._rules.gap_rounds * flow.round_time
-        excuse = None
-        if not own:
-            done = visits.visited == 1.0 and (gap is None or gap <= limit)
-            ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
-        elif fall is None or fall[1].tick > own[0].tick:
-            ruling = Ruling.VIOLATED
-        else:
-            ruling = Ruling.EXCUSED
-            sensed = self._was_sensed(fall[1].car, own[0].tick)
-            excuse = Excuse(fall[0], violations[self._breaches.index(fall[1])], sensed)
-        return Verdict(
-            ruling,
-            not own,
-            excuse,
-            violations,
+        return reach_verdict(
+            self._instance,
+            self._rules,
+            self._breaches,
             self._collisions.result(),
-            visits.rounds,
-            gap,
-            limit if math.isfinite(limit) else None,
-            self._formulas(visits, self._referee.running[0]),
+            self._visiting.result(),
+            self._at_goal.tolist(),
+            self._was_sensed,
+            self._referee.running[0],
         )
 
-    def _violation(self, breach: Breach) -> Violation:
-        network, rate = self._instance.problem.network, self._instance.problem.rate
-        segment = None
-        if breach.lane >= 0:
-            x0, y0, x1, y1 = network.segments[breach.lane // 2]
-            segment = (x1, y1, x0, y0) if breach.lane % 2 else (x0, y0, x1, y1)
-        vertex = network.intersections[breach.vertex] if breach.vertex >= 0 else None
-        place = Place(breach.x, breach.y, vertex, segment)
-        name = self._instance.names[breach.car]
-        return Violation(breach.rule, name, breach.tick / rate, breach.tick, breach.since / rate, place)
-
-    def _was_sensed(self, car: int, tick: int) -> bool:
-        back = ticks(self._rules.witness_time, self._instance.problem.rate)
+    def _was_sensed(self, car: int, first: int, last: int) -> bool:
         sensed = np.concatenate(self._sensed)
         self._sensed = [sensed]
-        return bool(sensed[max(0, tick - back) : tick + 1, car].any())
+        return bool(sensed[first : last + 1, car].any())
 
-    def _formulas(self, visits: Visits, running: Running) -> dict[str, Status]:
-        broken = {breach.rule for breach in self._breaches if breach.car == EGO}
-        found: dict[str, Status] = {rule: _status(rule in broken, rule in running.ego) for rule in EGO_RULES}
-        for goal, there in zip(visits.goals, self._at_goal.tolist(), strict=True):
-            found[f"1.goal {goal.goal[0]} {goal.goal[1]}"] = _status(False, not there)
-        pending = {assumption_of(rule) for rule in running.others}
-        for assumption in assumed(self._rules):
-            of_it = [
-                breach
-                for breach in self._breaches
-                if breach.car != EGO and assumption_of(breach.rule) == assumption
-            ]
-            fell = first_fall(of_it, self._rules, self._instance.problem.rate) is not None
-            found[assumption] = _status(fell, assumption in pending)
-        return found
+
+def reach_verdict(
+    instance: Instance,
+    rules: RuleParameters,
+    breaches: Sequence[Breach],
+    collisions: tuple[Collision, ...],
+    visits: Visits,
+    at_goal: Sequence[bool],
+    was_sensed: Callable[[int, int, int], bool],
+    running: Running,
+) -> Verdict:
+    """Return the verdict on a trial.
+
+    Parameters
+    ----------
+    instance, rules
+        What has been run, and the parameters of its rules.
+    breaches
+        All that was broken, in order.
+    collisions, visits
+        The ego's.
+    at_goal
+        For each goal, once, whether the ego is inside its disc in the last frame.
+    was_sensed
+        Asked for (car, first, last): whether the car was within the sensing radius at a frame from first to last.
+    running
+        What hangs over the cars after the last frame.
+    """
+    rate = instance.problem.rate
+    violations = tuple(_violation(instance, breach) for breach in breaches)
+    own = [breach for breach in breaches if breach.car == EGO]
+    fall = first_fall(breaches, rules, rate)
+    gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
+    limit = rules.gap_rounds * free_flow(instance).round_time
+    excuse = None
+    if not own:
+        done = visits.visited == 1.0 and (gap is None or gap <= limit)
+        ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
+    elif fall is None or fall[1].tick > own[0].tick:
+        ruling = Ruling.VIOLATED
+    else:
+        ruling = Ruling.EXCUSED
+        back = ticks(rules.witness_time, rate)
+        sensed = was_sensed(fall[1].car, max(0, own[0].tick - back), own[0].tick)
+        excuse = Excuse(fall[0], violations[breaches.index(fall[1])], sensed)
+    return Verdict(
+        ruling,
+        not own,
+        excuse,
+        violations,
+        collisions,
+        visits.rounds,
+        gap,
+        limit if math.isfinite(limit) else None,
+        _formulas(rules, rate, breaches, visits, at_goal, running),
+    )
+
+
+def _violation(instance: Instance, breach: Breach) -> Violation:
+    network, rate = instance.problem.network, instance.problem.rate
+    segment = None
+    if breach.lane >= 0:
+        x0, y0, x1, y1 = network.segments[breach.lane // 2]
+        segment = (x1, y1, x0, y0) if breach.lane % 2 else (x0, y0, x1, y1)
+    vertex = network.intersections[breach.vertex] if breach.vertex >= 0 else None
+    place = Place(breach.x, breach.y, vertex, segment)
+    name = instance.names[breach.car]
+    return Violation(breach.rule, name, breach.tick / rate, breach.tick, breach.since / rate, place)
+
+
+def _formulas(
+    rules: RuleParameters,
+    rate: float,
+    breaches: Sequence[Breach],
+    visits: Visits,
+    at_goal: Sequence[bool],
+    running: Running,
+) -> dict[str, Status]:
+    broken = {breach.rule for breach in breaches if breach.car == EGO}
+    found: dict[str, Status] = {rule: _status(rule in broken, rule in running.ego) for rule in EGO_RULES}
+    for goal, there in zip(visits.goals, at_goal, strict=True):
+        found[f"1.goal {goal.goal[0]} {goal.goal[1]}"] = _status(False, not there)
+    pending = {assumption_of(rule) for rule in running.others}
+    for assumption in assumed(rules):
+        of_it = [
+            breach for breach in breaches if breach.car != EGO and assumption_of(breach.rule) == assumption
+        ]
+        fell = first_fall(of_it, rules, rate) is not None
+        found[assumption] = _status(fell, assumption in pending)
+    return found
 
 
 def assumption_of(rule: str) -> str:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.motion import Workspace, step, workspace
-from dubins_traffic.cars.rows import rows
+from dubins_traffic.cars.rows import Rows, rows
 from dubins_traffic.cars.state import Contact, State
-from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.cars.tables import CarTable, ObstacleTable, pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import Capabilities
@@ -69,9 +69,14 @@ class Embedded:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
-                self._work = _enlarged(self._work)
+                self._work = enlarged(self._work)
                 self._gather()
         return contacts
+
+    @property
+    def tables(self) -> tuple[CarTable, ObstacleTable, Rows, Workspace]:
+        """The tables with which the kernels of `cars.motion` move this batch."""
+        return self._cars, self._obstacles, self._rows, self._work
 
     def close(self) -> None:
         """Nothing is held outside memory."""
@@ -82,22 +87,27 @@ class Embedded:
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)
         for row in self._work.contact[: self._work.found[0]].tolist():
-            contact = Contact(
-                tick=self._tick,
-                time=(self._tick - 1) / self._rate + row[3],
-                car=int(row[1]),
-                other=int(row[2]),
-                x=row[4],
-                y=row[5],
-                nx=row[6],
-                ny=row[7],
-                closing=(row[8], row[9]),
-                moved=(row[10] != 0, row[11] != 0),
-            )
-            contacts[int(row[0])] += (contact,)
+            contacts[int(row[0])] += (contact_of(row, self._tick, self._rate),)
         return contacts
 
 
-def _enlarged(work: Workspace) -> Workspace:
+def contact_of(row: Sequence[float], tick: int, rate: float) -> Contact:
+    """Return the contact in a row of `Workspace.contact`, of the tick that ends in frame `tick`."""
+    return Contact(
+        tick=tick,
+        time=(tick - 1) / rate + row[3],
+        car=int(row[1]),
+        other=int(row[2]),
+        x=row[4],
+        y=row[5],
+        nx=row[6],
+        ny=row[7],
+        closing=(row[8], row[9]),
+        moved=(row[10] != 0, row[11] != 0),
+    )
+
+
+def enlarged(work: Workspace) -> Workspace:
+    """Return the workspace with more room for pairs."""
     pairs = 4 * len(work.when)
     return work._replace(pair=np.zeros((pairs, 2), dtype=np.int64), when=np.zeros(pairs))

@@ -29,10 +29,15 @@ def with_fault(contact: Contact, bits: Bits) -> Contact:
     Never who did not move. A car that hits an obstacle is at fault. Of two cars: those that closed; of these, those
     in breach; if none of these or all are, all that closed.
     """
+    own = int(bits[contact.car])
+    return with_fault_by(contact, own, int(bits[contact.other]) if contact.other >= 0 else 0)
+
+
+def with_fault_by(contact: Contact, own: int, other: int) -> Contact:
+    """Do as `with_fault`, given the flags of `contact.car` and of the other car."""
     if contact.other < 0:
         return replace(contact, at_fault=(contact.moved[0], False))
     closed = [moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True)]
-    cars = (contact.car, contact.other)
-    guilty = [closes and in_breach(int(bits[n])) for closes, n in zip(closed, cars, strict=True)]
+    guilty = [closes and in_breach(flags) for closes, flags in zip(closed, (own, other), strict=True)]
     first, second = guilty if any(guilty) else closed
     return replace(contact, at_fault=(first, second))

@@ -109,21 +109,36 @@ def label_tables(
     memory: Memory,
 ) -> None:
     """Do what `label_frame` does, for a kernel that has the tables."""
-    memory.head[0, NOW] = tick % memory.trail.shape[0]
     for b in range(state.count.shape[0]):
-        cars = state.count[b]
-        for n in range(cars):
-            locate(b, n, tick, state, roads, rules, labels, memory)
-        for n in range(cars):
-            _stop(b, n, tick, roads, rules, labels, memory)
-        for n in range(cars):
-            _queue(b, n, tick, roads, rules, labels, memory)
-        for n in range(cars):
-            _stand(b, n, rules, labels, memory)
-        for n in range(cars):
-            _block(b, n, state, roads, obstacles, rules, labels, memory)
-        for n in range(cars):
-            _forget(b, n, roads, rules, labels, memory)
+        label_trial(b, tick, state, roads, obstacles, rules, labels, memory)
+
+
+@jit_inner
+def label_trial(
+    b: int,
+    tick: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    labels: Labels,
+    memory: Memory,
+) -> None:
+    """Label frame `tick` of one trial."""
+    memory.head[0, NOW] = tick % memory.trail.shape[1]
+    cars = state.count[b]
+    for n in range(cars):
+        locate(b, n, tick, state, roads, rules, labels, memory)
+    for n in range(cars):
+        _stop(b, n, tick, roads, rules, labels, memory)
+    for n in range(cars):
+        _queue(b, n, tick, roads, rules, labels, memory)
+    for n in range(cars):
+        _stand(b, n, rules, labels, memory)
+    for n in range(cars):
+        _block(b, n, state, roads, obstacles, rules, labels, memory)
+    for n in range(cars):
+        _forget(b, n, roads, rules, labels, memory)
 
 
 @jit

@@ -29,6 +29,7 @@ from dubins_traffic.spec.docket import (
     RULES,
     SINCE_TICK,
     Docket,
+    Terms,
     pack_terms,
 )
 from dubins_traffic.spec.fault import with_fault
@@ -36,6 +37,7 @@ from dubins_traffic.spec.judge_kernel import judge_frame, judge_frames
 from dubins_traffic.spec.labeller import Judged, Labeller, Posed
 from dubins_traffic.spec.parameters import RuleParameters
 
+_PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_SINCE), ("E5", REST_SINCE))
 _ROOMY = 64
 """For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
 
@@ -104,14 +106,7 @@ class Referee:
         problems = [instance.problem for instance in instances]
         self._own = labeller is None
         self._labeller = labeller or Labeller(instances)
-        self._terms = pack_terms(
-            [RuleParameters.from_mapping(problem.rules) for problem in problems],
-            [bool(problem.rules) for problem in problems],
-            [problem.intersection_radius for problem in problems],
-            [problem.rate for problem in problems],
-            [problem.goal_vertices if problem.rules else () for problem in problems],
-            pack_cars([problem.car for problem in problems]),
-        )
+        self._terms = terms_of(problems)
         self._judged = [bool(problem.rules) for problem in problems]
         self._roads, self._obstacles, self._rules = self._labeller.tables
         self._state: State | None = None
@@ -167,28 +162,13 @@ class Referee:
             for contact in frames.contacts
             for row in (contact.tick - frames.first,)
         )
-        breaches += _accused(contacts) if self._judged[0] else ()
-        return sorted(breaches, key=_order), contacts
+        breaches += accused(contacts) if self._judged[0] else ()
+        return sorted(breaches, key=order), contacts
 
     @property
     def running(self) -> Sequence[Running]:
         """What hangs over the cars of each trial."""
-        clock = self._docket.clock >= 0
-        pending = (
-            ("2.return", LEFT_SINCE),
-            ("E3.enter", FIRST_SINCE),
-            ("E4", EXIT_SINCE),
-            ("E5", REST_SINCE),
-        )
-        found: list[Running] = []
-        for b in range(len(self._judged)):
-            ego = frozenset(rule for rule, k in pending if clock[b, EGO, k])
-            others = {rule for rule, k in pending if clock[b, EGO + 1 :, k].any()}
-            goals = slice(int(self._terms.goal_off[b]), int(self._terms.goal_off[b + 1]))
-            if (self._docket.goal_clock[goals] >= 0).any():
-                others.add("E6")
-            found.append(Running(ego, frozenset(others)))
-        return found
+        return [running(b, self._terms, self._docket) for b in range(len(self._judged))]
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:
@@ -214,13 +194,13 @@ class Referee:
         by_trial: dict[int, list[Breach]] = {}
         for row in self._found():
             b, n = row[OF_TRIAL], row[OF_CAR]
-            by_trial.setdefault(b, []).append(_breach(row, float(state.x[b, n]), float(state.y[b, n])))
+            by_trial.setdefault(b, []).append(breach_of(row, float(state.x[b, n]), float(state.y[b, n])))
         for b, own in enumerate(contacts):
             if own and self._judged[b]:
-                by_trial.setdefault(b, []).extend(_accused(own))
+                by_trial.setdefault(b, []).extend(accused(own))
         breaches: list[Sequence[Breach]] = [()] * len(self._judged)
         for b, own in by_trial.items():
-            breaches[b] = sorted(own, key=_order)
+            breaches[b] = sorted(own, key=order)
         return breaches
 
     def _block(self, frames: Frames) -> tuple[Bits, Bits, list[Breach]]:
@@ -259,7 +239,7 @@ class Referee:
             )
             for row in self._found():
                 f, n = row[AT_TICK] - frames.first, row[OF_CAR]
-                breaches.append(_breach(row, float(frames.x[f, n]), float(frames.y[f, n])))
+                breaches.append(breach_of(row, float(frames.x[f, n]), float(frames.y[f, n])))
         return before, bits, breaches
 
     def _found(self) -> list[list[int]]:
@@ -270,13 +250,36 @@ class Referee:
         return rows
 
 
-def _breach(row: list[int], x: float, y: float) -> Breach:
+def terms_of(problems: Sequence[WithGoals]) -> Terms:
+    """Return the terms by which the trials of some problems are judged."""
+    return pack_terms(
+        [RuleParameters.from_mapping(problem.rules) for problem in problems],
+        [bool(problem.rules) for problem in problems],
+        [problem.intersection_radius for problem in problems],
+        [problem.rate for problem in problems],
+        [problem.goal_vertices if problem.rules else () for problem in problems],
+        pack_cars([problem.car for problem in problems]),
+    )
+
+
+def running(b: int, terms: Terms, docket: Docket) -> Running:
+    """Return what hangs over the cars of trial b."""
+    clock = (docket.clock[b] >= 0).tolist()
+    ego = frozenset(rule for rule, k in _PENDING if clock[EGO][k])
+    others = {rule for rule, k in _PENDING if any(own[k] for own in clock[EGO + 1 :])}
+    if (docket.goal_clock[terms.goal_off[b] : terms.goal_off[b + 1]] >= 0).any():
+        others.add("E6")
+    return Running(ego, frozenset(others))
+
+
+def breach_of(row: Sequence[int], x: float, y: float) -> Breach:
+    """Return the breach in a row of the docket, of a car at (x, y)."""
     return Breach(
         RULES[row[OF_RULE]], row[OF_CAR], row[AT_TICK], row[SINCE_TICK], x, y, row[AT_VERTEX], row[ON_LANE]
     )
 
 
-def _accused(contacts: Sequence[Contact]) -> list[Breach]:
+def accused(contacts: Sequence[Contact]) -> list[Breach]:
     """Return the breaches that lie in contacts: any of the ego's, and an e-agent's fault in any."""
     breaches: list[Breach] = []
     for contact in contacts:
@@ -289,5 +292,6 @@ def _accused(contacts: Sequence[Contact]) -> list[Breach]:
     return breaches
 
 
-def _order(breach: Breach) -> tuple[int, int, int]:
+def order(breach: Breach) -> tuple[int, int, int]:
+    """Return the key by which breaches are sorted: frame, rule, car."""
     return breach.tick, RULES.index(breach.rule), breach.car

@@ -123,52 +123,66 @@ def judge_tables(
     docket: Docket,
 ) -> None:
     """Do as `judge_frame`, for kernels."""
+    for b in range(state.count.shape[0]):
+        if terms.whole[b, JUDGED] != 0:
+            judge_trial(b, tick, state, roads, obstacles, rules, terms, labels, memory, docket)
+
+
+@jit_inner
+def judge_trial(
+    b: int,
+    tick: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> None:
+    """Do as `judge_frame`, of one trial."""
     row = docket.row
     filled = docket.filled
-    for b in range(state.count.shape[0]):
-        if terms.whole[b, JUDGED] == 0:
+    cars = state.count[b]
+    whole = terms.whole[b]
+    past = docket.past[b]
+    flags = labels.bits[b]
+    lanes = labels.lane[b]
+    for n in range(cars):
+        clock = docket.clock[b, n]
+        bits = np.int64(flags[n])
+        lane = lanes[n]
+        v = labels.crosses[b, n]
+        if bits & LEFT != 0:
+            _judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
+        else:
+            clock[LEFT_SINCE] = -1
+            clock[UNBLOCKED_SINCE] = -1
+        if bits & ENTERS == ENTERS:
+            stopped = False
+            if past[n, BITS] & STOPPED != 0:
+                stopped = lane_end(roads, rules.whole[b, NET], past[n, LANE]) == v
+            _judge_entry(b, n, tick, v, stopped, cars, past, row, filled)
+        if n == EGO:
+            _judge_road(b, tick, bits, lane, clock, row, filled)
             continue
-        cars = state.count[b]
-        whole = terms.whole[b]
-        past = docket.past[b]
-        flags = labels.bits[b]
-        lanes = labels.lane[b]
-        for n in range(cars):
-            clock = docket.clock[b, n]
-            bits = np.int64(flags[n])
-            lane = lanes[n]
-            v = labels.crosses[b, n]
-            if bits & LEFT != 0:
-                _judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
-            else:
-                clock[LEFT_SINCE] = -1
-                clock[UNBLOCKED_SINCE] = -1
-            if bits & ENTERS == ENTERS:
-                stopped = False
-                if past[n, BITS] & STOPPED != 0:
-                    stopped = lane_end(roads, rules.whole[b, NET], past[n, LANE]) == v
-                _judge_entry(b, n, tick, v, stopped, cars, past, row, filled)
-            if n == EGO:
-                _judge_road(b, tick, bits, lane, clock, row, filled)
-                continue
-            _judge_agent(
-                b, n, tick, bits, lane, v, state, roads, obstacles, rules, terms, labels, memory, docket
-            )
-            if past[n, AT] != labels.at[b, n]:
-                clock[AT_SINCE] = tick
-        for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
-            who = _at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
-            if who < 0:
-                docket.goal_clock[g] = -1
-            elif docket.goal_clock[g] < 0:
-                docket.goal_clock[g] = tick
-            if who >= 0 and tick - docket.goal_clock[g] == whole[GOAL_TICKS]:
-                _add(b, GOAL, who, tick, docket.goal_clock[g], terms.goal[g], -1, row, filled)
-        for n in range(cars):
-            past[n, BITS] = flags[n]
-            past[n, LANE] = lanes[n]
-            past[n, CROSSES] = labels.crosses[b, n]
-            past[n, AT] = labels.at[b, n]
+        _judge_agent(b, n, tick, bits, lane, v, state, roads, obstacles, rules, terms, labels, memory, docket)
+        if past[n, AT] != labels.at[b, n]:
+            clock[AT_SINCE] = tick
+    for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
+        who = _at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
+        if who < 0:
+            docket.goal_clock[g] = -1
+        elif docket.goal_clock[g] < 0:
+            docket.goal_clock[g] = tick
+        if who >= 0 and tick - docket.goal_clock[g] == whole[GOAL_TICKS]:
+            _add(b, GOAL, who, tick, docket.goal_clock[g], terms.goal[g], -1, row, filled)
+    for n in range(cars):
+        past[n, BITS] = flags[n]
+        past[n, LANE] = lanes[n]
+        past[n, CROSSES] = labels.crosses[b, n]
+        past[n, AT] = labels.at[b, n]
 
 
 @jit_inline

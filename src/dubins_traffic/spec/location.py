@@ -179,8 +179,8 @@ def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memo
     """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
     trail = memory.trail
     now = memory.head[0, NOW]
-    trail[now, b, n, 0] = x
-    trail[now, b, n, 1] = y
+    trail[b, now, n, 0] = x
+    trail[b, now, n, 1] = y
     if moved2(b, n, tick, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]:
         return STILL
     return 0
@@ -195,9 +195,9 @@ def moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
     now = memory.head[0, NOW]
     then = now - ago
     if then < 0:
-        then += trail.shape[0]
-    dx = trail[now, b, n, 0] - trail[then, b, n, 0]
-    dy = trail[now, b, n, 1] - trail[then, b, n, 1]
+        then += trail.shape[1]
+    dx = trail[b, now, n, 0] - trail[b, then, n, 0]
+    dy = trail[b, now, n, 1] - trail[b, then, n, 1]
     return dx * dx + dy * dy
 
 

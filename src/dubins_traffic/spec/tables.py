@@ -100,7 +100,7 @@ class Memory(NamedTuple):
         First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
         in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
         (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none.
-    trail : (M, B, N, 2) float64
+    trail : (B, M, N, 2) float64
         Positions at the last M ticks, tick k in row k mod M.
     link : (N, LINKS) int64
         Scratch: the cars of one lane, segment and queue as linked lists; members and groups of a queue.
@@ -125,7 +125,7 @@ class Memory(NamedTuple):
         return Memory(
             np.zeros((trials, cars, MEASURES)),
             mark,
-            np.zeros((depth, trials, cars, 2)),
+            np.zeros((trials, depth, cars, 2)),
             np.full((cars, LINKS), -1, dtype=np.int64),
             head,
         )

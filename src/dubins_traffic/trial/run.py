@@ -40,7 +40,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
         raise
     except ControllerError as error:
         trial.end(End(error.reason), error.detail)
-    ending = _close(controller, trial.end(End.DURATION))
+    ending = close(controller, trial.end(End.DURATION))
     return ending, measured(begin, summary(latencies), reproducible=ending.end is not End.DEADLINE)
 
 
@@ -113,7 +113,8 @@ def _alarm(seconds: float) -> Generator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _close(controller: Controller, ending: Ending) -> Ending:
+def close(controller: Controller, ending: Ending) -> Ending:
+    """Tell a controller that its trial is over; return the ending, with what closing raised in its detail."""
     if isinstance(controller, Closes):
         try:
             controller.close()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self, cast
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink, Watch
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.trial.endings import agent_fault, checked_command, collision_detail
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -103,7 +103,11 @@ class Trial:
         """Do as `step` but don't observe; return the contacts of the tick."""
         if self.ending is not None:
             raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): make a new one")
-        speed, yaw = self._checked(command)
+        try:
+            speed, yaw = checked_command(command, self._tick)
+        except ControllerError as error:
+            self.end(End.CONTROLLER_FAULT, error.detail)
+            raise
         if not self._line.clear:
             speed, yaw = self._line.carry(self._tick, (speed, yaw))
         commands = self._commands
@@ -146,30 +150,12 @@ class Trial:
     def __exit__(self, *_error: object) -> None:
         self.close()
 
-    def _checked(self, command: object) -> tuple[float, float]:
-        try:
-            speed, yaw = cast("tuple[float, float]", command)  # what is no pair is refused just below
-            speed, yaw = float(speed), float(yaw)
-        except (TypeError, ValueError) as error:
-            detail = f"a command is two numbers (speed, yaw rate): got {command!r:.80}"
-            self.end(End.CONTROLLER_FAULT, detail)
-            raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
-        if not (math.isfinite(speed) and math.isfinite(yaw)):
-            detail = f"a command is two finite numbers: got ({speed}, {yaw}) at tick {self._tick}"
-            self.end(End.CONTROLLER_FAULT, detail)
-            raise ControllerError(End.CONTROLLER_FAULT.value, detail)
-        return speed, yaw
-
     def _agent_fault(self) -> Sequence[Contact]:
-        n = int(np.argwhere(~np.isfinite(self._commands[0]).all(axis=1))[0, 0])
-        self.end(End.AGENT_FAULT, f"{self.instance.names[n]} asked for a command that is not finite")
+        self.end(End.AGENT_FAULT, agent_fault(self.instance, self._commands[0]))
         return ()
 
     def _end_on_collision(self, contacts: Sequence[Contact]) -> None:
         for contact in contacts:
             if EGO in (contact.car, contact.other):
-                names = self.instance.names
-                other = contact.other if contact.car == EGO else contact.car
-                name = names[other] if other >= 0 else f"obstacle {-1 - other}"
-                self.end(End.COLLISION, f"with {name} at {contact.time:.3f} s")
+                self.end(End.COLLISION, collision_detail(self.instance, contact))
                 return

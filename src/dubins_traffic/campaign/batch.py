@@ -1,0 +1,249 @@
+"""Many trials at once: drawn, run together, judged and scored, the same numbers as one by one."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
+
+from dubins_traffic.campaign.asked import Maker, ask, grouped
+from dubins_traffic.campaign.group import Group, Outcome
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import Controller, End
+from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.scoring.verdict import Ruling
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+COMPILED = "rules"
+"""The controller that is compiled: no Python runs between two ticks of its trials."""
+KEEP = "none, all, failures or sample:K"
+Progress = Callable[[int], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What came of the trials of a batch, by their numbers; of trials that have a record their scores name it."""
+
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def sheet(self) -> ScoreSheet:
+        """The scores."""
+        return ScoreSheet(tuple(outcome.score for outcome in self.outcomes))
+
+
+def run_batch(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    *,
+    trials: int | None = None,
+    first: int = 0,
+    seed: int = 0,
+    batch: int = 64,
+    threads: int = 1,
+    keep: str = "none",
+    records: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Run trials of a configuration, `batch` at a time.
+
+    Every score and verdict equals that of `run_trial` on the same instance, bit for bit, whatever `batch` and
+    `threads`.
+
+    Parameters
+    ----------
+    configuration : Configuration, path or name
+        What to draw the trials from.
+    controller : str or callable
+        `rules` runs compiled. Others, by name, as ``module:Class`` or ``path/to/file.py:Class``, or as a callable that
+        makes one, are asked every tick: one object for each trial, or one for all if it also has the methods
+        `start_batch` and `act_batch` (`campaign.asked.BatchController`).
+    trials, first : int
+        Trials `first` to ``first + trials - 1``; by default as many as the configuration says, from 0.
+    seed : int
+        What all random numbers follow from.
+    batch : int
+        Trials that are stepped together; when one ends another takes its place.
+    threads : int
+        Batches that run at a time, where the controller is compiled.
+    keep : str
+        Of which trials a record is kept: ``none``, ``all``, ``failures`` (a rule broken and not excused, a fault, or in
+        trials that are not judged a collision), or ``sample:K``: K of them, evenly spaced. These trials are run once
+        more by themselves, since the same seed gives the same bytes; so a controller must do the same in the same
+        trial.
+    records : path
+        Folder for the records, made if missing.
+    progress : callable, optional
+        Told of every trial that has ended, by 1.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong, or an instance can't be drawn.
+    """
+    if not isinstance(configuration, Configuration):
+        configuration = load_config(configuration)
+    count = configuration.number_trials if trials is None else trials
+    for name, value in (("trials", count), ("batch", batch), ("threads", threads)):
+        if value < 1:
+            raise InputError("too few", field=name, value=value, expected="at least 1")
+    kept, folder = _kept(keep, count), _folder(keep, records)
+    instances = (draw(configuration, seed, first + k) for k in range(count))
+    found: list[Outcome] = []
+    for outcome in outcomes(instances, controller, batch=batch, threads=threads):
+        if folder is None or not kept(outcome.instance.trial - first, outcome):
+            found.append(outcome)
+        else:
+            found.append(_recorded(outcome, controller, folder))
+        if progress is not None:
+            progress(1)
+    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
+
+
+def outcomes(
+    instances: Iterable[Instance], controller: str | Maker = COMPILED, *, batch: int = 64, threads: int = 1
+) -> Iterator[Outcome]:
+    """Run trials of instances, `batch` at a time, and yield what came of each as it ends.
+
+    The parameters are those of `run_batch`. Instances are drawn from their iterator as they are needed. Trials that
+    can't be stepped with others (another simulator, formulas of the user's) run by themselves.
+    """
+    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+    make = partial(controllers.load, controller) if isinstance(controller, str) else controller
+    make()
+    source = iter(instances)
+    if controller != COMPILED:
+        yield from _apart(source, make, lambda rest: ask(rest, make, name, batch))
+        return
+    cancelled = Event()
+    waiting: deque[Future[list[Outcome]]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            while True:
+                while len(waiting) <= threads and (taken := list(islice(source, batch))):
+                    waiting.append(pool.submit(_compiled, taken, cancelled))
+                if not waiting:
+                    return
+                yield from waiting.popleft().result()
+        finally:
+            cancelled.set()
+
+
+def _compiled(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
+    """Run the trials of instances whose egos keep the rules."""
+    found: list[Outcome] = []
+    together: list[Instance] = []
+    asked: list[Instance] = []
+    for instance in instances:
+        if not _can_share(instance):
+            found.append(_alone(instance, COMPILED))
+        else:
+            (together if _undisturbed(instance) else asked).append(instance)
+    for own in grouped(together):
+        group = Group(own, keeps_rules=True)
+        group.finish(cancelled.is_set)
+        if not cancelled.is_set():
+            found += [group.outcome(b, COMPILED) for b in range(len(own))]
+    make = partial(controllers.load, COMPILED)
+    return found + list(ask(asked, make, COMPILED, max(1, len(asked))))
+
+
+def _apart(
+    source: Iterator[Instance], make: Maker, run: Callable[[Iterator[Instance]], Iterator[Outcome]]
+) -> Iterator[Outcome]:
+    """Run the trials that can't be stepped with others, and hand on the rest."""
+    done: list[Outcome] = []
+
+    def rest() -> Iterator[Instance]:
+        for instance in source:
+            if _can_share(instance):
+                yield instance
+            else:
+                done.append(_alone(instance, make()))
+
+    for outcome in run(rest()):
+        while done:
+            yield done.pop(0)
+        yield outcome
+    yield from done
+
+
+def _can_share(instance: Instance) -> bool:
+    remote = any(agent.kind == REMOTE for agent in instance.e_agents)
+    return instance.simulator == "embedded" and not instance.problem.formulas and not remote
+
+
+def _undisturbed(instance: Instance) -> bool:
+    own = instance.disturbances
+    noise = own.position_noise > 0.0 or own.heading_noise > 0.0
+    return not noise and own.command_delay == 0 and own.command_loss == 0.0
+
+
+def _alone(instance: Instance, controller: str | Controller) -> Outcome:
+    result = run_trial(instance, controller)
+    return Outcome(instance, result.ending, result.score)
+
+
+def _kept(keep: str, count: int) -> Callable[[int, Outcome], bool]:
+    kind, colon, number = keep.partition(":")
+    if kind == "sample" and colon and number.isdigit() and int(number) > 0:
+        wanted = min(int(number), count)
+        chosen = {k * count // wanted for k in range(wanted)}
+        return lambda place, _outcome: place in chosen
+    if keep not in ("none", "all", "failures"):
+        raise InputError("not a choice of records", file="--keep", value=keep, expected=KEEP)
+    if keep == "failures":
+        return lambda _place, outcome: failed(outcome)
+    return lambda _place, _outcome: keep == "all"
+
+
+def failed(outcome: Outcome) -> bool:
+    """Tell whether a trial counts as failed: a rule broken and not excused, a fault, or, unjudged, a collision."""
+    if outcome.ending.end not in (End.DURATION, End.COLLISION):
+        return True
+    verdict = outcome.score.verdict
+    return bool(outcome.score.collisions) if verdict is None else verdict.verdict is Ruling.VIOLATED
+
+
+def _folder(keep: str, records: str | os.PathLike[str] | None) -> Path | None:
+    if keep == "none" or records is None:
+        if (keep == "none") != (records is None):
+            raise InputError(
+                "records are kept in a folder",
+                file="--keep, --records",
+                value=(keep, records),
+                expected="both, or neither",
+            )
+        return None
+    folder = Path(records)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"can't hold records ({error.strerror})",
+            file=str(folder),
+            expected="a folder, or a place for one",
+        ) from None
+    return folder
+
+
+def _recorded(outcome: Outcome, controller: str | Maker, folder: Path) -> Outcome:
+    """Run a trial once more for its record."""
+    instance = outcome.instance
+    driver = controller if isinstance(controller, str) else controller()
+    result = run_trial(instance, driver, record=folder / f"trial-{instance.trial:04d}.mcap", overwrite=True)
+    return replace(outcome, ending=result.ending, score=result.score)

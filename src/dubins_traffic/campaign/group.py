@@ -1,0 +1,219 @@
+"""Trials that are stepped together: their tables, the compiled tick, and what came of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.agents.fleet import PAIRS, pack_agents
+from dubins_traffic.agents.lawful import pack_drivers
+from dubins_traffic.agents.tables import KEEP_RULES
+from dubins_traffic.agents.tables import workspace as agent_workspace
+from dubins_traffic.campaign.batch_kernel import (
+    COLLIDED,
+    COURSE,
+    ENDED,
+    ENDS,
+    FAULTY,
+    LAST,
+    LAWFUL,
+    NO_PAIRS,
+    NO_SIGHT,
+    OTHERS,
+    STATUS,
+    TICK,
+    Course,
+    World,
+    run_trials,
+)
+from dubins_traffic.cars.state import EGO, Contact, Labels, State
+from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
+from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
+from dubins_traffic.driving.rounds import nearest_stage, stages
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import End, Ending
+from dubins_traffic.scoring.outcome import score_of
+from dubins_traffic.scoring.score import Score
+from dubins_traffic.scoring.tally import new_tally
+from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
+from dubins_traffic.spec.docket import OF_TRIAL, Docket
+from dubins_traffic.spec.fault import with_fault_by
+from dubins_traffic.spec.judge import Breach, breach_of, running, terms_of
+from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.spec.tables import NET
+from dubins_traffic.trial.endings import agent_fault, collision_detail
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+FRAMES = 16
+"""For how many frames in which all goes wrong there is room in the docket."""
+WORK = 500_000
+"""Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a trial of a group."""
+
+    instance: Instance
+    ending: Ending
+    score: Score
+
+
+class Group:
+    """Some trials of one control rate on their way.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial; with the embedded simulator, without formulas of the user's and without remote cars.
+    keeps_rules : bool
+        Whether the controller `rules` drives the egos, compiled; else `commands` says what they do.
+
+    Attributes
+    ----------
+    state, labels : State, Labels
+        The present frame of each trial, (B, N).
+    commands : (B, N, 2)
+        Speed and yaw rate of each car; those of the egos may be written between the ticks.
+    endings : list of Ending or None
+        How each trial has ended, None while it runs.
+    """
+
+    def __init__(self, instances: Sequence[Instance], *, keeps_rules: bool) -> None:
+        self.instances = tuple(instances)
+        self._rate = instances[0].problem.rate
+        problems = [instance.problem for instance in instances]
+        simulator = Embedded()
+        self.state: State = simulator.reset(instances)
+        trials, places = self.state.x.shape
+        labeller = Labeller(instances)
+        labeller.begin(trials, places)
+        roads, beside, rules = labeller.tables
+        net = rules.whole[:, NET].copy()
+        cars, obstacles, rows, work = simulator.tables
+        terms = terms_of(problems)
+        docket = Docket.empty(trials, places, len(terms.goal))
+        docket = docket._replace(row=np.zeros((FRAMES * (10 * places + 8), docket.row.shape[1]), np.int64))
+        rounds = [stages(problem) for problem in problems] if keeps_rules else ()
+        segments = int(np.diff(roads.seg_off).max())
+        self._world = World(
+            self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
+            labeller.memory, docket, pack_drivers(instances, places, net, rounds), desk(places, segments),
+            pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
+            new_tally(instances, net, places), self._course(len(work.contact), len(docket.row)),
+        )  # fmt: skip
+        self.labels: Labels = labeller.labels
+        self.commands: Floats = np.zeros((trials, places, 2))
+        self.endings: list[Ending | None] = [None] * trials
+        self._going = np.ones(trials, dtype=bool)
+        self._contacts: list[list[Contact]] = [[] for _ in instances]
+        self._breaches: list[list[Breach]] = [[] for _ in instances]
+        self._run(self.active, 1)
+        self._aim()
+
+    @property
+    def ticks(self) -> Ints:
+        """The present frame of each trial, (B,)."""
+        return self._world.course.ints[:, TICK]
+
+    @property
+    def active(self) -> Ints:
+        """The trials that have not ended."""
+        return np.flatnonzero(self._going)
+
+    def advance(self, most: int = 1) -> None:
+        """Take each trial that has not ended up to `most` ticks farther."""
+        active = self.active
+        if len(active):
+            self._run(active, most)
+
+    def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
+        """Run all trials to their ends, about `WORK` steps of cars at a time; stop in between when `cancelled`."""
+        while len(active := self.active) and not cancelled():
+            self._run(active, max(1, WORK // (len(active) * self.state.x.shape[1])))
+
+    def end(self, b: int, end: End, detail: str = "") -> None:
+        """End trial b for a reason of its driver's."""
+        self.endings[b] = Ending(end, int(self.ticks[b]), detail)
+        self._going[b] = False
+
+    def outcome(self, b: int, controller: str, time_to_begin: float | None = None) -> Outcome:
+        """Return what came of trial b, which has ended."""
+        instance, ending, world = self.instances[b], self.endings[b], self._world
+        assert ending is not None
+        hanging = running(b, world.terms, world.docket)
+        score = score_of(
+            instance, b, world.tally, self._contacts[b], self._breaches[b], hanging, ending, controller,
+            time_to_begin,
+        )  # fmt: skip
+        return Outcome(instance, ending, score)
+
+    def _course(self, contacts: int, breaches: int) -> Course:
+        ints = np.zeros((len(self.instances), COURSE), dtype=np.int64)
+        ints[:, TICK] = -1
+        for b, instance in enumerate(self.instances):
+            kinds = {agent.kind for agent in instance.e_agents}
+            others = not kinds <= KEEP_RULES | {REMOTE}
+            ints[b, [LAST, OTHERS, ENDS]] = max(1, instance.ticks), others, instance.end_on_collision
+        radii = np.array([instance.problem.sensing_radius for instance in self.instances])
+        places = np.zeros((breaches, 2))
+        return Course(ints, radii * radii, np.zeros((contacts, 3), dtype=np.int64), places)
+
+    def _aim(self) -> None:
+        """Let the egos that keep the rules begin with the goal nearest to where they start."""
+        world = self._world
+        drivers, labels = world.drivers, world.labels
+        world.course.ints[:, LAWFUL] = drivers.active
+        for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
+            own = drivers.ints[b, EGO]
+            far = drivers.distance[own[FIRST] : own[LAST_STAGE]]
+            lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
+            own[PLACE] = own[FIRST] + nearest_stage(far, lane, segment)
+
+    def _run(self, active: Ints, most: int) -> None:
+        goal = self.ticks[active] + most
+        while len(active):
+            left = int((goal - self.ticks[active]).max())
+            run_trials(active, left, 1.0 / self._rate, self.commands, self._world)
+            self._drain()
+            self._mind(active)
+            going = self._going[active] & (self.ticks[active] < goal)
+            active, goal = active[going], goal[going]
+
+    def _mind(self, active: Ints) -> None:
+        """Enlarge what was too small, and write down how trials ended."""
+        status = self._world.course.ints[active, STATUS]
+        if (status == NO_PAIRS).any():
+            self._world = self._world._replace(work=enlarged(self._world.work))
+        if (status == NO_SIGHT).any():
+            room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
+            self._world = self._world._replace(space=self._world.space._replace(pair=room))
+        numbers: list[int] = active.tolist()
+        for b, why in zip(numbers, status.tolist(), strict=True):
+            if why == ENDED:
+                self.end(b, End.DURATION)
+            elif why == FAULTY:
+                self.end(b, End.AGENT_FAULT, agent_fault(self.instances[b], self.commands[b]))
+            elif why == COLLIDED:
+                tick = int(self.ticks[b])
+                mine = [own for own in self._contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
+                self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))
+
+    def _drain(self) -> None:
+        """Take over the contacts and breaches that have been found, and make room."""
+        world = self._world
+        found, filled = int(world.work.found[0]), int(world.docket.filled[0])
+        notes = zip(world.work.contact[:found].tolist(), world.course.contact[:found].tolist(), strict=True)
+        for row, (tick, own, other) in notes:
+            contact = contact_of(row, tick, self._rate)
+            self._contacts[int(row[0])].append(with_fault_by(contact, own, other))
+        rows: list[list[int]] = world.docket.row[:filled].tolist()
+        for row, (x, y) in zip(rows, world.course.place[:filled].tolist(), strict=True):
+            self._breaches[row[OF_TRIAL]].append(breach_of(row, x, y))
+        world.work.found[0] = world.docket.filled[0] = 0

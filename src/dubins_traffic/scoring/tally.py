@@ -1,0 +1,310 @@
+"""The metrics of a batch, counted tick by tick in one compiled pass: the numbers that the sinks find in frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.propositions import LEFT, ON_ROAD
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+NET, GOALS, STANDING, OFF_ROAD, DEPARTURES, COLLIDED, OFF_SINCE, OFF_TICKS, SAMPLED, ROUNDS, SEALED = range(
+    11
+)
+INTS = 11
+"""Columns of `Tally.ints`.
+
+NET: the trial's network. GOALS: how many goals it has. STANDING, OFF_ROAD, DEPARTURES: ticks and frames that
+`scoring.driving` counts. COLLIDED, OFF_SINCE (-1: on the road), OFF_TICKS, SAMPLED: what `scoring.icra2016` counts, its
+rounds last. ROUNDS: by visits. SEALED: 1 once the ego has broken a rule, from when on `Tally.sensed` stays as it is.
+"""
+
+DISTANCE, CLEARANCE, STILL, RADIUS, SIGHT2 = range(5)
+FLOATS = 5
+"""Columns of `Tally.floats`: metres driven, smallest gap so far; how far a car that stands moves in a tick at most, the
+goals' radius, the square of the sensing radius."""
+
+VERTEX, SAMPLE_DONE, VISIT_DONE, INSIDE, VISITS, LAST_VISIT, GAP = range(7)
+GOAL_INTS = 7
+"""Columns of `Tally.goal`: the goal's vertex, whether it is done in the present round of samples, and of visits,
+whether the ego is inside its disc, visits, tick of the last one (0 before the first), longest gap between them."""
+
+
+class Tally(NamedTuple):
+    """What is counted of each trial.
+
+    `ints` (B, INTS), `floats` (B, FLOATS); `goal_off` (B,) and `goal` (G, GOAL_INTS): the goals of trial b from row
+    goal_off[b] on, each once; `counts` (B, N): 1 for the e-agents that count in the score of 2016; `sensed` (B, N): the
+    last tick at which the car was within the ego's sensing radius, -1 before; `before` (B, N, 2): where the cars were
+    in the frame before; `left` (B,): whether the ego was left there.
+    """
+
+    ints: Ints
+    floats: Floats
+    goal_off: Ints
+    goal: Ints
+    counts: Ints
+    sensed: Ints
+    before: Floats
+    left: Ints
+
+
+def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
+    """Return the tally of a batch of instances, whose networks have the numbers `nets`, before the first frame."""
+    trials = len(instances)
+    ints = np.zeros((trials, INTS), dtype=np.int64)
+    floats = np.zeros((trials, FLOATS))
+    ints[:, OFF_SINCE] = -1
+    ints[:, NET] = nets
+    floats[:, CLEARANCE] = np.inf
+    counts = np.zeros((trials, cars), dtype=np.int64)
+    offsets = np.zeros(trials, dtype=np.int64)
+    goals: list[int] = []
+    for b, instance in enumerate(instances):
+        problem = instance.problem
+        still = RuleParameters.from_mapping(problem.rules).still_speed / problem.rate
+        sight2 = problem.sensing_radius * problem.sensing_radius
+        floats[b, [STILL, RADIUS, SIGHT2]] = still, problem.intersection_radius, sight2
+        for n, agent in enumerate(instance.e_agents, start=1):
+            counts[b, n] = agent.name.startswith("agent")
+        own = dict.fromkeys(problem.goal_vertices)
+        offsets[b] = len(goals)
+        ints[b, GOALS] = len(own)
+        goals += own
+    goal = np.zeros((len(goals), GOAL_INTS), dtype=np.int64)
+    goal[:, VERTEX] = goals
+    sensed = np.full((trials, cars), -1, dtype=np.int64)
+    return Tally(
+        ints,
+        floats,
+        offsets,
+        goal,
+        counts,
+        sensed,
+        np.zeros((trials, cars, 2)),
+        np.zeros(trials, dtype=np.int64),
+    )
+
+
+@jit_inner
+def count_frame(
+    b: int, tick: int, state: State, labels: Labels, roads: RoadTable, cars: CarTable, obstacles: ObstacleTable,
+    tally: Tally,
+) -> None:  # fmt: skip
+    """Count frame `tick` of trial b."""
+    floats = tally.floats[b]
+    ints = tally.ints[b]
+    x, y = state.x[b, EGO], state.y[b, EGO]
+    bits = np.int64(labels.bits[b, EGO])
+    left = 1 if bits & LEFT != 0 else 0
+    if tick > 0:
+        moved = _moved(b, EGO, state, tally)
+        floats[DISTANCE] += moved
+        ints[STANDING] += 0 if moved >= floats[STILL] else 1
+        ints[OFF_ROAD] += 1 if bits & ON_ROAD == 0 else 0
+        if left > tally.left[b] and _others_move(b, state, tally):
+            ints[DEPARTURES] += 1
+    tally.left[b] = left
+    _look_at_cars(b, tick, state, cars, tally)
+    if obstacles.off[b] != obstacles.off[b + 1]:
+        _look_at_obstacles(b, state, cars, obstacles, floats)
+    _count_goals(b, tick, x, y, roads, tally)
+    on = _on_2016(ints[NET], labels.segment[b, EGO], x, y, roads)
+    if on == (ints[OFF_SINCE] >= 0):
+        if on:
+            ints[OFF_TICKS] += tick - ints[OFF_SINCE]
+        ints[OFF_SINCE] = -1 if on else tick
+    for n in range(state.count[b]):
+        tally.before[b, n, 0] = state.x[b, n]
+        tally.before[b, n, 1] = state.y[b, n]
+
+
+@jit_inline
+def _moved(b: int, n: int, state: State, tally: Tally) -> float:
+    dx = state.x[b, n] - tally.before[b, n, 0]
+    dy = state.y[b, n] - tally.before[b, n, 1]
+    return sqrt(dx * dx + dy * dy)
+
+
+@jit
+def _others_move(b: int, state: State, tally: Tally) -> bool:
+    moves = 0
+    for n in range(1, state.count[b]):
+        moves += 1 if _moved(b, n, state, tally) >= tally.floats[b, STILL] else 0
+    return moves > 0
+
+
+@jit_inline
+def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally) -> None:
+    """Keep the smallest gap to the cars, who was sensed when, and whether anyone came too near by the rules of 2016."""
+    floats = tally.floats[b]
+    ints = tally.ints[b]
+    x, y = state.x[b, EGO], state.y[b, EGO]
+    reach = floats[CLEARANCE] + 2.0 * cars.reach[b] + 1e-9
+    near2 = max(reach * reach, 2.0 * COLLISION_DISTANCE * COLLISION_DISTANCE)
+    sight2 = floats[SIGHT2] if ints[SEALED] == 0 else -1.0
+    for n in range(1, state.count[b]):
+        dx = state.x[b, n] - x
+        dy = state.y[b, n] - y
+        d2 = dx * dx + dy * dy
+        if d2 <= sight2:
+            tally.sensed[b, n] = tick
+        if d2 <= near2:
+            if tally.counts[b, n] != 0 and sqrt(d2) < COLLISION_DISTANCE:
+                ints[COLLIDED] = 1
+            if floats[CLEARANCE] > 0.0:
+                gap = _car_gap(b, n, state, cars)
+                floats[CLEARANCE] = min(floats[CLEARANCE], gap)
+
+
+@jit
+def _car_gap(b: int, n: int, state: State, cars: CarTable) -> float:
+    half_length, half_width = cars.half_length[b], cars.half_width[b]
+    apart = box_gap(
+        state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO], half_length, half_width,
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], half_length, half_width,
+    )  # fmt: skip
+    return apart - 2.0 * cars.rounding[b]
+
+
+@jit
+def _look_at_obstacles(
+    b: int, state: State, cars: CarTable, obstacles: ObstacleTable, floats: Floats
+) -> None:
+    """Keep the smallest gap to the obstacles."""
+    x, y = state.x[b, EGO], state.y[b, EGO]
+    for k in range(obstacles.off[b], obstacles.off[b + 1]):
+        p = obstacles.part[k]
+        dx = p[0] - x
+        dy = p[1] - y
+        far = floats[CLEARANCE] + cars.reach[b] + p[7] + 1e-9
+        if floats[CLEARANCE] > 0.0 and dx * dx + dy * dy <= far * far:
+            apart = box_gap(
+                x, y, state.c[b, EGO], state.s[b, EGO], cars.half_length[b], cars.half_width[b],
+                p[0], p[1], p[2], p[3], p[4], p[5],
+            )  # fmt: skip
+            floats[CLEARANCE] = min(floats[CLEARANCE], apart - cars.rounding[b] - p[6])
+
+
+@jit
+def box_gap(
+    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
+    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
+) -> float:  # fmt: skip
+    """Return the distance between two oriented boxes, 0 where they overlap, as `scoring.clearance.box_distance` does.
+
+    A box is its centre, the cosine and sine of its heading, its half length and half width.
+    """
+    if _overlap(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width):
+        return 0.0
+    return min(
+        _corners_to_box(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width),
+        _corners_to_box(bx, by, bc, bz, b_length, b_width, ax, ay, ac, az, a_length, a_width),
+    )
+
+
+@jit
+def _corners_to_box(
+    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
+    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
+) -> float:  # fmt: skip
+    best = 1e300
+    for k in range(4):
+        along = a_length if k < 2 else -a_length
+        across = a_width if k % 2 == 0 else -a_width
+        x = ax + ac * along - az * across - bx
+        y = ay + az * along + ac * across - by
+        dx = max(abs(bc * x + bz * y) - b_length, 0.0)
+        dy = max(abs(bc * y - bz * x) - b_width, 0.0)
+        best = min(best, sqrt(dx * dx + dy * dy))
+    return best
+
+
+@jit
+def _overlap(
+    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
+    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
+) -> bool:  # fmt: skip
+    """Tell whether no side of either box separates them."""
+    x = bx - ax
+    y = by - ay
+    c = abs(ac * bc + az * bz)
+    s = abs(ac * bz - az * bc)
+    return (
+        abs(ac * x + az * y) <= a_length + c * b_length + s * b_width
+        and abs(ac * y - az * x) <= a_width + s * b_length + c * b_width
+        and abs(bc * x + bz * y) <= b_length + c * a_length + s * a_width
+        and abs(bc * y - bz * x) <= b_width + s * a_length + c * a_width
+    )
+
+
+@jit_inline
+def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally: Tally) -> None:
+    """Count samples inside the goals' discs, visits, and rounds of both."""
+    ints = tally.ints[b]
+    first = tally.goal_off[b]
+    last = first + ints[GOALS]
+    offset = roads.vert_off[ints[NET]]
+    radius = tally.floats[b, RADIUS]
+    some = False
+    for g in range(first, last):
+        goal = tally.goal[g]
+        dx = x - roads.vert[offset + goal[VERTEX], 0]
+        dy = y - roads.vert[offset + goal[VERTEX], 1]
+        inside = 1 if sqrt(dx * dx + dy * dy) < radius else 0
+        if inside > 0:
+            some = True
+            goal[SAMPLE_DONE] = 1
+            if goal[INSIDE] == 0:
+                goal[VISIT_DONE] = 1
+                goal[VISITS] += 1
+                goal[GAP] = max(goal[GAP], tick - goal[LAST_VISIT])
+                goal[LAST_VISIT] = tick
+        goal[INSIDE] = inside
+    if some:
+        ints[SAMPLED] += _round(tally.goal, first, last, SAMPLE_DONE)
+        ints[ROUNDS] += _round(tally.goal, first, last, VISIT_DONE)
+
+
+@jit_inline
+def _round(goal: Ints, first: int, last: int, column: int) -> int:
+    """Return 1 if all goals are done, which are then to do again, else 0."""
+    done = 1
+    for g in range(first, last):
+        done &= goal[g, column]
+    if done == 1:
+        for g in range(first, last):
+            goal[g, column] = 0
+    return done
+
+
+@jit_inline
+def _on_2016(net: int, segment: int, x: float, y: float, roads: RoadTable) -> bool:
+    """Tell whether a point is on the road of 2016: on the nearest segment, or on any."""
+    first = roads.seg_off[net]
+    on = _on_segment(first + segment, x, y, roads)
+    if not on:
+        for k in range(first, roads.seg_off[net + 1]):
+            on = on or _on_segment(k, x, y, roads)
+    return on
+
+
+@jit_inline
+def _on_segment(k: int, x: float, y: float, roads: RoadTable) -> bool:
+    rx = x - roads.seg[k, 0]
+    ry = y - roads.seg[k, 1]
+    along = rx * roads.seg[k, 2] + ry * roads.seg[k, 3]
+    beside = rx * roads.seg[k, 3] - ry * roads.seg[k, 2]
+    return along >= 0.0 and along <= roads.seg[k, 4] and abs(beside) <= ROAD_HALF_WIDTH

@@ -1,0 +1,214 @@
+"""A batch gives the scores and verdicts of its trials run one by one, bit for bit."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from dubins_traffic.campaign.asked import BatchView, ask
+from dubins_traffic.campaign.batch import failed, outcomes, run_batch
+from dubins_traffic.campaign.group import Group
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Problem
+from dubins_traffic.protocols import End
+from dubins_traffic.record.reader import read
+from dubins_traffic.scoring.score import Score, score
+
+SEED = 5
+AGENTS = [
+    {"type": "lawful", "name": "agent", "count": 2},
+    {"type": "lawful", "name": "rogue", "parameters": {"rolls": 0.4, "left": 0.3, "tailgates": 0.5}},
+    {"type": "nemesis", "name": "nemesis"},
+    {"type": "wander", "name": "agent", "count": 2},
+    {"type": "loop", "name": "loop"},
+    {"type": "follow", "name": "agentf"},
+    {"type": "parked", "name": "parked", "parameters": {"vacates_after": 3.0}},
+]
+OWN_NETWORKS = {"random": {"intersections": [5, 14], "segments": [6, 18]}}
+GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
+
+
+def configuration(**more: Any) -> Configuration:
+    document = {
+        "version": 1,
+        "problem_domain": "dubins_traffic",
+        "network": GRID,
+        "rules": {},
+        "e-agents": AGENTS,
+        "number_trials": 5,
+        "number_goals_bounds": [1, 3],
+        "duration_bounds": [5, 9],
+        **more,
+    }
+    return load_config(document)
+
+
+def plain(found: Score) -> Mapping[str, Any]:
+    """Return what of a score is no matter of clocks and places."""
+    return {
+        name: value
+        for name, value in found.to_json().items()
+        if name not in ("time_to_begin_s", "record", "controller")
+    }
+
+
+@pytest.mark.parametrize("controller", ["rules", "simple", "lanes"])
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"rules": False, "end_on_collision": True},
+        {"disturbances": {"command_delay": 2, "command_loss": 0.2, "position_noise": 0.01}},
+        {"obstacles": [{"disc": {"x": 4.0, "y": 0.3, "radius": 0.2}}]},
+    ],
+    ids=["judged", "to-collision", "disturbed", "obstacle"],
+)
+def test_a_batch_equals_its_trials_one_by_one(controller, more) -> None:
+    config = configuration(**more)
+    found = run_batch(config, controller, seed=SEED, batch=3).outcomes
+    assert [own.instance.trial for own in found] == list(range(5))
+    for own in found:
+        single = run_trial(draw(config, SEED, own.instance.trial), controller)
+        assert own.ending == single.ending
+        assert plain(own.score) == plain(single.score)
+
+
+def test_networks_of_their_own_and_a_batch_of_any_size_and_threads() -> None:
+    agents = [{"type": "lawful", "name": "agent", "count": 3}]
+    config = configuration(network=OWN_NETWORKS, **{"e-agents": agents}, rules={"approach_distance": 0.6})
+    sheets = [
+        run_batch(config, trials=6, seed=SEED, batch=batch, threads=threads).sheet
+        for batch, threads in ((1, 1), (4, 2), (64, 1))
+    ]
+    assert sheets[0] == sheets[1] == sheets[2]
+    single = run_trial(draw(config, SEED, 4), "rules")
+    assert plain(sheets[0].trials[4]) == plain(single.score)
+
+
+class Wheel:
+    """Drives in a circle; by itself and for whole batches."""
+
+    views: ClassVar[list[BatchView]] = []
+
+    def start(self, problem: Problem) -> None:
+        self._speed = 0.1 * len(problem.goals)
+
+    def act(self, observation: Observation) -> Command:
+        return Command(self._speed + 0.01 * len(observation.others), 0.3)
+
+    def start_batch(self, trials, problems) -> None:
+        self._speeds = {**getattr(self, "_speeds", {})}
+        self._speeds |= {t: 0.1 * len(problem.goals) for t, problem in zip(trials, problems, strict=True)}
+
+    def act_batch(self, view: BatchView) -> np.ndarray:
+        self.views.append(view)
+        speed = np.array([self._speeds[t] for t in view.trial.tolist()])
+        return np.stack([speed + 0.01 * (view.seen.sum(axis=1) - 1), np.full(len(speed), 0.3)], axis=1)
+
+
+def test_a_vectorised_controller_gets_all_trials_at_once_and_those_that_end_are_replaced() -> None:
+    Wheel.views = []
+    config = configuration()
+    found = run_batch(config, Wheel, trials=5, seed=SEED, batch=3).outcomes
+    for own in found:
+        assert plain(own.score) == plain(run_trial(draw(config, SEED, own.instance.trial), Wheel()).score)
+    sizes = [len(view.trial) for view in Wheel.views]
+    assert max(sizes) == 3
+    ends = {own.instance.trial: own.instance.ticks for own in found}
+    first = min(ends[trial] for trial in range(3))
+    assert sizes[: first + 1] == [3] * (first + 1)
+    assert set(Wheel.views[first].trial.tolist()) - {0, 1, 2}
+    assert sum(sizes) == sum(ends.values())
+    view = Wheel.views[0]
+    assert np.isnan(view.state.x[~view.seen]).all()
+    assert (view.labels.lane[~view.seen] == -1).all()
+    assert np.isfinite(view.state.x[view.seen]).all()
+
+
+class Broken(Wheel):
+    def act_batch(self, view: BatchView) -> np.ndarray:
+        commands = super().act_batch(view)
+        commands[view.trial == 1] = np.nan
+        return commands if view.tick.max() < 20 else commands[:, :1]
+
+
+def test_a_fault_ends_the_trials_that_it_is_about() -> None:
+    found = run_batch(configuration(), Broken, trials=3, seed=SEED).outcomes
+    assert {own.ending.end for own in found} == {End.CONTROLLER_FAULT}
+    assert [own.ending.ticks for own in found] == [20, 0, 20]
+    assert "finite" in found[1].ending.detail
+    assert "(3, 2)" in found[0].ending.detail or "(2, 2)" in found[0].ending.detail
+
+
+class Quitter:
+    def start(self, problem: Problem) -> None:
+        self._ticks = 3 if len(problem.goals) > 1 else 6
+
+    def act(self, observation: Observation) -> Command | None:
+        if observation.tick == 5:
+            raise ValueError("enough")
+        return None if observation.tick == self._ticks else Command(0.2, 0.0)
+
+    def close(self) -> None:
+        raise RuntimeError("stuck")
+
+
+def test_plain_controllers_end_as_they_do_alone() -> None:
+    config = configuration()
+    for own in ask([draw(config, SEED, k) for k in range(5)], Quitter, "Quitter", 2):
+        assert own.ending == run_trial(draw(config, SEED, own.instance.trial), Quitter()).ending
+
+
+def test_records_are_those_of_single_trials(tmp_path) -> None:
+    config = configuration()
+    found = run_batch(config, seed=SEED, keep="sample:2", records=tmp_path / "some")
+    assert sorted(path.name for path in (tmp_path / "some").glob("*.mcap")) == [
+        "trial-0000.mcap",
+        "trial-0002.mcap",
+    ]
+    run_trial(draw(config, SEED, 2), "rules", record=tmp_path / "alone.mcap")
+    kept = tmp_path / "some" / "trial-0002.mcap"
+    assert kept.read_bytes() == (tmp_path / "alone.mcap").read_bytes()
+    assert found.outcomes[2].score.record == str(kept)
+    assert plain(score(read(str(kept)))) == plain(found.outcomes[2].score)
+    found = run_batch(config, "simple", seed=SEED, keep="failures", records=tmp_path / "failures")
+    wanted = [f"trial-{own.instance.trial:04d}.mcap" for own in found.outcomes if failed(own)]
+    assert len(wanted) > 0
+    assert sorted(path.name for path in (tmp_path / "failures").glob("*.mcap")) == wanted
+
+
+def test_what_is_wrong_is_refused() -> None:
+    config = configuration()
+    for wrong in ({"batch": 0}, {"trials": 0}, {"threads": 0}, {"keep": "some"}, {"keep": "all"}):
+        with pytest.raises(InputError):
+            run_batch(config, **wrong)
+    with pytest.raises(InputError, match="noise"):
+        list(
+            outcomes(
+                [draw(configuration(disturbances={"position_noise": 0.1}), 0, 0)],
+                Wheel,
+            )
+        )
+
+
+def test_room_for_pairs_contacts_and_breaches_is_found_when_it_is_needed(monkeypatch) -> None:
+    from dubins_traffic.campaign import group
+
+    config = configuration()
+    instances = [draw(config, SEED, k) for k in range(3)]
+
+    def results() -> list[Mapping[str, Any]]:
+        own = Group(instances, keeps_rules=True)
+        own.finish()
+        return [plain(own.outcome(b, "rules").score) for b in range(3)]
+
+    roomy = results()
+    monkeypatch.setattr(group, "PAIRS", 1)
+    monkeypatch.setattr(group, "FRAMES", 1)
+    monkeypatch.setattr(group, "WORK", 100)
+    assert results() == roomy
