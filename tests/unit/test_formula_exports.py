@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from random import Random
 
 import pytest
 
@@ -17,8 +18,18 @@ from dubins_traffic.spec.logic.exports import (
     tlsf,
     tulip,
 )
-from dubins_traffic.spec.logic.formula import FormulaError
+from dubins_traffic.spec.logic.formula import Formula, FormulaError, conj, implies
 from dubins_traffic.spec.logic.parse import parse
+from dubins_traffic.spec.logic.printer import (
+    ASCII,
+    SPIN,
+    Brackets,
+    Style,
+    written,
+    written_implication,
+    written_together,
+)
+from tests.formulas import drawn
 
 TASK = Specification(
     assumptions=tuple(
@@ -212,3 +223,22 @@ def test_sides_must_be_clear() -> None:
         Specification((), (parse("[] a"),), ("b",), ())
     with pytest.raises(FormulaError, match="both input and output: got 'a'"):
         Specification((), (), ("a",), ("a",))
+
+
+@pytest.mark.parametrize(
+    "style", [SPIN, ASCII, Style({}, Brackets.ALL)], ids=["spin", "ascii", "all brackets"]
+)
+def test_what_is_written_together_is_what_the_whole_formula_is(style: Style) -> None:
+    random = Random(4)
+
+    def side() -> tuple[Formula, ...]:
+        return tuple(
+            drawn(random, random.randint(0, 3), ("a", "b"), past=True, bounds=True)
+            for _ in range(random.randint(0, 3))
+        )
+
+    for _ in range(200):
+        left, right = side(), side()
+        assert written_together(left, style) == written(conj(*left), style)
+        whole = implies(conj(*left), conj(*right)) if left else conj(*right)
+        assert written_implication(left, right, style) == written(whole, style)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
@@ -139,14 +140,24 @@ def _told(spec: Specification, format: Format, period: float, source: str) -> st
         return write(spec, period)
     except FormulaError as error:
         refused = error
-    sides = [(formula, replace(spec, assumptions=(formula,), guarantees=())) for formula in spec.assumptions]
-    sides += [(formula, replace(spec, assumptions=(), guarantees=(formula,))) for formula in spec.guarantees]
-    for formula, alone in sides:
+    for formula, alone in _parts(spec):
         try:
             write(alone, period)
         except FormulaError as error:
             raise _refusal(error, formula, format, source) from None
     raise refused.within(file=source, field=f"--format {format}")
+
+
+def _parts(spec: Specification) -> Iterator[tuple[Formula, Specification]]:
+    """Yield each formula of a specification, and a specification of it alone."""
+    from dubins_traffic.spec.logic.formula import propositions
+
+    outputs = set(spec.outputs)
+    for place, formula in enumerate((*spec.assumptions, *spec.guarantees)):
+        names = propositions(formula)
+        sides = ((formula,), ()) if place < len(spec.assumptions) else ((), (formula,))
+        inputs = tuple(name for name in names if name not in outputs)
+        yield formula, type(spec)(*sides, inputs, tuple(name for name in names if name in outputs))
 
 
 def _refusal(error: FormulaError, formula: Formula, format: Format, source: str) -> InputError:
