@@ -23,6 +23,7 @@ __all__ = [
     "End",
     "Ending",
     "Mailbox",
+    "Polled",
     "Simulator",
     "Sink",
     "Streams",
@@ -214,6 +215,18 @@ class Streams(Protocol):
 
     def stream(self, view: View) -> None:
         """Send the world as it is between two frames: `view.time` and `view.state` lie between those of ticks."""
+        ...
+
+
+@runtime_checkable
+class Polled(Protocol):
+    """A transport without threads of its own: what has come is taken by the trial's thread when it waits.
+
+    Handing a message over from another thread would cost about as much as a whole exchange of messages.
+    """
+
+    def receive(self, seconds: float) -> None:
+        """Wait for a message, so long at most, and hand all that have come to the mailbox."""
         ...
 
 
