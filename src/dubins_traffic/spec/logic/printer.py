@@ -104,7 +104,7 @@ def written_together(formulas: Sequence[Formula], style: Style) -> str:
 
 
 def written_implication(left: Sequence[Formula], right: Sequence[Formula], style: Style) -> str:
-    """Return that the conjunction of `left` implies that of `right`, spelled in a style; the latter if `left` is empty."""
+    """Return that the conjunction of `left` implies that of `right`, in a style; only the latter if `left` is empty."""
     sides = [_together(formulas, style) for formulas in (left, right)]
     if not left:
         return sides[1][1]
