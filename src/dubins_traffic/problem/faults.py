@@ -58,15 +58,15 @@ class Careful(Open):
 
     @model_validator(mode="before")
     @classmethod
-    def _spelt(cls, document: Any) -> Any:
+    def _spelt(cls, document: object) -> object:
         if isinstance(document, dict):
-            keys = cast(dict[Any, Any], document)
+            keys = cast(dict[object, object], document)
             known = [info.alias or name for name, info in cls.model_fields.items()]
             for key, value in keys.items():
                 near = get_close_matches(str(key), known, n=1, cutoff=ALIKE)
                 if near and key not in known and near[0] not in keys:
                     raise fault("unknown key", f"{near[0]}, or a key less like it", str(key), value)
-        return document
+        return cast(object, document)
 
 
 def fault(problem: str, expected: str, field: str = "", value: object = None) -> PydanticCustomError:
