@@ -94,7 +94,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     with ProcessPoolExecutor(
         min(workers, len(jobs)), mp_context=context, initializer=_begin, initargs=(cancelled,)
     ) as pool:
-        with _deaf_to_interrupts():
+        with deaf_to_interrupts():
             pending = {pool.submit(_run, job) for job in jobs}
         try:
             while pending:
@@ -108,7 +108,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Generator[None]:
+def deaf_to_interrupts() -> Generator[None]:
     """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

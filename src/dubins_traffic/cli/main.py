@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import (
+    campaign,
     check,
     convert,
     faults,
@@ -17,6 +18,7 @@ from dubins_traffic.cli import (
     network,
     plot,
     replay,
+    ros1,
     run,
     score,
     spec,
@@ -62,6 +64,8 @@ app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
+app.add_typer(campaign.campaign, name="campaign")
+app.add_typer(ros1.app, name="ros1")
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -89,6 +87,7 @@ def run(
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
     from dubins_traffic.campaign.many import run_trials
     from dubins_traffic.campaign.plan import plan
+    from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
 
     if data is not None and data_over is not None:
@@ -107,10 +106,10 @@ def run(
     )
     results: list[Result] = []
     try:
-        with _progress(len(todo.jobs)) as advance:
+        with progress(len(todo.jobs)) as tell:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
-                advance()
+                tell(len(results), len(todo.jobs))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
         raise
@@ -123,16 +122,3 @@ def run(
         faults.tell(f"trial {result.instance.trial}: {ending.end}: {ending.detail}")
     if failed:
         raise typer.Exit(faults.FAILED)
-
-
-@contextmanager
-def _progress(trials: int) -> Generator[Callable[[], object]]:
-    """Show how many of the trials are done, on standard error and only to people."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (SpinnerColumn(), "trials", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("trials", total=trials)
-        yield lambda: progress.advance(task)
