@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from dubins_traffic.cars.state import Command, Contact, Labels, Observation, State
+from dubins_traffic.cars.state import Command, Contact, Labels, Observation, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import End, Ending, Sink
@@ -159,6 +159,10 @@ class Mailbox(Protocol):
 
     def pause(self, paused: bool) -> None:
         """Let simulated time stand still, or go on."""
+        ...
+
+    def place(self, car: str, pose: Pose) -> None:
+        """Put `car` there, if no trial runs; a running trial lets nobody move cars but their drivers."""
         ...
 
 

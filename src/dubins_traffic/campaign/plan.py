@@ -113,8 +113,8 @@ def plan(
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if jobs and jobs[0].instance is not None:
         _check_simulator(os.fspath(source), jobs[0].instance.simulator)
-    target = None if data is None else _data_file(Path(data), overwrite_data)
-    folder = None if records is None else _folder(Path(records))
+    target = None if data is None else check_data_file(Path(data), overwrite_data)
+    folder = None if records is None else check_folder(Path(records))
     several = [(job, f"-{run:04d}" if repeat > 1 else "") for job in jobs for run in range(repeat)]
     return Plan(
         tuple(_complete(job, suffix, folder, deadline) for job, suffix in several), configuration, target
@@ -166,7 +166,8 @@ def _check_deadline(deadline: float | None) -> None:
         raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
 
 
-def _data_file(path: Path, overwrite: bool) -> Path:
+def check_data_file(path: Path, overwrite: bool) -> Path:
+    """Return `path` if a file can be written there; InputError if not, or if one exists and may not be replaced."""
     if path.exists() and not overwrite:
         raise InputError("exists", file=str(path), expected="a new file; -F overwrites")
     if path.is_dir() or not path.parent.is_dir():
@@ -175,7 +176,8 @@ def _data_file(path: Path, overwrite: bool) -> Path:
     return path
 
 
-def _folder(folder: Path) -> Path:
+def check_folder(folder: Path) -> Path:
+    """Return `folder`, made if missing; InputError if that can't be."""
     expected = "a folder, or a place for one"
     try:
         folder.mkdir(parents=True, exist_ok=True)

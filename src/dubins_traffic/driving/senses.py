@@ -69,7 +69,7 @@ class Senses:
                 noise.position_noise, noise.heading_noise,
             )  # fmt: skip
         if self._laser is not None:
-            self._sweep(tick, state)
+            self._sweep(tick, state, self._laser)
         reals = self._reals[:count].tolist()
         wholes = self._wholes[:count].tolist()
         own, labelled = reals[0], wholes[0]
@@ -90,23 +90,34 @@ class Senses:
             SensedCar, (self._names[index], index, pose, twist, self._body, new(Propositions, whole[1:]))
         )
 
-    def _sweep(self, tick: int, state: State) -> None:
-        """Scan when the laser's next sweep is due; in between the last scan stays."""
+    def sweep(self, state: State) -> Floats:
+        """Return the ranges of a laser sweep in `state`, (rays,), metres, from right to left.
+
+        Raises
+        ------
+        ValueError
+            If there is no laser.
+        """
         laser = self._laser
-        assert laser is not None
-        sweep = int(tick * laser.rate / self._rate + 1e-9)
-        if sweep > self._latest:
-            self._latest = sweep
-            ranges = np.zeros(laser.rays)
-            scan(
-                state,
-                0,
-                self._car,
-                self._cars,
-                self._obstacles,
-                self._rays,
-                laser.range_min,
-                laser.range_max,
-                ranges,
-            )
-            self._scan = ranges
+        if laser is None:
+            raise ValueError("no laser")
+        ranges = np.zeros(laser.rays)
+        scan(
+            state,
+            0,
+            self._car,
+            self._cars,
+            self._obstacles,
+            self._rays,
+            laser.range_min,
+            laser.range_max,
+            ranges,
+        )
+        return ranges
+
+    def _sweep(self, tick: int, state: State, laser: Laser) -> None:
+        """Scan when the laser's next sweep is due; in between the last scan stays."""
+        number = int(tick * laser.rate / self._rate + 1e-9)
+        if number > self._latest:
+            self._latest = number
+            self._scan = self.sweep(state)
