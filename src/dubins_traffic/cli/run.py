@@ -17,8 +17,9 @@ EXAMPLES = options.examples(
     "run demo --controller simple --trials 20 --jobs 2 --records out",
     "run my-trials.json --controller my_controller.py:MyController -f data.json",
     "run out/trial-0003.mcap --controller simple --json",
+    "run demo --simulator gazebo --records out",
 )
-FAULTS = ("controller_fault", "agent_fault", "deadline")
+FAULTS = ("controller_fault", "agent_fault", "deadline", "world_lost")
 """Ends of a trial that make the exit status 1."""
 
 
@@ -82,6 +83,19 @@ def run(
             "--deadline", metavar="SECONDS", help="End a trial whose controller takes longer to act."
         ),
     ] = None,
+    simulator: Annotated[
+        str | None,
+        typer.Option(
+            "--simulator",
+            metavar="S",
+            help="What moves the cars; `list simulators` names them.",
+            show_default="as the source says",
+            autocompletion=options.simulators,
+        ),
+    ] = None,
+    gui: Annotated[
+        bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
@@ -103,6 +117,8 @@ def run(
         overwrite_data=data is None,
         records=records,
         deadline=deadline,
+        simulator=simulator,
+        show=gui,
     )
     results: list[Result] = []
     try:
