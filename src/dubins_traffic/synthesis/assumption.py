@@ -73,10 +73,10 @@ class Assumption:
         found = NOTHING
         seen: set[str] = set()
         for word in words:
-            name = word.strip().upper()
-            if name not in WORDS:
+            name = _NAMES.get(word.strip().lower())
+            if name is None:
                 raise InputError("not an assumption", field="--assume", value=word, expected=_known())
-            part = name.partition(":")[0]
+            part = part_of(name)
             if part in seen:
                 raise InputError("assumed twice", field="--assume", value=part, expected="each part once")
             seen.add(part)
@@ -101,16 +101,24 @@ NOTHING: Final = Assumption(Order.IGNORED, False, False, Forfeits.NEVER, False, 
 
 WORDS: Final[Mapping[str, Mapping[str, Any]]] = {
     "E1": {"order": Order.KEPT},
-    "E1:ANY-ORDER": {"order": Order.NONE},
+    "E1:any-order": {"order": Order.NONE},
     "E2": {"yields": True},
     "E3": {"enters": True, "forfeits": Forfeits.NEVER},
-    "E3:ONE-FORFEIT": {"enters": True, "forfeits": Forfeits.ONCE},
-    "E3:FORFEITS": {"enters": True, "forfeits": Forfeits.ALWAYS},
+    "E3:one-forfeit": {"enters": True, "forfeits": Forfeits.ONCE},
+    "E3:forfeits": {"enters": True, "forfeits": Forfeits.ALWAYS},
     "E4": {"leaves": True},
     "E5": {"arrives": True},
     "E6": {"frees": True},
 }
 """What each word assumes."""
+
+
+_NAMES: Final = {word.lower(): word for word in WORDS}
+
+
+def part_of(word: str) -> str:
+    """Return which of E1 to E6 a word is about."""
+    return word.partition(":")[0]
 
 
 def _known() -> str:

@@ -16,6 +16,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.synthesis.arrays import Flags, Numbers
 from dubins_traffic.synthesis.game import Game
+from dubins_traffic.synthesis.search import NO_DEBT
 from dubins_traffic.synthesis.solver import Ranks
 
 LOST = np.int32(2**31 - 1)
@@ -68,13 +69,13 @@ def _astray(game: Game, ranks: Ranks, best: Numbers) -> Flags:
     count = game.positions
     held = ranks.rank > 0
     layer = np.where(held, ranks.rank, 0)
-    below = np.where(held, ranks.start[layer], LOST)
-    debt = np.where(held, ranks.debt[layer], np.int16(-1))
+    below = np.where(held, np.append(ranks.start, LOST)[layer], LOST)
+    debt = np.where(held, np.append(ranks.debt, NO_DEBT)[layer], NO_DEBT).astype(np.int16)
     owner = np.repeat(np.arange(count), np.diff(game.owed_at))
     owing = np.zeros(count, dtype=np.bool_)
     owing[owner[game.owed == debt[owner]]] = True
     after = np.searchsorted(ranks.start, ranks.start, side="right").astype(np.int32)
-    bound = np.where(owing, after[layer], below)
+    bound = np.where(owing, np.append(after, LOST)[layer], below)
     worst = np.maximum.reduceat(best[game.to], game.to_at[:-1])
     return held & (worst >= bound)
 
