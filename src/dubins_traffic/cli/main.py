@@ -13,7 +13,9 @@ from dubins_traffic.cli import (
     check,
     convert,
     faults,
+    gazebo,
     instance,
+    lcm,
     listing,
     network,
     plot,
@@ -22,6 +24,7 @@ from dubins_traffic.cli import (
     run,
     score,
     spec,
+    synth,
 )
 
 app = typer.Typer(
@@ -61,11 +64,14 @@ app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
+app.command("synth", epilog=synth.EXAMPLES)(synth.synth)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
 app.add_typer(ros1.app, name="ros1")
+app.add_typer(gazebo.app, name="gazebo")
+app.add_typer(lcm.app, name="lcm")
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 
