@@ -1,6 +1,6 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single`, `startup`, `judging` and `monitors` take about a minute; `lanes` runs 400 trials and
+`motion`, `single`, `startup`, `judging`, `monitors` and `lcm` take about a minute; `lanes` runs 400 trials and
 `rules` 1,400, which takes some minutes each.
 """
 
@@ -11,7 +11,7 @@ import sys
 
 from benchmarks.table import show
 
-NAMES = ("motion", "single", "startup", "judging", "monitors", "lanes", "rules")
+NAMES = ("motion", "single", "startup", "judging", "monitors", "lanes", "rules", "lcm")
 
 
 def main(names: list[str]) -> int:

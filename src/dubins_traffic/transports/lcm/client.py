@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from select import select
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -119,7 +120,8 @@ class Driver:
 
     def _receive(self, seconds: float) -> None:
         """Wait for a message and take all that have come, so that the newest state is acted on."""
-        self._silent = not self._lcm.handle_timeout(max(1, int(seconds * 1e3)))
+        arrived, _, _ = select([self._lcm.fileno()], [], [], seconds)
+        self._silent = not arrived
         while self._lcm.handle_timeout(0) > 0:
             pass
 

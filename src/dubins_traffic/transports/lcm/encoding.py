@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -54,8 +54,10 @@ def problem_from_message(message: instance_t) -> Problem:
 def observation_from_message(message: state_t, problem: Problem) -> Observation:
     """Return the observation, equal to the one that was sent."""
     body = problem.car.body
-    own, others = message.own, cast("list[car_t]", message.others)
-    scan = cast("list[float]", message.scan)
+    generated: Any = message
+    own: car_t = message.own
+    others: list[car_t] = generated.others
+    scan: tuple[float, ...] = generated.scan
     return Observation(
         message.tick,
         message.time,
