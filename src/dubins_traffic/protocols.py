@@ -24,6 +24,7 @@ __all__ = [
     "Ending",
     "Mailbox",
     "Polled",
+    "Scans",
     "Simulator",
     "Sink",
     "Streams",
@@ -60,6 +61,18 @@ class Simulator(Protocol):
 
     def close(self) -> None:
         """Free what the simulator holds."""
+        ...
+
+
+@runtime_checkable
+class Scans(Protocol):
+    """A simulator with lasers of its own; for others, laser ranges are worked out from the state."""
+
+    def scan(self, car: int, rays: Floats, longest: float) -> Floats:
+        """Return how far each ray goes before it meets a body: (R,), metres, `longest` where it meets none.
+
+        `rays` (R, 2) are unit vectors in the frame of `car`, from its centre; no ray meets that car.
+        """
         ...
 
 

@@ -15,6 +15,7 @@ from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Laser
+    from dubins_traffic.protocols import Scans
 
 
 new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknownMemberType]
@@ -34,13 +35,21 @@ class Senses:
         From where other cars are seen, metres; by default the problem's sensing radius.
     laser : Laser, optional
         Instead of the problem's laser.
+    scanner : Scans, optional
+        Finds what the laser's rays meet; by default that is worked out from the state.
     """
 
     def __init__(
-        self, instance: Instance, car: int = EGO, radius: float | None = None, laser: Laser | None = None
+        self,
+        instance: Instance,
+        car: int = EGO,
+        radius: float | None = None,
+        laser: Laser | None = None,
+        scanner: Scans | None = None,
     ) -> None:
         problem = instance.problem
         self._car = car
+        self._scanner = scanner
         self._instance = instance
         self._names = instance.names
         self._body = problem.car.body
@@ -101,6 +110,8 @@ class Senses:
         laser = self._laser
         if laser is None:
             raise ValueError("no laser")
+        if self._scanner is not None:
+            return _cut(self._scanner.scan(self._car, self._rays, laser.range_max), laser)
         ranges = np.zeros(laser.rays)
         scan(
             state,
@@ -121,3 +132,9 @@ class Senses:
         if number > self._latest:
             self._latest = number
             self._scan = self.sweep(state)
+
+
+def _cut(ranges: Floats, laser: Laser) -> Floats:
+    """Return ranges with those beyond the laser's as REP 117 of ROS says (see `cars.sensing.scan`)."""
+    far = np.where(ranges >= laser.range_max, np.inf, ranges)
+    return np.where(ranges < laser.range_min, -np.inf, far)

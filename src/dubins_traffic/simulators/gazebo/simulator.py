@@ -135,6 +135,11 @@ class Gazebo:
         contacts = self._take(answer)
         return [self._contacts.collect(self._tick, contacts, self.state)]
 
+    def scan(self, car: int, rays: Floats, longest: float) -> Floats:
+        """Return how far the rays (R, 2), unit vectors in the frame of `car`, go: (R,), at most `longest` metres."""
+        message = np.concatenate(([car, vehicle.BUMPER, longest], rays.ravel()))
+        return self._ask(Kind.SCAN, message).copy()
+
     def close(self) -> None:
         """End the server."""
         if self.server is not None:

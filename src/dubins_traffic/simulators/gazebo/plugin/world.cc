@@ -18,6 +18,8 @@
 
 #include <gazebo/common/Events.hh>
 #include <gazebo/common/Plugin.hh>
+#include <gazebo/ode/ode.h>
+#include <gazebo/physics/ode/ODECollision.hh>
 #include <gazebo/physics/physics.hh>
 
 #ifndef DUBINS_TRAFFIC_PROTOCOL
@@ -242,12 +244,14 @@ class World : public gazebo::WorldPlugin {
   // car, height, longest range, then cos and sin of each ray in the car's frame; answers ranges, the longest where free.
   bool Scan() {
     if (in_.size() < 3 || in_.size() % 2 == 0 || !(in_[0] >= 0 && in_[0] < cars_.size())) return false;
-    const auto pose = cars_[static_cast<std::size_t>(in_[0])].base->WorldPose();
+    const Car &car = cars_[static_cast<std::size_t>(in_[0])];
+    const auto pose = car.base->WorldPose();
     const double longest = in_[2];
     if (!ray_) {
       ray_ = boost::dynamic_pointer_cast<gazebo::physics::RayShape>(
           world_->Physics()->CreateShape("ray", gazebo::physics::CollisionPtr()));
     }
+    Show(car, false);
     const Vector from(pose.Pos().X(), pose.Pos().Y(), in_[1]);
     const double yaw = pose.Rot().Yaw(), c = std::cos(yaw), s = std::sin(yaw);
     for (std::size_t k = 3; k + 1 < in_.size(); k += 2) {
@@ -258,7 +262,20 @@ class World : public gazebo::WorldPlugin {
       ray_->GetIntersection(range, hit);
       out_.push_back(hit.empty() ? longest : range);
     }
+    Show(car, true);
     return true;
+  }
+
+  // A laser does not see the car that carries it.
+  static void Show(const Car &car, bool shown) {
+    for (const auto &link : car.model->GetLinks())
+      for (const auto &collision : link->GetCollisions()) {
+        const auto own = boost::dynamic_pointer_cast<gazebo::physics::ODECollision>(collision);
+        if (shown)
+          dGeomEnable(own->GetCollisionId());
+        else
+          dGeomDisable(own->GetCollisionId());
+      }
   }
 
   gazebo::physics::WorldPtr world_;
