@@ -193,7 +193,12 @@ def test_spin_with_a_longer_period(command: Command, town: str) -> None:
 def test_what_a_format_can_not_say_is_named(command: Command, town: str) -> None:
     error = command(town, "--format", "spin", "--guarantee", status=2)
     assert "[] (left_ego -> <>[0,10] !left_ego)" in error
-    assert "300 ticks" in error
+    assert "a bound of 10 s is too long" in error
+    assert "a period of at least 0.25 s" in error
+    assert command(town, "--format", "spin", "--guarantee", "--period", "0.25")
+    whole = command(town, "--format", "spin", status=2)
+    assert "a period of at least 1.5 s" in whole
+    assert command(town, "--format", "spin", "--period", "1.5")
     assert error.startswith(f"dubins-traffic: {town}: --format spin: ")
 
 

@@ -144,7 +144,7 @@ def _told(spec: Specification, format: Format, period: float, source: str) -> st
         try:
             write(alone, period)
         except FormulaError as error:
-            raise _refusal(error, formula, format, source) from None
+            raise _refusal(error, refused, formula, format, source) from None
     raise refused.within(file=source, field=f"--format {format}")
 
 
@@ -160,7 +160,10 @@ def _parts(spec: Specification) -> Iterator[tuple[Formula, Specification]]:
         yield formula, type(spec)(*sides, inputs, tuple(name for name in names if name in outputs))
 
 
-def _refusal(error: FormulaError, formula: Formula, format: Format, source: str) -> InputError:
+def _refusal(
+    error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str
+) -> InputError:
+    """Return what to say of a formula that can't be said, given what would have to change for the whole."""
     from dubins_traffic.spec.logic.printer import to_spin
 
     return InputError(
@@ -168,5 +171,5 @@ def _refusal(error: FormulaError, formula: Formula, format: Format, source: str)
         file=source,
         field=f"--format {format}",
         value=to_spin(formula),
-        expected=error.expected,
+        expected=whole.expected,
     )

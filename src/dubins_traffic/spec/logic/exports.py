@@ -21,6 +21,7 @@ from dubins_traffic.spec.logic.formula import (
     implies,
     make,
     propositions,
+    subformulas,
     ticks,
 )
 from dubins_traffic.spec.logic.gr1 import gr1, slugs_text, tulip_text
@@ -35,6 +36,7 @@ from dubins_traffic.spec.logic.printer import (
 )
 from dubins_traffic.spec.logic.rewrite import mapped
 from dubins_traffic.spec.logic.translation import (
+    MAX_NEXT,
     for_signals,
     in_ticks,
     until_and_release_only,
@@ -115,8 +117,20 @@ def spin(spec: Specification, period: float) -> str:
     Raises
     ------
     FormulaError
-        If a bound is too long to be written out.
+        If a bound is too long to be written out; says which period would do.
     """
+    bounds = [
+        part.bounds
+        for side in (spec.assumptions, spec.guarantees)
+        for one in side
+        for part in subformulas(one)
+    ]
+    longest = max((high for _, high in filter(None, bounds)), default=0.0)
+    if ticks(longest, period) > MAX_NEXT:
+        raise FormulaError(
+            f"a bound of {number(longest)} s is too long to be written out with next",
+            expected=f"a period of at least {longest / MAX_NEXT:.4g} s, or a format that counts",
+        )
     plain = _changed(
         _without_past(spec), lambda formula: written_out(until_and_release_only(in_ticks(formula, period)))
     )
