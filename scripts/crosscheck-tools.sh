@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa; and Debian's spin and mona. What is there already is left alone.
+# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd; and Debian's spin and mona. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -29,6 +29,7 @@ environment stormpy stormpy 'stormpy==2.0.0'
 environment rtamt rtamt 'rtamt==0.4.10' setuptools
 environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
+environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
 
 missing=()
 for program in spin mona; do

@@ -49,6 +49,7 @@ def test_bounds_of_an_ego_on_shortest_routes() -> None:
     for left_out in ("E1", "E2", "E3", "E4", "E5"):
         parts = [part for part in ALL.split(",") if part != left_out]
         assert route_bound(board(2, 2, 1).arena, Assumption.parse(parts)) == 0
+    assert route_bound(board(3, 4, 1, ALL, 4).arena, Assumption()) == 0
 
 
 def test_a_goal_in_a_dead_end_bears_two() -> None:
@@ -173,6 +174,30 @@ def test_the_command_answers_in_json(capsys: pytest.CaptureFixture[str], tmp_pat
     expected = {"states": 50_112, "winning": 50_112, "vacuous": 0, "realizable": True, "route_bound": 41}
     assert found == expected
     assert Strategy.load(path).board.positions == 50_112
+
+
+def test_the_game_as_a_graph_says_what_its_numbers_mean(tmp_path: Path) -> None:
+    path = tmp_path / "game.npz"
+    assert main(["synth", "demo", "--cars", "1", "--graph", str(path), "--json"]) == 0
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    header = json.loads(arrays["header"].tobytes())
+    assert (header["format"], header["version"], header["cars"]) == ("dubins-traffic game", 1, 1)
+    for position in range(0, len(arrays["ego_cell"]), 37):
+        ego: list[int] = []
+        others: list[int] = []
+        for n, node in enumerate(header["nodes"]):
+            scene = header["kinds"][node["kind"]][arrays["scene"][position, n]]
+            cars = [(node["inbound"][slot], who) for slot, who in scene["queue"]]
+            cars += [(n, scene["inside"])] if scene["inside"] else []
+            for cell, who in cars:
+                (ego if who == "ego" else others).append(cell)
+        assert ego == [arrays["ego_cell"][position]]
+        assert len(others) == 1
+        reached = arrays["ego_to"][arrays["ego_at"][position] : arrays["ego_at"][position + 1]]
+        near = {ego[0], *(cell for node in header["nodes"] for cell in node["exits"])}
+        near |= {n for n, node in enumerate(header["nodes"]) if ego[0] in node["inbound"]}
+        assert {int(cell) for cell in arrays["ego_cell"][reached]} <= near
 
 
 def test_the_command_explains(capsys: pytest.CaptureFixture[str]) -> None:

@@ -60,6 +60,10 @@ def synth(
         str | None,
         typer.Option("--output", "-o", metavar="STRATEGY", help="Write the strategy, `*.npz`."),
     ] = None,
+    graph: Annotated[
+        str | None,
+        typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
+    ] = None,
     explain: Annotated[
         bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
     ] = False,
@@ -78,6 +82,7 @@ def synth(
     """Say whether the ego can win at all: solve the game of cells behind a problem."""
     from dubins_traffic.synthesis.answer import answer
     from dubins_traffic.synthesis.assumption import Assumption
+    from dubins_traffic.synthesis.export import save_game
     from dubins_traffic.synthesis.strategy import Strategy
 
     instance = _instance(source, seed, trial)
@@ -92,6 +97,8 @@ def synth(
             progress=progress,
         )
         reasons = found.explain(progress) if explain else []
+    if graph is not None:
+        save_game(found.solution.game, graph)
     if strategy is not None:
         won = Strategy.of(found.solution)
         won.first()

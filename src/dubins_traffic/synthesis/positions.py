@@ -130,3 +130,12 @@ def rank(t: Tables, others: int, scenes: Ints) -> int:
             left -= t.others[t.base[v] + scene]
             ego -= t.egos[t.base[v] + scene]
     return total
+
+
+@jit
+def list_scenes(t: Tables, others: int, scenes: Ints, found: Numbers) -> None:
+    """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
+    for position in range(found.shape[0]):
+        unrank(t, others, position, scenes)
+        for v in range(scenes.shape[0]):
+            found[position, v] = scenes[v]

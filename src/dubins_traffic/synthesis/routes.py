@@ -22,9 +22,11 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
     arena : Arena
         The cells.
     assumption : Assumption
-        The proof needs E1 to E5, and that forfeits are bounded; it does not need E6. Without these the bound is 0.
+        The proof needs E1 to E5, that forfeits are bounded, and crossings wherever three roads meet; it does not need
+        E6. Without these the bound is 0.
     """
-    kept = (assumption.yields, assumption.enters, assumption.leaves, assumption.arrives)
+    kept = [assumption.yields, assumption.enters, assumption.leaves, assumption.arrives]
+    kept += [node.crossing or len(node.inbound) == 1 for node in arena.nodes]
     if assumption.order is not Order.KEPT or assumption.forfeits is Forfeits.ALWAYS or not all(kept):
         return 0
     regions = (len(region(arena, ahead, cell)) for cell, ahead in waits(arena))

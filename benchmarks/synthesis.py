@@ -1,0 +1,149 @@
+"""The game of cells: the known results, speed and memory, long plays, and omega with dd on the same game.
+
+Speed is measured in a process of its own whose kernels have been compiled before.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from benchmarks.table import Row
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.play import Environment, play
+from dubins_traffic.synthesis.routes import route_bound
+from dubins_traffic.synthesis.solver import Solution, solve
+from dubins_traffic.synthesis.strategy import Strategy
+
+ROOT = Path(__file__).resolve().parents[1]
+OMEGA = ROOT / "build" / "crosscheck" / "omega" / "bin" / "python"
+ALL = "E1,E2,E3,E4,E5,E6"
+KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
+ONCE = "E1,E2,E3:one-forfeit,E4,E5,E6"
+OFTEN = "E1,E2,E3:forfeits,E4,E5,E6"
+TURNS = 1_000_000
+
+KNOWN: tuple[tuple[int, int, int, str, int, int, bool], ...] = (
+    (3, 4, 1, "E6", 1, 3_668, False),
+    (2, 2, 2, KEEP_MOVING, 1, 660, True),
+    (3, 4, 2, KEEP_MOVING, 1, 45_540, True),
+    (2, 2, 3, KEEP_MOVING, 1, 1_980, False),
+    (3, 4, 3, KEEP_MOVING, 1, 652_740, False),
+    (2, 2, 3, ALL, 1, 2_724, True),
+    (2, 2, 4, ALL, 1, 6_600, True),
+    (3, 4, 3, ALL, 1, 788_336, True),
+    (3, 3, 4, ALL, 1, 1_748_215, True),
+    (4, 4, 3, ALL, 1, 2_951_656, True),
+    (2, 2, 3, ALL, 3, 7_280, True),
+    (3, 4, 3, ALL, 3, 1_063_444, True),
+    (2, 2, 3, ONCE, 1, 13_284, True),
+    (3, 4, 3, ONCE, 1, 4_298_028, True),
+    (3, 4, 3, OFTEN, 1, 788_336, False),
+)
+"""Rows, columns, e-agents, assumption, least degree of a crossing; positions, and whether all are won or none."""
+
+TIMED = """
+import json, resource, sys, tempfile, time
+from benchmarks.synthesis import board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.strategy import Strategy
+def run(size):
+    begun = time.perf_counter()
+    solution = solve(build(board(*size)))
+    with tempfile.TemporaryDirectory() as folder:
+        Strategy.of(solution).save(folder + "/strategy.npz")
+    return time.perf_counter() - begun
+run((2, 2, 1))
+seconds = run(tuple(json.loads(sys.argv[1])))
+print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+"""
+
+
+def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Board:
+    """Return the positions on a grid with goals at two opposite corners."""
+    network = RoadNetwork.grid(rows, columns)
+    arena = Arena.of(network, [0, len(network.intersections) - 1], order_degree)
+    return Board(arena, Assumption.parse(assumed.split(",")), others)
+
+
+def measure() -> list[Row]:
+    """Return the rows of the table."""
+    rows = [*_speed(), *_against_omega()]
+    for case in KNOWN:
+        solution = solve(build(board(*case[:5])))
+        rows.append(_known(case, solution))
+        if case[:5] in ((3, 4, 3, ALL, 1), (3, 3, 4, ALL, 1)):
+            rows += _played(f"{case[0]}x{case[1]}, {case[2]} cars", Strategy.of(solution))
+    bounds = [route_bound(board(*size, 1).arena, Assumption()) for size in ((2, 2), (3, 4))]
+    return [*rows, Row("bound of fixed routes, 2x2 and 3x4", f"{bounds}", "[9, 41]", bounds == [9, 41])]
+
+
+def _known(case: tuple[int, int, int, str, int, int, bool], solution: Solution) -> Row:
+    grid_rows, columns, others, assumed, degree, positions, won = case
+    winning, vacuous = int(solution.winning.sum()), int(solution.vacuous.sum())
+    figure = f"{solution.game.positions:,} positions, {winning:,} won, {vacuous} vacuous"
+    name = f"{grid_rows}x{columns}, {others} cars, {assumed}, crossings from {degree}"
+    met = (solution.game.positions, winning, vacuous) == (positions, positions if won else 0, 0)
+    return Row(name, figure, f"{positions:,}, {'all' if won else 'none'}, 0", met)
+
+
+def _speed() -> list[Row]:
+    found: list[Row] = []
+    for size, seconds, mebibytes in (((3, 4, 3), 5.0, 1024.0), ((4, 4, 3), 25.0, 4096.0)):
+        took, used = json.loads(_run([sys.executable, "-c", TIMED, json.dumps(size)]))
+        name = f"{size[0]}x{size[1]}, {size[2]} cars: build, solve, save the strategy"
+        found.append(Row(name, f"{took:.2f} s", f"< {seconds:g} s", took < seconds))
+        found.append(Row("  memory", f"{used:.0f} MiB", f"< {mebibytes:g} MiB", used < mebibytes))
+    return found
+
+
+def _played(name: str, strategy: Strategy) -> list[Row]:
+    found: list[Row] = []
+    for environment in Environment:
+        played = play(strategy, TURNS, environment, seed=1)
+        figure = f"visits {played.visits}, longest gap {max(played.gaps)} turns, astray {played.astray}"
+        met = played.turns == TURNS and not played.astray and min(played.visits) > 100
+        found.append(Row(f"{name}: {TURNS:,} turns, {environment.name.lower()}", figure, "goals recur", met))
+    return found
+
+
+def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
+    """Return a game as `tests/crosscheck/omega_game.py` takes it."""
+    arena, assumed = some.arena, some.assumption
+    return {
+        "following": [list(arena.following(cell)) for cell in range(arena.cells)],
+        "nodes": len(arena.nodes),
+        "goals": [list(nodes) for nodes in arena.goal_nodes],
+        "others": some.others,
+        "ordered": assumed.order == "kept",
+        "enters": assumed.enters,
+        "leaves": assumed.leaves,
+        "frees": assumed.frees,
+        "list": lost,
+    }
+
+
+def _against_omega() -> list[Row]:
+    if not OMEGA.is_file():
+        return []
+    script = str(ROOT / "tests" / "crosscheck" / "omega_game.py")
+    some = board(3, 4, 2)
+    other = json.loads(_run([str(OMEGA), script], json.dumps(request(some))))
+    took, _ = json.loads(_run([sys.executable, "-c", TIMED, json.dumps((3, 4, 2))]))
+    ratio = other["seconds"] / took
+    figure = f"{other['seconds']:.1f} s to {took:.2f} s: {ratio:.0f}"
+    met = ratio > 10 and other["winning"] == 2 * some.positions
+    return [Row("3x4, 2 cars: omega with dd to ours", figure, "> 10, the same winners", met)]
+
+
+def _run(command: list[str], text: str = "") -> str:
+    ran = subprocess.run(command, input=text, capture_output=True, text=True, check=True, cwd=ROOT)
+    return ran.stdout.strip().splitlines()[-1]
