@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from dubins_traffic.campaign.sessions import Programme
+from dubins_traffic.campaign.sessions import Programme, rehearse
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.protocols import Clock
 from dubins_traffic.transports.clocks import Lockstep, RealTime
@@ -63,6 +63,7 @@ def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
     """
     clock: Clock = Lockstep(terms.deadline) if terms.lockstep else RealTime(terms.factor)
     maestro = Maestro() if programme.controller is None else None
+    rehearse(programme.supply(0))
     with ExitStack() as stack:
         if terms.master is not None:
             master = Master(terms.master)

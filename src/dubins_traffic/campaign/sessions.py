@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from dubins_traffic.campaign.plan import check_data_file, check_folder
 from dubins_traffic.campaign.remote import Session, hand_over, run_remote
-from dubins_traffic.campaign.single import Result
+from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.campaign.sources import load
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro
+
+REHEARSAL = 1.2
+"""Seconds: more than a block of frames."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +138,18 @@ def programme(
         None if records is None else check_folder(Path(records)),
         None if data is None else check_data_file(Path(data), overwrite_data),
     )
+
+
+def rehearse(instance: Instance) -> None:
+    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts."""
+    agents = tuple(
+        replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
+        if agent.kind == REMOTE
+        else agent
+        for agent in instance.e_agents
+    )
+    brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
+    run_trial(brief, Scripted(np.zeros((brief.ticks, 2))))
 
 
 def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:

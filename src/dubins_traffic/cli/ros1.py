@@ -75,6 +75,9 @@ def run(
     begin: Annotated[
         float, typer.Option("--begin", metavar="SECONDS", help="For the first command after the instance.")
     ] = 60.0,
+    silence: Annotated[
+        float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
+    ] = 5.0,
     clock: Annotated[
         bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
     ] = False,
@@ -109,7 +112,9 @@ def run(
         source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
         data=data or data_over, overwrite_data=data is None, records=records,
     )  # fmt: skip
-    terms = Terms(port if master else None, lockstep, factor, deadline, Patience(begin=begin), clock)
+    terms = Terms(
+        port if master else None, lockstep, factor, deadline, Patience(begin=begin, silence=silence), clock
+    )
     results: list[Result] = []
     signal.signal(signal.SIGTERM, _interrupt)
     try:

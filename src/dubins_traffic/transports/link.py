@@ -199,6 +199,9 @@ class Link:
         self._settle()
 
     def _check_silence(self, slot: Slot, tick: int) -> None:
+        """Name a peer that is there and says nothing; one that has gone is given its time to come back."""
+        if slot.gone_since is not None:
+            return
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
         if monotonic() - since > self._patience.silence:
             detail = f"no command for {self._patience.silence:g} s at tick {tick}"

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from threading import Event, Thread
+from time import sleep
 from typing import Any
 
 from dubins_traffic.errors import TransportError
@@ -17,6 +18,7 @@ LOOK = 0.1
 """Seconds between two looks at who is connected."""
 PING = 10
 """Looks between two calls of the master."""
+GRACE = 0.5
 MISSED = 2
 """Calls of the master in a row that may go unanswered, and one more."""
 
@@ -53,6 +55,18 @@ def leave() -> None:
     rospy = sys.modules.get("rospy")
     if rospy is not None and rospy.core.is_initialized():
         rospy.signal_shutdown("the session is over")
+
+
+def abandon(rospy: Any, detail: str) -> None:
+    """Leave a graph whose master has gone.
+
+    A registration that is under way waits for the master until rospy is shut down, and the shutdown waits for it; so
+    it is let go first.
+    """
+    rospy.core._shutdown_flag = True
+    sleep(GRACE)
+    rospy.core._shutdown_flag = False
+    rospy.signal_shutdown(detail)
 
 
 def _node_at(uri: str) -> str | None:

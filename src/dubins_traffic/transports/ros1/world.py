@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ ODOMETRY = 0.025
 """Seconds between two odometries while frames are farther apart, at least."""
 BASE = 0.0102
 """Height of a Kobuki's base above its footprint, metres."""
+PER_CAR = ("/odom", "/scan")
 NOISE = 0.01
 """Diagonal of the covariance that odometry states, for programs that want one."""
 
@@ -39,22 +41,50 @@ class _Car:
     swept: int = -1
 
 
+class Topics:
+    """The publishers of a session, each made once: who listens stays connected from trial to trial."""
+
+    def __init__(self, rospy: Any) -> None:
+        self.rospy = rospy
+        self._made: dict[str, Any] = {}
+
+    def publisher(self, topic: str, kind: Any, *, latch: bool = False) -> Any:
+        """Return the publisher of `topic`."""
+        if topic not in self._made:
+            self._made[topic] = self.rospy.Publisher(
+                topic, kind, queue_size=QUEUE, latch=latch, tcp_nodelay=True
+            )
+        return self._made[topic]
+
+    def retain(self, cars: Sequence[str]) -> None:
+        """Take back the topics of cars that are not among `cars`."""
+        for topic in [topic for topic in self._made if topic.endswith(PER_CAR)]:
+            if topic.split("/")[1] not in cars:
+                self._made.pop(topic).unregister()
+
+    def close(self) -> None:
+        """Take all topics back."""
+        while self._made:
+            self._made.popitem()[1].unregister()
+
+
 class World:
     """Publishes the cars of one instance; only what someone listens to is made.
 
     Parameters
     ----------
-    rospy : module
-        With this process a node.
+    topics : Topics
+        Has the publishers, which outlive the instance.
     instance : Instance
         Whose cars.
     clock : bool
         Whether `/clock` is published.
     """
 
-    def __init__(self, rospy: Any, instance: Instance, *, clock: bool) -> None:
+    def __init__(self, topics: Topics, instance: Instance, *, clock: bool) -> None:
         self._m = load()
-        self._rospy = rospy
+        self._rospy = topics.rospy
+        self._publisher = topics.publisher
         self._names = instance.names
         self._network = instance.problem.network
         self._rate = instance.problem.rate
@@ -82,18 +112,6 @@ class World:
         if self._models.get_num_connections():
             self._fill_states(view.state)
             self._models.publish(self._states)
-
-    def close(self) -> None:
-        """Take all topics back."""
-        for car in self._cars:
-            car.odometry.unregister()
-            car.scan.unregister()
-        for publisher in (self._models, self._labels, self._transforms, self._clock):
-            if publisher is not None:
-                publisher.unregister()
-
-    def _publisher(self, topic: str, kind: Any, *, latch: bool = False) -> Any:
-        return self._rospy.Publisher(topic, kind, queue_size=QUEUE, latch=latch, tcp_nodelay=True)
 
     def _model_states(self) -> Any:
         m = self._m
