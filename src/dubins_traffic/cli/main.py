@@ -11,6 +11,7 @@ import typer
 from dubins_traffic.cli import (
     campaign,
     check,
+    check_controller,
     convert,
     faults,
     gazebo,
@@ -63,6 +64,7 @@ app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
 app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
 app.command("synth", epilog=synth.EXAMPLES)(synth.synth)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
