@@ -6,10 +6,14 @@ Speed is measured in a process of its own whose kernels have been compiled befor
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+from tests.game_reference import Arrays
+from tests.property.test_game_reference import SQUARE, position, reference
 
 from benchmarks.table import Row
 from dubins_traffic.roads.network import RoadNetwork
@@ -76,7 +80,7 @@ def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree
 
 def measure() -> list[Row]:
     """Return the rows of the table."""
-    rows = [*_speed(), *_against_omega()]
+    rows = [*_speed(), *_against_omega(), _against_textbook()]
     for case in KNOWN:
         solution = solve(build(board(*case[:5])))
         rows.append(_known(case, solution))
@@ -124,24 +128,44 @@ def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
         "goals": [list(nodes) for nodes in arena.goal_nodes],
         "others": some.others,
         "ordered": assumed.order == "kept",
-        "enters": assumed.enters,
+        "enters": [n for n, node in enumerate(arena.nodes) if _entered(node.crossing, assumed)],
         "leaves": assumed.leaves,
         "frees": assumed.frees,
         "list": lost,
     }
 
 
+def _entered(crossing: bool, assumed: Assumption) -> bool:
+    return assumed.enters if crossing else assumed.arrives
+
+
 def _against_omega() -> list[Row]:
     if not OMEGA.is_file():
         return []
     script = str(ROOT / "tests" / "crosscheck" / "omega_game.py")
-    some = board(3, 4, 2)
-    other = json.loads(_run([str(OMEGA), script], json.dumps(request(some))))
-    took, _ = json.loads(_run([sys.executable, "-c", TIMED, json.dumps((3, 4, 2))]))
-    ratio = other["seconds"] / took
-    figure = f"{other['seconds']:.1f} s to {took:.2f} s: {ratio:.0f}"
-    met = ratio > 10 and other["winning"] == 2 * some.positions
-    return [Row("3x4, 2 cars: omega with dd to ours", figure, "> 10, the same winners", met)]
+    found: list[Row] = []
+    for size in ((2, 2, 3), (3, 4, 2)):
+        some = board(*size)
+        other = json.loads(_run([str(OMEGA), script], json.dumps(request(some))))
+        took, _ = json.loads(_run([sys.executable, "-c", TIMED, json.dumps(size)]))
+        ratio = other["seconds"] / took
+        figure = f"{other['seconds']:.1f} s to {took:.2f} s: {ratio:.0f}"
+        met = ratio > 10 and other["winning"] == math.factorial(some.others) * some.positions
+        name = f"{size[0]}x{size[1]}, {size[2]} cars: omega with dd to ours"
+        found.append(Row(name, figure, "> 10, the same winners", met))
+    return found
+
+
+def _against_textbook() -> Row:
+    """Compare with the nested fixpoint on labelled states, evaluated as it stands."""
+    solution = solve(build(board(2, 2, 4)))
+    game = reference(SQUARE, 4, {})
+    arrays = Arrays(game)
+    winners = arrays.winning()
+    numbers = [position(solution.game.board, game, state) for state in arrays.states]
+    same = bool((winners == solution.winning[numbers]).all())
+    figure = f"{len(arrays.states):,} labelled states, {'the same' if same else 'other'} winners"
+    return Row("2x2, 4 cars: textbook", figure, "the same winners", same)
 
 
 def _run(command: list[str], text: str = "") -> str:
