@@ -1,10 +1,10 @@
 """Solves games of cells symbolically, with omega and dd; run by the Python that has them.
 
-Standard input: {"following": cells that each cell leads to, "nodes": how many cells are nodes, "goals": nodes of each
-goal, "others": e-agents, "ordered": whether crossings keep the order of arrival, "enters": nodes that are to be
-entered, "leaves", "frees": what is assumed}. Standard output: {"seconds", "valid", "winning"}, the latter two as numbers
-of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the cars, ego
-first, and pairs (i, j) such that i is before j if they wait together.
+Standard input: {"following": cells that each cell leads to, "nodes": how many cells are nodes, "goals": nodes of
+each goal, "others": e-agents, "ordered": whether crossings keep the order of arrival, "enters": nodes that are to be
+entered, "leaves", "frees": what is assumed}. Standard output: {"seconds", "valid", "winning"}, the latter two as
+numbers of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the
+cars, ego first, and pairs (i, j) such that i is before j if they wait together.
 """
 
 from __future__ import annotations
