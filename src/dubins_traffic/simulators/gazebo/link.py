@@ -50,7 +50,15 @@ class Link:
 
     def __init__(self, line: socket.socket, patience: float) -> None:
         self._line = line
-        self.patience = patience
+        self.be_patient(patience)
+
+    def be_patient(self, seconds: float) -> None:
+        """Wait that long for each answer from now on."""
+        self.patience = seconds
+        # The kernel keeps the time: a timeout of Python's own costs further calls for each message.
+        limit = struct.pack("ll", int(seconds), int(seconds % 1.0 * 1e6))
+        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
+        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
 
     def ask(self, kind: Kind, values: Floats) -> Floats:
         """Send a message and return the numbers of its answer.
@@ -61,31 +69,29 @@ class Link:
             If no answer comes within the patience, the other end has gone, or it does not know the message.
         """
         try:
-            self._line.settimeout(self.patience)
             self._line.sendall(HEAD.pack(kind, len(values)) + values.tobytes())
-            answer, count = HEAD.unpack(self._take(HEAD.size))
-            found = np.frombuffer(self._take(8 * count), dtype=np.float64)
-        except TimeoutError:
+            data = self._take(b"", HEAD.size)
+            answer, count = HEAD.unpack_from(data)
+            data = self._take(data, HEAD.size + 8 * count)
+        except BlockingIOError:
             raise LostError(f"it has not answered for {self.patience:g} s") from None
         except OSError as error:
             raise LostError(f"its socket is closed ({error.strerror or error})") from None
         if answer != kind:
             raise LostError(f"it refused {kind.name}")
-        return found
+        return np.frombuffer(data, dtype=np.float64, offset=HEAD.size)
 
     def quit(self) -> None:
         """Tell the other end to end, and close this one."""
         with contextlib.suppress(OSError):
-            self._line.settimeout(0.0)
-            self._line.send(HEAD.pack(Kind.QUIT, 0))
+            self._line.send(HEAD.pack(Kind.QUIT, 0), socket.MSG_DONTWAIT)
         self._line.close()
 
-    def _take(self, size: int) -> bytes:
-        parts: list[bytes] = []
-        while size > 0:
-            part = self._line.recv(size)
+    def _take(self, data: bytes, size: int) -> bytes:
+        """Return `data` with as much after it as makes `size` bytes at least; nothing follows an answer."""
+        while len(data) < size:
+            part = self._line.recv(65536)
             if not part:
                 raise LostError("it has gone")
-            parts.append(part)
-            size -= len(part)
-        return b"".join(parts)
+            data += part
+        return data

@@ -68,7 +68,7 @@ class Server:
             except PortTakenError:
                 if port is not None or attempt == TRIES - 1:
                     raise
-        self._link.patience = patience
+        self._link.be_patient(patience)
 
     def _start(self, installation: Installation, world: str, port: int, startup: float) -> None:
         folder = _folder()

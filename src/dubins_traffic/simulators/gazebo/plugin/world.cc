@@ -99,7 +99,8 @@ class World : public gazebo::WorldPlugin {
     if (sdf->HasElement("obstacle"))
       for (auto each = sdf->GetElement("obstacle"); each; each = each->GetNextElement("obstacle"))
         AddObstacle(each->Get<std::string>());
-    world_->Physics()->GetContactManager()->SetNeverDropContacts(true);
+    // The engine writes down the contacts of what is in a filter, and drops those of wheels on the ground.
+    world_->Physics()->GetContactManager()->CreateFilter("dubins_traffic", hulls_);
     begin_ = gazebo::event::Events::ConnectWorldUpdateBegin(std::bind(&World::Begin, this));
     before_ = gazebo::event::Events::ConnectBeforePhysicsUpdate(std::bind(&World::Collided, this));
     end_ = gazebo::event::Events::ConnectWorldUpdateEnd(std::bind(&World::End, this));
@@ -113,7 +114,9 @@ class World : public gazebo::WorldPlugin {
     car.wheels[0] = car.model->GetJoint("left_wheel_joint");
     car.wheels[1] = car.model->GetJoint("right_wheel_joint");
     for (auto &wheel : car.wheels) wheel->SetParam("fmax", 0, torque_);
-    bodies_[car.base->GetCollision("hull").get()] = static_cast<int>(cars_.size());
+    const auto hull = car.base->GetCollision("hull");
+    bodies_[hull.get()] = static_cast<int>(cars_.size());
+    hulls_[hull->GetScopedName()] = hull;
     cars_.push_back(car);
   }
 
@@ -284,6 +287,7 @@ class World : public gazebo::WorldPlugin {
   std::unique_ptr<Line> line_;
   std::vector<Car> cars_;
   std::map<const Collision *, int> bodies_;  // of a car its number, of obstacle k -1 - k
+  std::map<std::string, gazebo::physics::CollisionPtr> hulls_;
   std::set<std::pair<int, int>> met_;        // in the steps that are running
   std::vector<double> in_, out_, contacts_;
   std::uint32_t kind_ = 0;
