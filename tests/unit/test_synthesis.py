@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -156,6 +157,7 @@ def test_the_estimate_is_close() -> None:
     expected = estimate(game.board)
     assert expected.positions == game.positions
     assert 0.9 < expected.moves / game.to.shape[0] < 1.1
+    assert game.bytes < expected.bytes < 500 << 20
 
 
 def test_assumptions_by_name() -> None:
@@ -179,8 +181,23 @@ def test_progress_goes_up_to_the_whole() -> None:
     told: list[tuple[str, float]] = []
     game = build(board(3, 4, 2), progress=lambda what, share: told.append((what, share)))
     solve(game, progress=lambda what, share: told.append((what, share)))
-    assert [share for what, share in told if what == "build"][-1] == 1.0
+    assert told[0][0].startswith("build 50,112 positions, about 1")
+    assert [share for what, share in told if what.startswith("build")][-1] == 1.0
     assert [share for what, share in told if what == "solve"][-1] == 1.0
+
+
+def test_ctrl_c_ends_a_search_soon() -> None:
+    game = build(board(3, 4, 3))
+
+    def interrupt(what: str, _: float) -> None:
+        raise KeyboardInterrupt(what)
+
+    begun = perf_counter()
+    with pytest.raises(KeyboardInterrupt, match="build"):
+        build(board(3, 4, 3), progress=interrupt)
+    with pytest.raises(KeyboardInterrupt, match="solve"):
+        solve(game, progress=interrupt)
+    assert perf_counter() - begun < 5.0
 
 
 PLAIN = """

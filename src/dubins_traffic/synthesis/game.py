@@ -24,6 +24,10 @@ MOST_POSITIONS: Final = 2**31 - 1
 """Positions are numbered in 32 bits, one number more than there are."""
 BLOCK: Final = 8192
 SAMPLE: Final = 512
+PROGRAM: Final = 160 << 20
+"""Bytes that the program takes without any game, about."""
+SPARE: Final = 1.2
+"""What the allocator does not give back, as a factor."""
 LARGEST_CHOICE: Final = 1 << 18
 """Moves that the environment may have in one position."""
 WORKERS: Final = min(2, os.cpu_count() or 1)
@@ -144,8 +148,8 @@ def estimate(board: Board) -> Estimate:
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
     goals = len(board.arena.goals)
     building = 2 * (5 * moves + 4 * ego_moves + 3 * debts) + 26 * count
-    solving = 5 * moves + 8 * ego_moves + 3 * debts + count * (26 + goals * 38) + goals * debts * 12
-    return Estimate(count, int(moves), int(max(building, solving)))
+    solving = 5 * moves + 8 * ego_moves + 7 * debts + count * (26 + goals * 46) + goals * debts * 12
+    return Estimate(count, int(moves), int(PROGRAM + SPARE * max(building, solving)))
 
 
 def build(
@@ -177,12 +181,13 @@ def build(
             value=f"{expected.positions} positions, about {expected.bytes / 2**20:.0f} MiB",
             expected=f"at most {allowed / 2**20:.0f} MiB (--memory), so fewer cars or a smaller network",
         )
+    what = f"build {expected.positions:,} positions, about {expected.bytes / 2**20:.0f} MiB"
     each = max(64, 4 * expected.moves // expected.positions)
     pieces: list[Moves] = []
     for piece in _expanded(board, each, workers):
         pieces += piece
         if progress:
-            progress("build", sum(part.many.shape[0] for part in pieces) / expected.positions)
+            progress(what, sum(part.many.shape[0] for part in pieces) / expected.positions)
     return Game(
         board,
         _starts([part.many for part in pieces]),
