@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import select
 import socket
 import struct
 from enum import IntEnum
@@ -68,8 +69,23 @@ class Link:
         LostError
             If no answer comes within the patience, the other end has gone, or it does not know the message.
         """
+        self.send(kind, values)
+        return self.receive(kind)
+
+    def send(self, kind: Kind, values: Floats) -> None:
+        """Send a message; LostError if it can't be."""
         try:
             self._line.sendall(HEAD.pack(kind, len(values)) + values.tobytes())
+        except OSError as error:
+            raise LostError(f"its socket is closed ({error.strerror or error})") from None
+
+    def ready(self, seconds: float) -> bool:
+        """Whether there is something to receive, or will be within that time."""
+        return bool(select.select([self._line], [], [], seconds)[0])
+
+    def receive(self, kind: Kind) -> Floats:
+        """Return the numbers of the answer to a message of this kind that has been sent; LostError as `ask`."""
+        try:
             data = self._take(b"", HEAD.size)
             answer, count = HEAD.unpack_from(data)
             data = self._take(data, HEAD.size + 8 * count)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -11,6 +12,7 @@ import tempfile
 import threading
 import weakref
 from pathlib import Path
+from time import monotonic
 from typing import Final
 
 import numpy as np
@@ -24,6 +26,9 @@ SOCKET: Final = "DUBINS_TRAFFIC_GAZEBO_SOCKET"
 PARENT: Final = "DUBINS_TRAFFIC_GAZEBO_PARENT"
 HOST: Final = "127.0.0.1"
 TRIES: Final = 5
+PAINT: Final = re.compile(r"\x1b\[[0-9;]*m")
+GLANCE: Final = 0.2
+UNLOADED: Final = b"Failed to load plugin"
 GRACE: Final = 1.0
 """Seconds that a server is given to end by itself."""
 
@@ -85,7 +90,7 @@ class Server:
             }
             with self.log.open("wb") as log:
                 self.process = subprocess.Popen(
-                    [str(installation.gzserver), "--minimal_comms", "--seed", "1", str(path)],
+                    [str(installation.gzserver), "--verbose", "--minimal_comms", "--seed", "1", str(path)],
                     env=self._environment | private,
                     stdin=subprocess.DEVNULL,
                     stdout=log,
@@ -101,11 +106,13 @@ class Server:
             there.close()
         self._link = Link(here, startup)
         self._finish = weakref.finalize(self, _end, self.process, self._link, folder)
-        self._greet(installation, port)
+        self._greet(installation, port, startup)
 
-    def _greet(self, installation: Installation, port: int) -> None:
+    def _greet(self, installation: Installation, port: int, startup: float) -> None:
         try:
-            version = self.ask(Kind.HELLO)[0]
+            self._link.send(Kind.HELLO, np.zeros(0))
+            self._await(startup)
+            version = self._link.receive(Kind.HELLO)[0]
         except LostError as error:
             why = self.explain(error)
             self.close()
@@ -117,6 +124,15 @@ class Server:
         if version != PROTOCOL:
             self.close()
             raise _not_started(f"its plugin speaks version {version:g}, not {PROTOCOL}", installation)
+
+    def _await(self, startup: float) -> None:
+        """Wait until the plugin answers; a gzserver that can't load a plugin goes on without it."""
+        until = monotonic() + startup
+        while not self._link.ready(GLANCE):
+            if UNLOADED in self.log.read_bytes():
+                raise LostError(f"its plugin could not be loaded{self._last_words()}")
+            if monotonic() > until:
+                raise LostError(f"it was not up within {startup:g} s")
 
     @staticmethod
     def _surroundings(installation: Installation, port: int, folder: str) -> dict[str, str]:
@@ -167,9 +183,9 @@ class Server:
         self._finish()
 
     def _last_words(self) -> str:
-        lines = self.log.read_text(errors="replace").split("\n")
-        said = [line for line in lines if "Err]" in line or "error" in line.lower()]
-        return f": {said[-1].strip()[:200]}" if said else ""
+        lines = PAINT.sub("", self.log.read_text(errors="replace")).split("\n")
+        said = [line for line in lines if "[Err]" in line or "error" in line.lower()]
+        return f": {said[-1].strip()[-300:]}" if said else ""
 
 
 def _end(process: subprocess.Popen[bytes], link: Link, folder: tempfile.TemporaryDirectory[str]) -> None:
