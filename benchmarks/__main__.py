@@ -1,7 +1,7 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single`, `startup`, `judging`, `monitors` and `lcm` take about a minute; `lanes` runs 400 trials and
-`rules` 1,400, which takes some minutes each; `synthesis` solves its games in about two minutes.
+`motion`, `single`, `startup`, `judging`, `monitors` and `lcm` take about a minute, `ros1` three; `lanes` runs 400 trials
+and `rules` 1,400, which takes some minutes each; `synthesis` solves its games in about two minutes.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 
 from benchmarks.table import show
 
-NAMES = ("motion", "single", "startup", "judging", "monitors", "lanes", "rules", "lcm", "synthesis")
+NAMES = ("motion", "single", "startup", "judging", "monitors", "lanes", "rules", "lcm", "ros1", "synthesis", "gazebo")
 
 
 def main(names: list[str]) -> int:
