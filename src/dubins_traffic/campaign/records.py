@@ -14,8 +14,10 @@ from dubins_traffic.record import wall
 from dubins_traffic.scoring.verdict import Ruling
 
 FOLDER = "records"
-FAULTS = frozenset({End.CONTROLLER_FAULT.value, End.AGENT_FAULT.value, End.DEADLINE.value})
-"""Ends of a trial by somebody's fault."""
+FAULTS = frozenset(
+    {End.CONTROLLER_FAULT.value, End.AGENT_FAULT.value, End.DEADLINE.value, End.WORLD_LOST.value}
+)
+"""Ends of a trial by somebody's fault, or by that of the simulator."""
 
 
 class Keep(StrEnum):

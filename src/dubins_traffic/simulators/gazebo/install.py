@@ -19,6 +19,8 @@ from dubins_traffic.simulators.gazebo.packages import Apt, Progress
 
 ROOM: Final = 1_350_000_000
 """Bytes that an installation needs on disk while it is made."""
+UNPACKED: Final = "unpacked"
+"""The file that says that all packages have been unpacked."""
 OLDEST_LIBC: Final = (2, 31)
 ANNOUNCEMENT: Final = """\
 Gazebo 11 goes into {folder}
@@ -64,7 +66,7 @@ def _install(folder: Path, progress: Progress) -> None:
     root = None if server is not None else folder / "root"
     if root is not None:
         server = root / "usr" / "bin" / "gzserver"
-        if not (folder / "unpacked").exists():
+        if not ((folder / UNPACKED).exists() and server.exists()):
             _unpack(folder, root, progress)
     assert server is not None
     progress("compile the plugin", 0.0)
@@ -98,7 +100,7 @@ def _unpack(folder: Path, root: Path, progress: Progress) -> None:
         apt.fetch(left, progress)
         apt.unpack(left, root, progress)
     shutil.rmtree(apt.home)
-    (folder / "unpacked").touch()
+    (folder / UNPACKED).touch()
 
 
 def _size(folder: Path) -> int:
