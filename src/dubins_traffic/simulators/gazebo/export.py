@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from os import PathLike
 from pathlib import Path
@@ -44,6 +45,15 @@ def to_sdf(network: RoadNetwork, version: Version = Version.CLASSIC) -> str:
     link.append(grass)
     world = tag("world", numbers("gravity", 0.0, 0.0, -9.81), _sun(), earth, *roads(network), name="roads")
     return text(tag("sdf", world, version=version.value))
+
+
+def outlook(network: RoadNetwork) -> list[Element]:
+    """Return what makes a trial worth looking at: light, roads, and a camera from which all of them are seen."""
+    low, high = network.points.min(axis=0), network.points.max(axis=0)
+    x, y = (0.5 * (low + high)).tolist()
+    away = 3.0 + 1.2 * float((high - low).max())
+    camera = tag("camera", pose(x, y - 0.5 * away, away, 0.0, 1.1, 0.5 * math.pi), name="view")
+    return [tag("gui", camera), _sun(), *roads(network)]
 
 
 def write_sdf(network: RoadNetwork, path: str | PathLike[str], version: Version = Version.CLASSIC) -> None:

@@ -19,9 +19,9 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import Capabilities, End
 from dubins_traffic.simulators.gazebo import vehicle
 from dubins_traffic.simulators.gazebo.contacts import Contacts
+from dubins_traffic.simulators.gazebo.export import outlook
 from dubins_traffic.simulators.gazebo.link import BODY, CONTACT, Kind, LostError
 from dubins_traffic.simulators.gazebo.prefix import find
-from dubins_traffic.simulators.gazebo.roads import roads
 from dubins_traffic.simulators.gazebo.server import Server
 from dubins_traffic.simulators.gazebo.world import world
 
@@ -100,7 +100,7 @@ class Gazebo:
         self._steps = math.ceil(1.0 / (problem.rate * self._longest) - 1e-9)
         step = 1.0 / (problem.rate * self._steps)
         plugin = str(self._installation.plugin)
-        scenery = roads(problem.network) if self._show else ()
+        scenery = outlook(problem.network) if self._show else ()
         text = world(instance.starts, problem.car.body, problem.obstacles, step, plugin, scenery)
         self.server = Server(self._installation, text, port=self._port, patience=self._patience)
         if self._show:

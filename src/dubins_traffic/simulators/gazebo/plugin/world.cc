@@ -3,8 +3,10 @@
 // It holds the physics thread at the beginning of an iteration until the other end of its socket asks for steps,
 // and answers with the state after the last of them. docs/gazebo-plugin.md describes the messages.
 
+#include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -34,6 +36,7 @@ using Vector = ignition::math::Vector3d;
 enum Kind : std::uint32_t { HELLO = 1, STEP = 2, STATE = 3, PLACE = 4, SCAN = 5, QUIT = 6, REFUSED = 0xffffffff };
 
 const char *const SOCKET = "DUBINS_TRAFFIC_GAZEBO_SOCKET";
+const std::chrono::microseconds LINGER(60);
 const std::uint32_t LONGEST = 1u << 20;  // numbers in a message
 
 // Numbers over a socket: kind, count, count doubles, all in this machine's byte order.
@@ -43,6 +46,7 @@ class Line {
 
   bool Get(std::uint32_t &kind, std::vector<double> &numbers) {
     std::uint32_t head[2];
+    Linger();
     if (!Read(head, sizeof head) || head[1] > LONGEST) return false;
     kind = head[0];
     numbers.resize(head[1]);
@@ -63,6 +67,14 @@ class Line {
   }
 
  private:
+  // The next question often comes at once, and to wake up from sleep takes longer than to look for it.
+  void Linger() const {
+    const auto until = std::chrono::steady_clock::now() + LINGER;
+    char first;
+    while (recv(file_, &first, 1, MSG_DONTWAIT | MSG_PEEK) < 0 && std::chrono::steady_clock::now() < until) {
+    }
+  }
+
   bool Read(void *into, std::size_t size) {
     char *at = static_cast<char *>(into);
     while (size > 0) {
