@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import threading
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import connection
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.campaign import Chunk
 from dubins_traffic.campaign.engine import Outcome
 from dubins_traffic.campaign.many import deaf_to_interrupts
+from dubins_traffic.campaign.orphans import end_with_parent
 from dubins_traffic.campaign.work import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 
@@ -95,15 +94,7 @@ def _begin(around: Surroundings, cancelled: Event) -> None:
     """Prepare a worker."""
     global _around, _cancelled  # a worker's only state, set once
     _around, _cancelled = around, cancelled
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Wait until the parent has ended, and end: nobody is left to take results."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
+    end_with_parent()
 
 
 def _run(chunk: Chunk) -> bytes:

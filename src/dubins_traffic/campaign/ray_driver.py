@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.orphans import end_with_parent
 from dubins_traffic.campaign.work import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 
@@ -25,6 +26,7 @@ PAUSE = 0.05
 
 def drive(pipe: Connection, address: str, workers: int, around: Surroundings) -> None:
     """Join the cluster at `address` and run chunks until the pipe is closed at the other end."""
+    end_with_parent()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     os.environ.setdefault("RAY_DEDUP_LOGS", "0")
     ray: Any = import_module("ray")

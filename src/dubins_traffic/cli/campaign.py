@@ -18,6 +18,8 @@ RUN_EXAMPLES = options.examples(
     "campaign run gaps.toml -o gaps --ray 10.0.0.1:6379 --records failures",
 )
 
+REPORT_EXAMPLES = options.examples("campaign report gaps", "campaign report gaps -o report --worst 5")
+
 campaign = typer.Typer(
     help="Many trials from one file: controllers compared on the same instances, with error bars.",
     no_args_is_help=True,
@@ -95,3 +97,38 @@ def _conclude(ran: Ran) -> None:
     if count:
         faults.tell(f"{count} of {ran.campaign.total} trials ended by a fault; the first: {first}")
         raise typer.Exit(faults.FAILED)
+
+
+@campaign.command("report", epilog=REPORT_EXAMPLES)
+def report(
+    folder: Annotated[str, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output", "-o", metavar="FOLDER", help="Where to write it.", show_default="DIR/report"
+        ),
+    ] = None,
+    worst: Annotated[
+        int,
+        typer.Option(
+            "--worst", metavar="K", min=0, max=100, help="Replays of the K worst trials of each controller."
+        ),
+    ] = 3,
+    wall: Annotated[
+        bool, typer.Option("--wall", help="Also what was measured on a wall clock, which does not repeat.")
+    ] = False,
+) -> None:
+    """Compare the controllers of a campaign: a table here, a page with plots and replays, and CSV."""
+    from rich.console import Console
+
+    from dubins_traffic.campaign.report.terminal import tables
+    from dubins_traffic.campaign.report.write import write_report
+    from dubins_traffic.cli.progress import progress
+
+    with progress() as show:
+        written = write_report(folder, output, worst=worst, wall=wall, progress=show)
+    console = Console(highlight=False)
+    for table in tables(written.comparison):
+        console.print(table)
+        console.print()
+    options.tell(str(written.page))
