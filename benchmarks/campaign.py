@@ -2,8 +2,8 @@
 
     python -m benchmarks campaign
 
-20,000 trials of a tenth of a second without e-agents, driven by `simple` on a grid of 2 by 2, so that what is not the trial shows.
-The bare loop runs a tenth of them with `run_trials` in this process.
+20,000 trials of a tenth of a second without e-agents, driven by `simple` on a grid of 2 by 2, so that what is not the
+trial shows. The bare loop runs a tenth of them with `run_trials` in this process.
 """
 
 from __future__ import annotations
