@@ -24,6 +24,7 @@ from benchmarks.table import Row
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import EGO, Frames, Pose
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
@@ -63,7 +64,11 @@ def manoeuvres() -> dict[str, Floats]:
 
 def measure() -> list[Row]:
     """Return the rows of this benchmark."""
-    return [*_agreement(), *_speed(find()), *_trials()]
+    try:
+        installation = find()
+    except InputError as error:
+        return [Row("Gazebo is installed", str(error), "dubins-traffic gazebo install", False)]
+    return [*_agreement(), *_speed(installation), *_trials()]
 
 
 def _alone(starts: Sequence[Pose]) -> Instance:

@@ -8,7 +8,7 @@ class TestGazebo(SimulatorConformance):
 
     position = 0.03
     heading = 0.035
-    touch = 0.01
+    touch = 0.006
 
     def make(self) -> Gazebo:
         installation()

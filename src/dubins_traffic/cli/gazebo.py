@@ -64,16 +64,17 @@ def _progress() -> Generator[Progress]:
     """Show each stage: as a bar to people, as lines otherwise."""
     from rich.console import Console
     from rich.progress import Progress as Bars
+    from rich.progress import TaskID
 
     console = Console()
     with Bars(console=console, disable=not console.is_terminal) as bars:
-        tasks: dict[str, int] = {}
+        tasks: dict[str, TaskID] = {}
 
         def tell(stage: str, share: float) -> None:
             if stage not in tasks:
                 tasks[stage] = bars.add_task(stage, total=1.0)
                 if not console.is_terminal:
                     print(stage, flush=True)
-            bars.update(bars.task_ids[tasks[stage]], completed=share)
+            bars.update(tasks[stage], completed=share)
 
         yield tell
