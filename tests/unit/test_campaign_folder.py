@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -172,3 +173,9 @@ def test_results_are_typed(short: Campaign, tmp_path: Path) -> None:
     assert types["clean"] == "bool"
     assert not [name for name in schema.names if name.endswith("_s") and "act" in name]
     assert "time_to_begin_s" in parquet.read_schema(tmp_path / "wall.parquet").names
+
+
+def test_a_machine_without_the_controller_makes_no_rows(short: Campaign) -> None:
+    chunk = replace(next(short.chunks()), controller="/nowhere/mine.py:Mine")
+    with pytest.raises(InputError, match=r"no such file: /nowhere/mine.py"):
+        run_chunk(chunk)

@@ -28,7 +28,7 @@ def drive(pipe: Connection, address: str, workers: int, around: Surroundings) ->
     """Join the cluster at `address` and run chunks until the pipe is closed at the other end."""
     end_with_parent()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    os.environ.setdefault("RAY_DEDUP_LOGS", "0")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # Ray's own words stand in its logs; ours go through the pipe
     ray: Any = import_module("ray")
     send = _Sender(pipe)
     over = threading.Event()
@@ -70,7 +70,8 @@ class _Sender:
 
 def _beat(ray: Any, send: _Sender, over: threading.Event) -> None:
     """Tell how many processors the cluster has, as long as its head answers and the work is not over."""
-    with contextlib.suppress(BrokenPipeError):  # nobody is left to tell
+    gone = (BrokenPipeError, ray.exceptions.RayError)  # nobody is left to tell, or nothing but silence
+    with contextlib.suppress(*gone):
         while not over.is_set():
             nodes: list[dict[str, Any]] = ray.nodes()
             send(ALIVE, int(sum(node["Resources"].get("CPU", 0) for node in nodes if node["Alive"])))

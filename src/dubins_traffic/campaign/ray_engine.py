@@ -59,8 +59,12 @@ class RayEngine:
             self._process.start()
         theirs.close()
         self._heard = self._peopled = time.monotonic()
-        while not self._processors:
-            self._take(START)
+        try:
+            while not self._processors:
+                self._take(START)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def capacity(self) -> int:

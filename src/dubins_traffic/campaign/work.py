@@ -11,6 +11,7 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Chunk
 from dubins_traffic.campaign.many import Job
 from dubins_traffic.campaign.records import Records, remove_record
+from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import DubinsTrafficError
 
 if TYPE_CHECKING:
@@ -37,11 +38,14 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
 
     Raises
     ------
+    InputError
+        If there is no such controller here: a fault of this machine, not of a trial.
     KeyboardInterrupt
         If it was interrupted; nothing of the chunk counts then.
     """
     if records is not None:
         records.check()
+    controllers.load(chunk.controller)
     return rows.columns([_row(chunk, k, records, cancelled) for k in range(chunk.count)])
 
 
