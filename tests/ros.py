@@ -19,6 +19,7 @@ import pytest
 
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
 from dubins_traffic.transports.ros1.master import answers
+from dubins_traffic.transports.ros1.messages import write_python
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -93,14 +94,17 @@ class Graph:
 
     def client(self, *actions: str) -> subprocess.Popen[str]:
         """Start the client of tests/ros_client.py."""
-        generated = self.folder / "messages"
-        if not generated.is_dir():
-            from dubins_traffic.transports.ros1.messages import write_python
-
-            write_python(generated)
+        generated = self.client_messages()
         return self.start(
             [SYSTEM_PYTHON, ROOT / "tests" / "ros_client.py", *actions], PYTHONPATH=str(generated)
         )
+
+    def client_messages(self) -> Path:
+        """Return where our messages are for the system's Python."""
+        generated = self.folder / "messages"
+        if not generated.is_dir():
+            write_python(generated)
+        return generated
 
     def close(self) -> None:
         """End everything that was started here, by its own session."""

@@ -1,7 +1,8 @@
 """A client of the ROS 1 interface, written from its tables of names and types alone; run by the system's Python.
 
 usage: ros_client.py ACTION...   with one ACTION per trial, each `what` or `what:commands`:
-drive (to the end), reset, restart, die (SIGKILL), stop (SIGSTOP), flood, nan, leave: after so many commands.
+drive (to the end), or after so many commands reset, restart, die (SIGKILL), stop (SIGSTOP), flood, nan, leave, pause.
+The action place is no trial: the ego is put elsewhere before one.
 Prints one JSON object per line: what it has seen of each trial.
 """
 
@@ -16,11 +17,12 @@ import time
 import rospy
 from dubins_traffic_msgs.msg import LabelStamped
 from dubins_traffic_msgs.srv import MMode, MModeRequest
-from gazebo_msgs.msg import ModelStates
+from gazebo_msgs.msg import ModelState, ModelStates
 from geometry_msgs.msg import Twist
 from integrator_chains_msgs.msg import ProblemInstanceJSON
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty
 
 
 def law(pose):
@@ -36,7 +38,7 @@ class Client:
         self.problems, self.labels, self.odometry, self.scans = [], [], 0, 0
         self.states, self.active, self.sent = 0, False, 0
         self.action, self.limit = "drive", 10**9
-        self.names = []
+        self.names, self.ego, self.paused = [], None, {}
         self.out = rospy.Publisher(
             "/ego/mobile_base/commands/velocity", Twist, queue_size=100, tcp_nodelay=True
         )
@@ -69,6 +71,7 @@ class Client:
     def state(self, message):
         self.states += 1
         self.names = message.name
+        self.ego = message.pose[message.name.index("ego")]
         with self.lock:
             if not self.active:
                 return
@@ -99,8 +102,33 @@ class Client:
         return {
             "action": action, "started": started, "again": again, "problem": json.loads(self.problems[seen]),
             "last": self.problems[seen + 1], "labels": self.labels, "names": self.names, "refused": refused,
-            "states": self.states - states, "odometry": self.odometry - odometry, "scans": self.scans - scans,
+            **self.paused, "states": self.states - states,
+            "odometry": self.odometry - odometry, "scans": self.scans - scans,
         }  # fmt: skip
+
+    def place(self):
+        """Put the ego elsewhere and wait until it is seen there."""
+        while not self.mode(MModeRequest.READY).result:
+            time.sleep(0.02)
+        out = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
+        message = ModelState(model_name="ego")
+        message.pose.position.x, message.pose.orientation.w = 1.25, 1.0
+        for _ in range(100):
+            out.publish(message)
+            time.sleep(0.05)
+            if self.ego is not None and abs(self.ego.position.x - 1.25) < 1e-6:
+                break
+        return {"x": self.ego.position.x}
+
+    def pause(self):
+        """Pause for half a second and say what moved meanwhile."""
+        rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
+        time.sleep(0.2)
+        before, states = self.ego.position.x, self.states
+        time.sleep(0.5)
+        self.paused = {"moved": self.ego.position.x - before, "states_while_paused": self.states - states}
+        rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
+        self.limit = 10**9
 
     def until(self, done):
         with self.lock:
@@ -112,6 +140,8 @@ class Client:
             return not self.mode(MModeRequest.RESET).result
         if action == "restart":
             return not self.mode(MModeRequest.RESTART).result
+        if action == "pause":
+            self.pause()
         if action == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if action == "stop":
@@ -135,4 +165,5 @@ if __name__ == "__main__":
     client = Client()
     for argument in sys.argv[1:]:
         what, _, count = argument.partition(":")
-        print(json.dumps(client.trial(what, int(count or 10**9))), flush=True)
+        seen = client.place() if what == "place" else client.trial(what, int(count or 10**9))
+        print(json.dumps(seen), flush=True)

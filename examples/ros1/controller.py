@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """An ego controller as a ROS 1 node: round the goals in order, straight across country, as `simple` of 2016.
 
 It knows nothing of dubins-traffic but names and types: topics, the mode service, the JSON of an instance. Start it

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.record.sink import End
 from dubins_traffic.transports.ros1.master import pid_at
 from dubins_traffic.transports.ros1.messages import MD5, load
-from tests.ros import ROOT, Graph, configuration, finish, graph, lines, need_ros
+from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
@@ -223,3 +224,40 @@ def test_own_master_port_in_use_second_maestro_and_interruption(tmp_path: Path) 
         assert status == 1
         assert "interrupted after 1 trials" in err
         assert not any(Path(f"/proc/{child}").exists() for child in children)
+
+
+def test_a_launch_file_starts_a_session_with_its_controller(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path, core=False) as ros:
+        config = configuration(tmp_path, number_trials=1, duration=1.5)
+        ros.client_messages()
+        options = [f"config:={config}", f"options:=--records {tmp_path / 'out'}"]
+        roslaunch = [SYSTEM_PYTHON, str(shutil.which("roslaunch")), "-p", str(ros.port)]
+        launch = ros.start(
+            [*roslaunch, "dubins_traffic_nodes", "trials.launch", *options],
+            ROS_PACKAGE_PATH=str(ROOT / "examples" / "ros1"),
+            DUBINS_TRAFFIC=f"{sys.executable} -m dubins_traffic.cli",
+            PYTHONPATH=str(tmp_path / "messages"),
+        )
+        finish(launch)
+        assert ends(tmp_path / "out") == {"trial-0000": End.DURATION}
+
+
+def test_cars_are_placed_before_a_trial_and_time_stands_still_while_paused(
+    ros: Graph, tmp_path: Path
+) -> None:
+    records = tmp_path / "out"
+    session = ros.session(
+        configuration(tmp_path, number_trials=1, duration=1.0), "--clock", "--records", records
+    )
+    status, out, err = finish(ros.client("place", "pause:5"))
+    assert status == 0, err
+    placed, paused = lines(out)
+    assert placed["x"] == pytest.approx(1.25)
+    assert paused["moved"] == 0.0
+    assert paused["states_while_paused"] >= 40
+    assert finish(session)[0] == 0
+    record = dt.load_record(records / "trial-0000.mcap")
+    assert record.instance.starts[0].x == pytest.approx(1.25)
+    assert record.ending is not None
+    assert record.ending.end is End.DURATION
