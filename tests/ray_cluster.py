@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import IO, Any
 
 NODES = 3
@@ -67,6 +70,7 @@ def main() -> None:
     cluster = Cluster(initialize_head=True, head_node_args={**common, "include_dashboard": False})
     nodes = [cluster.add_node(wait=False, **common) for _ in range(NODES - 1)]
     cluster.wait_for_nodes()
+    helpers = _helpers()
     print(cluster.address, flush=True)
     for line in sys.stdin:
         word = line.strip()
@@ -77,6 +81,19 @@ def main() -> None:
             cluster.head_node.kill_raylet()
         print(word, flush=True)
     cluster.shutdown()
+    for helper in helpers:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(helper, signal.SIGKILL)
+
+
+def _helpers() -> list[int]:
+    """Return the processes that those started here have started: Ray leaves them behind when these are killed."""
+    parents: dict[int, int] = {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = status.read_text().rpartition(")")[2].split()
+            parents[int(status.parent.name)] = int(fields[1])
+    return [child for child, parent in parents.items() if parents.get(parent) == os.getpid()]
 
 
 if __name__ == "__main__":
