@@ -197,10 +197,10 @@ def _end(process: subprocess.Popen[bytes], link: Link, folder: tempfile.Temporar
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End a process and its group."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
+    """End a process and its group, unless it has ended."""
+    if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+        process.wait()
 
 
 def _folder() -> tempfile.TemporaryDirectory[str]:
