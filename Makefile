@@ -21,6 +21,7 @@ demo: .venv/.installed-plot ## three trials with two controllers, scored, drawn 
 test: .venv/.installed-dev ## all checks, then all tests
 	@scripts/system-packages.sh
 	@scripts/crosscheck-tools.sh
+	@scripts/gazebo.sh
 	@$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 

@@ -21,12 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.drawing import random_roads, random_trial
 from benchmarks.table import Row, show
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.driving.free_flow import free_flow
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.problem.configuration import load_config
-from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
@@ -113,24 +112,9 @@ def way_is_free(problem: Problem, x: Any, y: Any, c: float, s: float) -> bool:
 def instance(number: int, seed: int = 2016) -> Instance:
     """Return the random instance of a number."""
     draws = Draws(seed, number, 900)
-    intersections = draws.between(6, 60)
-    most = math.floor(2 * intersections - 2 * math.sqrt(intersections))
-    configuration = {
-        "version": 1,
-        "problem_domain": "dubins_traffic",
-        "network": {
-            "random": {
-                "intersections": intersections,
-                "segments": draws.between(intersections - 1, most),
-                "rigid_motion": True,
-            }
-        },
-        "e-agents": [{"type": "wander", "name": "agent", "count": draws.between(1, 8)}],
-        "number_trials": 1,
-        "duration": int(DURATION),
-        "number_goals_bounds": [1, 4],
-    }
-    return draw(load_config(configuration), seed, number)
+    network = random_roads(draws, 60, 1.0)
+    e_agents = [{"type": "wander", "name": "agent", "count": draws.between(1, 8)}]
+    return random_trial(network, e_agents, DURATION, seed, number)
 
 
 def drive(number: int, rounds: int = ROUNDS, seconds: float = DURATION) -> Drive:

@@ -10,10 +10,9 @@ many are run of each of the others. Free flow is that of `dubins_traffic.driving
 
 from __future__ import annotations
 
-import math
 import statistics
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -21,12 +20,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.drawing import random_roads, random_trial
 from benchmarks.table import Row, show
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.driving.free_flow import free_flow
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.problem.configuration import load_config
-from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
@@ -76,8 +74,8 @@ class Waiting:
 
 
 def e_agents(kind: str, count: int, draws: Draws) -> list[dict[str, Any]]:
-    """Return the e-agents of a configuration."""
-    given = BREAKS if kind == "breakers" else {}
+    """Return the e-agents of a configuration; `kind` may be the name of one rule that all of them break."""
+    given = BREAKS if kind == "breakers" else {kind: 1.0} if kind in BREAKS else {}
     agents = [
         {"type": "lawful", "name": f"car{k}", "parameters": {"goes": goes, **given}}
         for k, goes in enumerate(("wander", "loop", "places")[draws.below(3)] for _ in range(count))
@@ -87,33 +85,26 @@ def e_agents(kind: str, count: int, draws: Draws) -> list[dict[str, Any]]:
     return agents
 
 
-def instance(number: int, kind: str = "lawful", seconds: float = DURATION, seed: int = 2016) -> Instance:
-    """Return the random instance of a number."""
+def instance(
+    number: int,
+    kind: str = "lawful",
+    seconds: float = DURATION,
+    seed: int = 2016,
+    body: Mapping[str, Any] | None = None,
+) -> Instance:
+    """Return the random instance of a number; `body` is the `car` of its configuration."""
     draws = Draws(seed, number, 901)
-    intersections = draws.between(6, 40)
-    most = math.floor(2 * intersections - 2 * math.sqrt(intersections))
-    configuration = {
-        "version": 1,
-        "problem_domain": "dubins_traffic",
-        "network": {
-            "random": {
-                "intersections": intersections,
-                "segments": draws.between(intersections - 1, int(0.5 * (intersections + most))),
-                "rigid_motion": True,
-            }
-        },
-        "e-agents": e_agents(kind, draws.between(1, 6), draws),
-        "number_trials": 1,
-        "duration": seconds,
-        "number_goals_bounds": [1, 4],
-        "rules": True,
-    }
-    return draw(load_config(configuration), seed, number)
+    network = random_roads(draws, 40, 0.5)
+    agents = e_agents(kind, draws.between(1, 6), draws)
+    car = {} if body is None else {"car": body}
+    return random_trial(network, agents, seconds, seed, number, rules=True, **car)
 
 
-def drive(number: int, kind: str = "lawful", seconds: float = DURATION) -> Drive:
-    """Run `rules` on an instance."""
-    own = instance(number, kind, seconds)
+def drive(
+    number: int, kind: str = "lawful", seconds: float = DURATION, body: Mapping[str, Any] | None = None
+) -> Drive:
+    """Run `rules` on an instance, with a car of its own if `body` says so."""
+    own = instance(number, kind, seconds, body=body)
     watch = Waiting()
     score = run_trial(own, "rules", sinks=[watch]).score
     verdict = score.verdict

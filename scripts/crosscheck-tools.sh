@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# stormpy (carries Spot), rtamt, TuLiP; and Debian's spin. What is there already is left alone.
+# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd; and Debian's spin and mona. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -27,16 +27,22 @@ environment() { # name, module, packages...
 mkdir -p "$folder"
 environment stormpy stormpy 'stormpy==2.0.0'
 environment rtamt rtamt 'rtamt==0.4.10' setuptools
+environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
+environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
 
-if ! command -v spin >/dev/null 2>&1; then
+missing=()
+for program in spin mona; do
+  command -v "$program" >/dev/null 2>&1 || missing+=("$program")
+done
+if [ "${#missing[@]}" -gt 0 ]; then
   as_root=""
   [ "$(id -u)" = 0 ] || as_root="sudo -n"
   if command -v apt-get >/dev/null 2>&1 && $as_root apt-get update >"$log" 2>&1 &&
     $as_root env DEBIAN_FRONTEND=noninteractive \
-      apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends spin >>"$log" 2>&1; then
-    echo "crosscheck-tools: installed spin"
+      apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends "${missing[@]}" >>"$log" 2>&1; then
+    echo "crosscheck-tools: installed ${missing[*]}"
   else
-    echo "crosscheck-tools: could not install spin: $(tail -n 1 "$log")"
+    echo "crosscheck-tools: could not install ${missing[*]}: $(tail -n 1 "$log")"
   fi
 fi

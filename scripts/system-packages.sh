@@ -1,37 +1,48 @@
 #!/bin/sh
-# Install the system packages that the tests need: Chromium and its driver, for the test of the replay page.
-# Does nothing where they are, and says so in one line where it can't install them; the status is 0 either way.
+# Install the system packages that the tests need: Chromium and its driver, for the test of the replay page; ROS 1 and
+# a compiler, for the tests over ROS. Does nothing where they are, and says in one line what it can't install; the
+# status is 0 either way.
 set -eu
 
-present() {
-    command -v chromium >/dev/null 2>&1 && command -v chromedriver >/dev/null 2>&1
+ros="python3-rospy python3-rosmaster python3-roslaunch python3-genpy python3-gencpp python3-nav-msgs"
+ros="$ros python3-sensor-msgs python3-geometry-msgs python3-std-srvs python3-tf2-msgs ros-geometry-msgs ros-std-msgs"
+ros="$ros libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev g++ pkg-config"
+
+has() {
+    for command in "$@"; do command -v "$command" >/dev/null 2>&1 || return 1; done
+}
+installed() {
+    for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || return 1; done
 }
 
-if present; then
-    exit 0
-fi
+missing=""
+has chromium chromedriver || missing="chromium chromium-driver"
+# shellcheck disable=SC2086 # a list of words
+installed $ros || missing="$missing $ros"
+[ -n "$missing" ] || exit 0
 
-if ! command -v apt-get >/dev/null 2>&1; then
-    echo "system-packages: no apt-get here; install chromium and chromium-driver by hand to test the replay page"
+if ! has apt-get; then
+    echo "system-packages: no apt-get here; install by hand: $missing"
     exit 0
 fi
 
 if [ "$(id -u)" -eq 0 ]; then
     as_root=""
-elif command -v sudo >/dev/null 2>&1 && sudo -n true 2>/dev/null; then
+elif has sudo && sudo -n true 2>/dev/null; then
     as_root="sudo -n"
 else
-    echo "system-packages: neither root nor sudo without a password; install chromium and chromium-driver by hand"
+    echo "system-packages: neither root nor sudo without a password; install by hand: $missing"
     exit 0
 fi
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
+# shellcheck disable=SC2086 # lists of words
 if $as_root apt-get update >"$log" 2>&1 &&
     $as_root env DEBIAN_FRONTEND=noninteractive \
-        apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends chromium chromium-driver >>"$log" 2>&1 && present; then
-    echo "system-packages: installed chromium and chromium-driver"
+        apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends $missing >>"$log" 2>&1; then
+    echo "system-packages: installed $missing"
 else
-    echo "system-packages: could not install chromium and chromium-driver: $(tail -n 1 "$log")"
+    echo "system-packages: could not install $missing: $(tail -n 1 "$log")"
 fi
 exit 0

@@ -27,7 +27,7 @@ def drawn(
             else random.choice((TRUE, FALSE))
         )
     if past and random.random() < 0.2:
-        return _drawn_past(random, depth, names)
+        return drawn_past(random, depth, names)
 
     def part() -> Formula:
         return drawn(random, depth - 1, names, past=past, bounds=bounds, longest=longest)
@@ -44,12 +44,13 @@ def drawn(
     return make(op, (part(), part()), bounds=limits)
 
 
-def _drawn_past(random: Random, depth: int, names: tuple[str, ...]) -> Formula:
+def drawn_past(random: Random, depth: int, names: tuple[str, ...]) -> Formula:
+    """Return a random formula of past operators."""
     if depth == 0 or random.random() < 0.2:
         return make(Op.PROP, name=random.choice(names))
     op = random.choice((*_PAST, Op.NOT, Op.AND, Op.OR))
     count = 1 if op in (Op.Y, Op.Z, Op.O, Op.H, Op.NOT) else 2
-    args = tuple(_drawn_past(random, depth - 1, names) for _ in range(count))
+    args = tuple(drawn_past(random, depth - 1, names) for _ in range(count))
     return conj(*args) if op is Op.AND else disj(*args) if op is Op.OR else make(op, args)
 
 

@@ -1,101 +1,118 @@
-"""The propositions of `spec.task` on recorded frames, and when the formulas over them are first broken."""
+"""What the formulas of `spec.task` say of a recorded trial: when each is first broken, and its last verdict."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
-import numpy as np
-import numpy.typing as npt
-
-from dubins_traffic.cars.state import Frames
+from dubins_traffic.cars.state import EGO, NONE, Frames
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.spec import propositions as flags
+from dubins_traffic.scoring.verdict import first_fall
 from dubins_traffic.spec.judge import Breach
-from dubins_traffic.spec.logic.formula import Formula, propositions
+from dubins_traffic.spec.logic.automaton import VERDICTS
+from dubins_traffic.spec.logic.formula import Formula, always, eventually, propositions
 from dubins_traffic.spec.logic.monitor import Monitors
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.task import task
+from dubins_traffic.spec.valuation import Valuation
 
-Signal = npt.NDArray[np.bool_]
-Key = tuple[str, int, int]
+Key: TypeAlias = tuple[str, int, int]
 """A rule, a car and an intersection (-1: none)."""
 
-_OF_CAR = {"on_road": flags.ON_ROAD, "left": flags.LEFT, "overtaking": flags.OVERTAKING}
-_OF_QUEUE = {"stopped": flags.STOPPED, "ahead": flags.AHEAD, "first": flags.FIRST}
 _FORMS = {
     r"G !collision_(\w+)": "1.collision",
     r"G \(Y on_road_(\w+) -> on_road_\1\)": "1.road",
+    r"G F (\w+)_t_(\d+)_(\d+)": "1.goal",
     r"G \(left_(\w+) -> overtaking_\1\)": "2.left",
     r"G \(left_(\w+) -> F\[.*\] !left_\1\)": "2.return",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y stopped_\1_\2_\3\)": "3.stop",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y !ahead_\1_\2_\3\)": "3.order",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y clear_\1_\2_\3\)": "3.clear",
+    r"G !excess_(\w+)": "E1",
     r"G !at_fault_(\w+)": "E2",
     r"G \(first_(\w+)_(\d+)_(\d+) & clear_\1_\2_\3 -> F\[.*\] !\(first_\1_\2_\3 & clear_\1_\2_\3\)\)": "E3.enter",
+    r"G !renewed_(\w+)": "E3.tickets",
+    r"G \(exit_(\w+) -> F\[.*\] !exit_\1\)": "E4",
+    r"G \(stands_(\w+) & way_\1 -> F\[.*\] !\(stands_\1 & way_\1\)\)": "E5",
+    r"G F free(_)(\d+)_(\d+)": "E6",
 }
-"""The formulas whose propositions are in records, and the rules that they say."""
+"""The forms of the task's formulas, and the rules that they say."""
+_PLACED = ("1.goal", "3.stop", "3.order", "3.clear", "E3.enter", "E6")
 
 
-def stated(instance: Instance, formulas: Sequence[Formula]) -> dict[Key, Formula]:
-    """Return the formulas that records decide, by what they say."""
+def stated(instance: Instance) -> dict[Key, Formula]:
+    """Return the formulas of the task by what they say, E6 with its horizon, which the task leaves out."""
+    spec = task(instance.problem, instance.names)
     found: dict[Key, Formula] = {}
-    for formula in formulas:
-        for form, rule in _FORMS.items():
-            match = re.fullmatch(form, str(formula))
-            if match:
-                name, *point = match.groups()
-                vertex = instance.problem.network.vertex((int(point[0]), int(point[1]))) if point else -1
-                found[rule, instance.names.index(name), vertex] = formula
+    for formula in (*spec.assumptions, *spec.guarantees):
+        ((rule, match),) = [
+            (rule, match)
+            for form, rule in _FORMS.items()
+            if (match := re.fullmatch(form, str(formula))) is not None
+        ]
+        name, *point = match.groups()
+        vertex = instance.problem.network.vertex((int(point[0]), int(point[1]))) if point else NONE
+        car = NONE if rule == "E6" else instance.names.index(name)
+        assert (rule, car, vertex) not in found
+        found[rule, car, vertex] = formula
+        if rule == "E6":
+            horizon = RuleParameters.from_mapping(instance.problem.rules).goal_time
+            found[rule, car, vertex] = always(eventually(formula.args[0].args[0], (0.0, horizon)))
     return found
 
 
-def signals(instance: Instance, frames: Frames) -> dict[str, Signal]:
-    """Return those propositions of a whole trial that its labels and contacts tell, (F,) each."""
-    found: dict[str, Signal] = {}
-    network = instance.problem.network
-    heads = np.array([network.lane_ends(lane)[1] for lane in range(network.lanes)] + [-1])[frames.lane]
-    for n, name in enumerate(instance.names):
-        bits = frames.bits[:, n]
-        found |= {f"{word}_{name}": bits & flag != 0 for word, flag in _OF_CAR.items()}
-        hits = [contact for contact in frames.contacts if n in (contact.car, contact.other)]
-        faults = [hit for hit in hits if hit.at_fault[0 if hit.car == n else 1]]
-        for word, contacts in (("collision", hits), ("at_fault", faults)):
-            ticks = [contact.tick for contact in contacts]
-            found[f"{word}_{name}"] = np.isin(np.arange(len(frames)), ticks)
-        for v, (x, y) in enumerate(network.intersections):
-            crosses = frames.crosses == v
-            others = np.delete(crosses, n, axis=1).any(axis=1)
-            found |= {
-                f"{word}_{name}_{x}_{y}": (bits & flag != 0) & (heads[:, n] == v)
-                for word, flag in _OF_QUEUE.items()
-            }
-            found[f"enter_{name}_{x}_{y}"] = (bits & flags.ENTERED != 0) & crosses[:, n]
-            found[f"clear_{name}_{x}_{y}"] = ~others
-    return found
-
-
-def first_broken(
-    formulas: Mapping[Key, Formula], values: Mapping[str, Signal], period: float
-) -> dict[Key, int]:
-    """Return at which frame the monitor of each formula says false, of those for which it does."""
+def judged(
+    instance: Instance, formulas: Mapping[Key, Formula], frames: Frames
+) -> tuple[dict[Key, int], dict[Key, str]]:
+    """Return at which frame the monitor of each formula first says false, if it does, and its last verdict."""
     names = sorted({name for formula in formulas.values() for name in propositions(formula)})
-    monitors = Monitors(
-        {str(number): formula for number, formula in enumerate(formulas.values())}, names, period
-    )
+    texts = {str(number): formula for number, formula in enumerate(formulas.values())}
+    monitors = Monitors(texts, names, instance.problem.period)
     monitors.reset(1)
     found: dict[Key, int] = {}
-    for tick, row in enumerate(np.stack([values[name] for name in names], axis=1)):
-        verdicts = monitors.update(row[None, :])[0]
-        for key, verdict in zip(formulas, verdicts.tolist(), strict=True):
-            if verdict == 0:
+    last: Sequence[int] = ()
+    for tick, row in enumerate(Valuation(instance, names).values(frames)):
+        last = monitors.update(row[None, :])[0].tolist()
+        for key, verdict in zip(formulas, last, strict=True):
+            if VERDICTS[verdict] == "false":
                 found.setdefault(key, tick)
-    return found
+    return found, {key: VERDICTS[verdict] for key, verdict in zip(formulas, last, strict=True)}
 
 
-def first_breaches(formulas: Mapping[Key, Formula], breaches: Sequence[Breach]) -> dict[Key, int]:
+def first_breaches(
+    instance: Instance, formulas: Mapping[Key, Formula], breaches: Sequence[Breach]
+) -> dict[Key, int]:
     """Return at which frame the referee first says that each of the rules is broken."""
     found: dict[Key, int] = {}
     for breach in breaches:
-        key = (breach.rule, breach.car, breach.vertex if breach.rule[0] in "3E" else -1)
+        car = NONE if breach.rule == "E6" else breach.car
+        key = (breach.rule, car, breach.vertex if breach.rule in _PLACED else NONE)
         if key in formulas:
             found.setdefault(key, breach.tick)
+    rules, rate = RuleParameters.from_mapping(instance.problem.rules), instance.problem.rate
+    for rule, car, _ in formulas:
+        if rule == "E1":
+            fall = first_fall(
+                [one for one in breaches if one.car == car and one.rule[0] in "23"], rules, rate
+            )
+            if fall is not None:
+                found[rule, car, NONE] = fall[1].tick
     return found
+
+
+def summed(instance: Instance, verdicts: Mapping[Key, str]) -> dict[str, str]:
+    """Return the least verdict of each part of the task, by the names that verdicts on trials have for them."""
+    found: dict[str, str] = {}
+    for (rule, car, vertex), verdict in verdicts.items():
+        part = rule if car == EGO else rule[:2] if rule.startswith("E") else "E1"
+        if rule == "1.goal":
+            x, y = instance.problem.network.intersections[vertex]
+            part = f"1.goal {x} {y}"
+        found[part] = min(found.get(part, "true"), verdict, key=VERDICTS.index)
+    return {part: _undecided(verdict) for part, verdict in found.items()}
+
+
+def _undecided(verdict: str) -> str:
+    """Return a verdict; of a part that holds for good that it is presumed to: no trial's verdict says more."""
+    return "presumably true" if verdict == "true" else verdict

@@ -49,8 +49,11 @@ def write_text(path: str | Path, text: str) -> None:
     replace_file(Path(path), lambda neighbour: neighbour.write_bytes(text.encode("utf-8")))
 
 
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool = False) -> None:
     """Let `write` make a temporary neighbour of `path`, then put it in the place of `path` in one step.
+
+    With `durable` it has reached the disk before it takes that place, and the place itself before this returns, so
+    that not even a loss of power leaves half a file.
 
     Raises
     ------
@@ -62,9 +65,22 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     neighbour = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         write(neighbour)
+        if durable:
+            _flush(neighbour)
         neighbour.replace(path)
+        if durable:
+            _flush(path.parent)
     except OSError as error:
         raise InputError(f"can't be written ({error.strerror or error})", file=str(path)) from error
     finally:
         with contextlib.suppress(OSError):
             neighbour.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    """Wait until a file or a folder has reached the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

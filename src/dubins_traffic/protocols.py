@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from dubins_traffic.cars.state import Command, Contact, Labels, Observation, State
+from dubins_traffic.cars.state import Command, Contact, Labels, Observation, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import End, Ending, Sink
@@ -23,6 +23,8 @@ __all__ = [
     "End",
     "Ending",
     "Mailbox",
+    "Polled",
+    "Scans",
     "Simulator",
     "Sink",
     "Streams",
@@ -59,6 +61,18 @@ class Simulator(Protocol):
 
     def close(self) -> None:
         """Free what the simulator holds."""
+        ...
+
+
+@runtime_checkable
+class Scans(Protocol):
+    """A simulator with lasers of its own; for others, laser ranges are worked out from the state."""
+
+    def scan(self, car: int, rays: Floats, longest: float) -> Floats:
+        """Return how far each ray goes before it meets a body: (R,), metres, `longest` where it meets none.
+
+        `rays` (R, 2) are unit vectors in the frame of `car`, from its centre; no ray meets that car.
+        """
         ...
 
 
@@ -160,6 +174,10 @@ class Mailbox(Protocol):
         """Let simulated time stand still, or go on."""
         ...
 
+    def place(self, car: str, pose: Pose) -> None:
+        """Put `car` there, if no trial runs; a running trial lets nobody move cars but their drivers."""
+        ...
+
 
 class Transport(Protocol):
     """Carries frames to drivers elsewhere and their commands back; one for all remote cars of a session.
@@ -214,6 +232,18 @@ class Streams(Protocol):
 
     def stream(self, view: View) -> None:
         """Send the world as it is between two frames: `view.time` and `view.state` lie between those of ticks."""
+        ...
+
+
+@runtime_checkable
+class Polled(Protocol):
+    """A transport without threads of its own: what has come is taken by the trial's thread when it waits.
+
+    Handing a message over from another thread would cost about as much as a whole exchange of messages.
+    """
+
+    def receive(self, seconds: float) -> None:
+        """Wait for a message, so long at most, and hand all that have come to the mailbox."""
         ...
 
 

@@ -39,14 +39,19 @@ def asked(tool: str, script: str, request: object) -> Any:
     return json.loads(ran.stdout.strip().splitlines()[-1])
 
 
-def never_claim(text: str) -> str:
-    """Return SPIN's automaton of a formula, without its first line and what is needless at literals."""
+def spin_output(text: str) -> str:
+    """Return what SPIN makes of a formula: a never claim."""
     ran = subprocess.run(
         [program("spin"), "-f", text], capture_output=True, text=True, check=False, timeout=60
     )
     assert ran.returncode == 0, f"{text}: {ran.stdout}{ran.stderr}"
     assert "syntax error" not in ran.stdout, f"{text}: {ran.stdout}"
-    claim, before = "".join(ran.stdout.splitlines()[1:]).replace(" ", ""), ""
+    return ran.stdout
+
+
+def never_claim(text: str) -> str:
+    """Return SPIN's automaton of a formula, without its first line and what is needless at literals."""
+    claim, before = "".join(spin_output(text).splitlines()[1:]).replace(" ", ""), ""
     while claim != before:
         claim, before = re.sub(r"\((!*\w+|\(\w+\))\)", r"\1", claim).replace("!!", ""), claim
     return claim

@@ -33,3 +33,20 @@ def test_rules_is_never_at_fault_among_cars_that_break_rules() -> None:
     found = [drive(number, "breakers", 120.0) for number in range(SAMPLE // 2)]
     assert [one.number for one in found if one.at_fault] == []
     assert all(one.others for one in found)
+
+
+@pytest.mark.parametrize(
+    ("habit", "rule"), [("rolls", "3.stop"), ("left", "2.left"), ("blocks", "E4"), ("parks", "E6")]
+)
+def test_cars_with_one_bad_habit_break_its_rule_and_rules_is_clean(habit: str, rule: str) -> None:
+    """Who tailgates meets slower cars too seldom here: see the tests of the law."""
+    found = [drive(number, habit, 120.0) for number in (2, 5, 7, 9)]
+    assert all(rule in one.others for one in found)
+    assert [one.number for one in found if one.own or one.at_fault] == []
+
+
+def test_rules_is_clean_with_bodies_and_bounds_of_other_kinds() -> None:
+    rectangle = {"rectangle": {"length": 0.4, "width": 0.25}}
+    cars = ({"body": rectangle}, {"bounds": {"turning_radius": 0.26}})
+    found = [drive(number, "lawful", 60.0, car) for number in range(SAMPLE // 2) for car in cars]
+    assert [one.number for one in found if one.own or one.others or one.collisions] == []

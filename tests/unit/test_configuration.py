@@ -276,7 +276,7 @@ def test_valid_documents_agree_with_the_schemas() -> None:
         Draft202012Validator(shipped_schema(name)).validate(document)
 
 
-# What JSON Schema can't say: relations between values, and 1.0 where an integer is asked.
+# What JSON Schema can't say: relations between values, likeness of keys, and 1.0 where an integer is asked.
 RELATIONS = {
     "trials with a fraction", "bounds in the wrong order", "goal off the network", "too many ticks", "no tick",
     "agent called ego", "name twice", "counts add up", "one start for many", "cycle that jumps",
@@ -284,6 +284,7 @@ RELATIONS = {
     "rules without sight", "rules with small discs", "starts that overlap", "start in an obstacle", "too many cars",
     "impossible network", "huge grid",  "rnd is no file", "huge length", "start far away",
     "crossing roads", "start of nobody", "heading too long", "bad instance", "NaN", "infinite rate",
+    "misspelt key", "misspelt key of an agent",
 }  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from random import Random
 
 import pytest
 
@@ -17,8 +17,19 @@ from dubins_traffic.spec.logic.exports import (
     tlsf,
     tulip,
 )
-from dubins_traffic.spec.logic.formula import FormulaError
+from dubins_traffic.spec.logic.formula import Formula, FormulaError, conj, implies
 from dubins_traffic.spec.logic.parse import parse
+from dubins_traffic.spec.logic.printer import (
+    ASCII,
+    SPIN,
+    Brackets,
+    Style,
+    written,
+    written_implication,
+    written_together,
+)
+from tests.formulas import drawn
+from tests.grammars import slugs_sections, tlsf_sections
 
 TASK = Specification(
     assumptions=tuple(
@@ -42,46 +53,6 @@ TASK = Specification(
     outputs=("at_0", "at_1", "left", "enter", "brake"),
 )
 PERIOD = 0.1
-
-
-class Grammar:
-    """Recognises fully parenthesised formulas: binary operators only between operands, one kind per level."""
-
-    def __init__(self, text: str, operand: str, unary: str, binary: str) -> None:
-        self.tokens = re.findall(rf"\s*({operand}|{unary}|{binary}|[()])", text)
-        assert "".join(self.tokens).replace(" ", "") == re.sub(r"\s", "", text), text
-        self.operand, self.unary, self.binary = operand, unary, binary
-        self.place = 0
-
-    def _at(self, pattern: str) -> bool:
-        return self.place < len(self.tokens) and re.fullmatch(pattern, self.tokens[self.place]) is not None
-
-    def formula(self) -> None:
-        self.part()
-        first = self.tokens[self.place] if self._at(self.binary) else ""
-        count = 0
-        while self._at(self.binary):
-            assert self.tokens[self.place] == first, self.tokens
-            self.place += 1
-            count += 1
-            self.part()
-        assert count < 2 or first in ("&&", "||", "&", "|"), self.tokens
-
-    def part(self) -> None:
-        while self._at(self.unary):
-            self.place += 1
-        if self._at(r"\("):
-            self.place += 1
-            self.formula()
-            assert self._at(r"\)"), self.tokens
-            self.place += 1
-        else:
-            assert self._at(self.operand), (self.tokens, self.place)
-            self.place += 1
-
-    def accepts(self) -> bool:
-        self.formula()
-        return self.place == len(self.tokens)
 
 
 def test_spin_without_past_and_bounds() -> None:
@@ -117,47 +88,22 @@ def test_stl_has_signals_and_seconds() -> None:
 
 def test_tlsf_keeps_its_grammar() -> None:
     text = tlsf(TASK, PERIOD)
-    main = re.fullmatch(
-        r"INFO \{\n  TITLE: \"[^\"]*\"\n  DESCRIPTION: \"[^\"]*\"\n  SEMANTICS: Mealy\n  TARGET: Mealy\n\}\n\n"
-        r"MAIN \{\n  INPUTS \{\n(?P<inputs>(?:    \w+;\n)+)  \}\n  OUTPUTS \{\n(?P<outputs>(?:    \w+;\n)+)  \}\n"
-        r"  ASSUME \{\n(?P<assume>(?:    .+;\n)+)  \}\n  GUARANTEE \{\n(?P<guarantee>(?:    .+;\n)+)  \}\n\}\n",
-        text,
-    )
-    assert main is not None
-    assert main["inputs"].split() == [f"{name};" for name in (*TASK.inputs, "past_1", "past_2")]
-    assert main["outputs"].split() == [f"{name};" for name in TASK.outputs]
-    lines = [line.strip(" ;") for line in (main["assume"] + main["guarantee"]).splitlines()]
-    assert len(lines) == 4 + 3 + 7
-    for line in lines:
-        assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), line
+    sections = tlsf_sections(text)
+    assert sections["inputs"] == [*TASK.inputs, "past_1", "past_2"]
+    assert sections["outputs"] == [*TASK.outputs]
+    assert len(sections["assume"]) == 4 + 3
+    assert len(sections["guarantee"]) == 7
     assert "G (left -> (F[0:10] (!left)))" in text
 
 
 def test_slugs_keeps_its_grammar() -> None:
-    text = slugs(TASK, PERIOD)
-    sections: dict[str, list[str]] = {}
-    for line in text.splitlines():
-        if line.startswith("["):
-            sections[line] = []
-        elif line:
-            sections[list(sections)[-1]].append(line)
-    sides = [f"[{side}_{part}]" for part in ("INIT", "TRANS", "LIVENESS") for side in ("ENV", "SYS")]
-    assert list(sections) == ["[INPUT]", "[OUTPUT]", *sides]
-    counters = r"(?:ticks|left)_\d"
-    for line in sections["[INPUT]"] + sections["[OUTPUT]"]:
-        assert re.fullmatch(rf"{counters}:0\.\.\.\d+|\w+", line)
-    operand = rf"{counters}'? (?:=|>) (?:{counters} [+-] )?\d+|[a-z]\w*'?"
-    for name in sides:
-        assert sections[name] or name == "[ENV_TRANS]"
-        for line in sections[name]:
-            assert Grammar(line, operand, "!", r"&|\||->|<->").accepts(), line
-    assert sections["[ENV_LIVENESS]"] == ["free_0", "!owed_1"]
-    assert sections["[SYS_LIVENESS]"] == ["at_0", "at_1"]
-    assert "past_1' <-> (stopped & (!ahead))" in sections["[ENV_TRANS]"]
-    assert "enter -> brake'" in sections["[SYS_TRANS]"]
-    assert "!left" in sections["[SYS_INIT]"]
-    primed_by_environment = set(re.findall(r"(\w+)'", "\n".join(sections["[ENV_TRANS]"])))
-    assert primed_by_environment <= {line.split(":")[0] for line in sections["[INPUT]"]}
+    sections = slugs_sections(slugs(TASK, PERIOD))
+    assert all(sections[name] for name in sections)
+    assert sections["ENV_LIVENESS"] == ["free_0", "!owed_1"]
+    assert sections["SYS_LIVENESS"] == ["at_0", "at_1"]
+    assert "past_1' <-> (stopped & (!ahead))" in sections["ENV_TRANS"]
+    assert "enter -> brake'" in sections["SYS_TRANS"]
+    assert "!left" in sections["SYS_INIT"]
 
 
 def test_tulip_is_a_python_file() -> None:
@@ -212,3 +158,22 @@ def test_sides_must_be_clear() -> None:
         Specification((), (parse("[] a"),), ("b",), ())
     with pytest.raises(FormulaError, match="both input and output: got 'a'"):
         Specification((), (), ("a",), ("a",))
+
+
+@pytest.mark.parametrize(
+    "style", [SPIN, ASCII, Style({}, Brackets.ALL)], ids=["spin", "ascii", "all brackets"]
+)
+def test_what_is_written_together_is_what_the_whole_formula_is(style: Style) -> None:
+    random = Random(4)
+
+    def side() -> tuple[Formula, ...]:
+        return tuple(
+            drawn(random, random.randint(0, 3), ("a", "b"), past=True, bounds=True)
+            for _ in range(random.randint(0, 3))
+        )
+
+    for _ in range(200):
+        left, right = side(), side()
+        assert written_together(left, style) == written(conj(*left), style)
+        whole = implies(conj(*left), conj(*right)) if left else conj(*right)
+        assert written_implication(left, right, style) == written(whole, style)

@@ -15,6 +15,8 @@ import pytest
 
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_way, way_between
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -60,6 +62,15 @@ def on_grid(agents: Sequence[dict[str, Any]], seconds: float, ego: Sequence[floa
         **more,
     }
     return draw(load_config(configuration), 7, 0)
+
+
+class Slow(Rules):
+    """`rules` at half its speed."""
+
+    def act(self, observation: Observation) -> Command:
+        """Drive on."""
+        speed, yaw_rate = super().act(observation)
+        return Command(0.5 * speed, 0.5 * yaw_rate)
 
 
 def broken(score: Score, name: str) -> set[str]:
@@ -147,7 +158,7 @@ def test_does_not_pass_where_it_could_not_return_before_the_disc() -> None:
         ({"rolls": 1.0}, {"3.stop"}),
         ({"left": 1.0}, {"2.left"}),
         ({"blocks": 1.0}, {"E4"}),
-        ({"parks": 1.0, "parks_for": 60.0}, {"E4"}),
+        ({"parks": 1.0, "parks_for": 300.0}, {"E4", "E6"}),
     ],
     ids=["rolls", "left", "blocks", "parks"],
 )
@@ -157,6 +168,20 @@ def test_breaks_the_rules_it_is_told_to(habit: dict[str, float], rules: set[str]
     assert broken(score, "bad") >= rules
     assert broken(score, "ego") == set()
     assert not any(one.at_fault for one in score.collisions)
+
+
+@pytest.mark.parametrize("ahead", ["ego", "agent"])
+def test_who_tailgates_runs_into_who_is_ahead(ahead: str) -> None:
+    """Who is ahead and stops at the line, the ego too, is never at fault."""
+    bad = car("lawful", "bad", turned(2.2, -W), tailgates=1.0)
+    ego = turned(3.0, -W) if ahead == "ego" else turned(3.0, 12.0 - W)
+    others = [] if ahead == "ego" else [car("lawful", "slow", turned(3.0, -W), speed=0.4)]
+    instance = on_grid([bad, *others], 60.0, ego)
+    score = run_trial(instance, Slow() if ahead == "ego" else "rules").score
+    assert "E2" in broken(score, "bad")
+    assert not any(one.at_fault for one in score.collisions)
+    assert broken(score, "slow") == set()
+    assert broken(score, "ego") <= {"1.collision"}
 
 
 def test_breaks_no_rule_that_it_is_not_told_to() -> None:

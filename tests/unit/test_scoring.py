@@ -224,6 +224,7 @@ def test_the_score_as_json() -> None:
         "min_clearance_m": pytest.approx(1412.0, abs=20.0),
         "time_to_begin_s": 0.5,
         "verdict": None,
+        "formulas": [],
     }
     assert document == expected
     assert list(document) == list(expected)

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import pytest
 
@@ -18,6 +19,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.spec.logic.exports import FORMATS, Specification
 from dubins_traffic.spec.logic.formula import Op, conj, propositions, subformulas
 from dubins_traffic.spec.logic.parse import parse
@@ -170,6 +172,17 @@ def test_the_rules_in_every_format(
         ast.parse(text)
 
 
+def test_a_huge_network_takes_seconds() -> None:
+    roads = RoadNetwork.grid(30, 30, 5.0)
+    spec = of(case(roads, 2, [(29, 29)]))
+    assert len(spec.guarantees) == 5 + 3 * (900 - 4)
+    for name, write in FORMATS.items():
+        began = process_time()
+        text = write(spec, 20.0)
+        assert process_time() - began < 5.0, name
+        assert text.replace("\\", "").count("ahead_ego_13_7") >= 1, name
+
+
 def test_spin_with_a_longer_period(command: Command, town: str) -> None:
     text = command(town, "--format", "spin", "--period", "2")
     found = parse(text)
@@ -180,7 +193,12 @@ def test_spin_with_a_longer_period(command: Command, town: str) -> None:
 def test_what_a_format_can_not_say_is_named(command: Command, town: str) -> None:
     error = command(town, "--format", "spin", "--guarantee", status=2)
     assert "[] (left_ego -> <>[0,10] !left_ego)" in error
-    assert "300 ticks" in error
+    assert "a bound of 10 s is too long" in error
+    assert "a period of at least 0.25 s" in error
+    assert command(town, "--format", "spin", "--guarantee", "--period", "0.25")
+    whole = command(town, "--format", "spin", status=2)
+    assert "a period of at least 1.5 s" in whole
+    assert command(town, "--format", "spin", "--period", "1.5")
     assert error.startswith(f"dubins-traffic: {town}: --format spin: ")
 
 

@@ -73,6 +73,15 @@ def test_an_inbox_keeps_one_command_a_car() -> None:
     assert slot.fault[0] is End.PEER_FLOOD
 
 
+def test_who_answers_many_frames_a_second_is_no_flood() -> None:
+    inbox = Inbox(flood=50)
+    inbox.expect(["ego"])
+    for tick in range(200):
+        inbox.stale()
+        inbox.command("ego", 0.1, 0.0, tick)
+    assert inbox.slot("ego").fault is None
+
+
 def test_a_lost_transport_outlives_the_trial() -> None:
     inbox = Inbox(flood=50)
     inbox.stop(End.RESET, "reset")

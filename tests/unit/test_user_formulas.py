@@ -31,6 +31,7 @@ from dubins_traffic.spec.propositions import STILL
 from dubins_traffic.spec.vocabulary import Proposition, Vocabulary
 from tests.judging import GRID, case
 from tests.recordings import blocks
+from tests.unit.test_formula_syntax import MALFORMED
 
 DOCS = Path(__file__).parents[2] / "docs"
 GRID_DOCUMENT: dict[str, Any] = {
@@ -127,6 +128,16 @@ def test_what_is_wrong_is_placed(command: Command, tmp_path: Path, formulas: obj
     made = {**instance_to_document(instance({})), "formulas": formulas}
     with pytest.raises(InputError, match=re.escape(message)):
         instance_from_document(made, "mine.json")
+
+
+def test_malformed_formulas_are_placed_in_the_document() -> None:
+    for text, line, column in MALFORMED:
+        with pytest.raises(InputError) as caught:
+            load_config(document({"mine": text}))
+        placed = f"formulas.mine: line {line}, column {column}: "
+        assert str(caught.value).startswith(placed), text[:80]
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 500
 
 
 def test_version_0_keeps_the_key_and_means_nothing_by_it() -> None:

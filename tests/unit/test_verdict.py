@@ -26,7 +26,7 @@ from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
 from tests.recordings import blocks
-from tests.rules_scripts import STAR, Frame, on_lane
+from tests.rules_scripts import KITE, STAR, Frame, on_lane
 
 both = pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)
 
@@ -81,11 +81,12 @@ def test_an_excuse_says_who_what_when_and_where(roads: RoadNetwork) -> None:
     assert duel(roads, 12, -1).excuse is None
 
 
-def test_an_excuse_says_whether_the_ego_could_have_seen() -> None:
+@pytest.mark.parametrize("turn", [0.0, 0.7], ids=["grid", "turned"])
+def test_an_excuse_says_whether_the_ego_could_have_seen(turn: float) -> None:
     """The other is in sight, 5 m or nearer, at frame 3 only."""
 
     def sensed(tick: int, way: float, **rules: float) -> bool:
-        roads = RoadNetwork.grid(2, 5, 5.0)
+        roads = RoadNetwork(RoadNetwork.grid(2, 5, 5.0).segments, 5.0, (turn, -turn, turn), (2, 5))
         ego = left_at(roads, roads.arms(roads.vertex((0, 0)))[0], 60, tick)
         x, y, c, s = ego[0]
         agent = [
@@ -103,8 +104,8 @@ def test_an_excuse_says_whether_the_ego_could_have_seen() -> None:
     assert sensed(14, near)
 
 
-def test_exceptions_are_forgiven_for_a_time() -> None:
-    roads = GRID
+@both
+def test_exceptions_are_forgiven_for_a_time(roads: RoadNetwork) -> None:
     one, two = lanes_in(roads)[:2]
 
     def ruling(*ticks: int, **rules: float) -> str:
@@ -147,34 +148,50 @@ def test_what_is_not_assumed_excuses_nothing() -> None:
         RuleParameters(assume_e1=2)
 
 
-def visits(frames: int, *, visit: Sequence[int], goals: Sequence[tuple[int, int]], **rules: float) -> Verdict:
+def dead_end(roads: RoadNetwork) -> int:
+    """Return a lane that ends in a dead end."""
+    return next(lane for lane in range(roads.lanes) if len(roads.arms(roads.lane_ends(lane)[1])) == 1)
+
+
+def visits(
+    frames: int,
+    *,
+    visit: Sequence[int],
+    goals: Sequence[tuple[int, int]],
+    roads: RoadNetwork = STAR,
+    **rules: float,
+) -> Verdict:
     """Return the verdict when the ego is in a dead end at some frames, and before it at others."""
-    lane = STAR.arms(STAR.vertex((1, 1)))[0]
-    inside = on_lane(STAR, lane, 3.2, -0.3)
-    out = [on_lane(STAR, lane, 2.9, -0.3 if not visit or k < visit[0] else 0.3) for k in range(frames)]
-    script = [[inside if k in visit else out[k]] for k in range(frames)]
-    return verdict(case(STAR, 1, goals, **rules), script)
+    lane = dead_end(roads)
+    length = float(roads.lengths[lane // 2])
+    inside = on_lane(roads, lane, length - 0.8, -0.3)
+    left = [-0.3 if not visit or k < visit[0] else 0.3 for k in range(frames)]
+    script = [[inside if k in visit else on_lane(roads, lane, length - 1.1, left[k])] for k in range(frames)]
+    return verdict(case(roads, 1, goals, **rules), script)
 
 
-def test_satisfied_needs_every_goal_and_short_gaps() -> None:
-    lane = STAR.arms(STAR.vertex((1, 1)))[0]
-    goal = STAR.intersections[STAR.lane_ends(lane)[1]]
-    other = next(point for point in STAR.intersections if point not in (goal, (1, 1)))
-    assert visits(50, visit=[10, 30], goals=[goal]).verdict == "satisfied"
-    assert visits(50, visit=[], goals=[goal]).verdict == "unfinished"
-    assert visits(50, visit=[10], goals=[goal, other]).verdict == "unfinished"
-    assert visits(50, visit=[], goals=[]).verdict == "satisfied"
-    found = visits(50, visit=[10, 30], goals=[goal])
+@pytest.mark.parametrize("roads", [STAR, KITE], ids=["grid", "kite"])
+def test_satisfied_needs_every_goal_and_short_gaps(roads: RoadNetwork) -> None:
+    goal = roads.intersections[roads.lane_ends(dead_end(roads))[1]]
+    other = next(point for point in roads.intersections if point != goal)
+
+    def ruling(visit: Sequence[int], goals: Sequence[tuple[int, int]], **rules: float) -> str:
+        return visits(50, visit=visit, goals=goals, roads=roads, **rules).verdict.value
+
+    assert ruling([10, 30], [goal]) == "satisfied"
+    assert ruling([], [goal]) == "unfinished"
+    assert ruling([10], [goal, other]) == "unfinished"
+    assert ruling([], []) == "satisfied"
+    found = visits(50, visit=[10, 30], goals=[goal], roads=roads)
     assert (found.rounds, found.longest_gap_s) == (2, 2.0)
-    once = free_flow(case(STAR, 1, [goal])).round_time
+    once = free_flow(case(roads, 1, [goal])).round_time
     assert found.gap_limit_s == 10.0 * once
-    assert visits(50, visit=[10, 30], goals=[goal], gap_rounds=2.0 / once + 1e-9).verdict == "satisfied"
-    assert visits(50, visit=[10, 30], goals=[goal], gap_rounds=2.0 / once - 1e-9).verdict == "unfinished"
+    assert ruling([10, 30], [goal], gap_rounds=2.0 / once + 1e-9) == "satisfied"
+    assert ruling([10, 30], [goal], gap_rounds=2.0 / once - 1e-9) == "unfinished"
 
 
 def test_formulas_have_four_values() -> None:
-    lane = STAR.arms(STAR.vertex((1, 1)))[0]
-    goal = STAR.intersections[STAR.lane_ends(lane)[1]]
+    goal = STAR.intersections[STAR.lane_ends(dead_end(STAR))[1]]
     name = f"1.goal {goal[0]} {goal[1]}"
     assert visits(50, visit=[10], goals=[goal]).formulas[name] == "presumably false"
     assert visits(50, visit=[10, 49], goals=[goal]).formulas[name] == "presumably true"

@@ -10,6 +10,7 @@ import numpy as np
 from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
     BLOCKS,
@@ -30,11 +31,11 @@ from dubins_traffic.driving.law_tables import (
     blank,
     build_of,
     desk,
-    pack_roads,
 )
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
+from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -44,9 +45,15 @@ class Lawful:
     """Drives the e-agents of a batch that keep the rules (a `protocols.Driver`); all others are left alone."""
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
-        """Begin a batch whose first frame is `state`."""
+        """Begin a batch whose first frame is `state`; InputError if its cars can't keep the rules."""
         cars = state.x.shape[1]
-        self._roads, net = pack_roads(instances)
+        for instance in instances:
+            if any(agent.kind in KEEP_RULES for agent in instance.e_agents):
+                check_fit(instance.problem, owes=True)
+        self._roads, net = pack_distinct(
+            [instance.problem.network for instance in instances],
+            [instance.problem.car.lane_width for instance in instances],
+        )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._drivers = pack_drivers(instances, cars, net)
         self._desk = desk(cars, int(np.diff(self._roads.seg_off).max()))

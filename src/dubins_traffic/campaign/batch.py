@@ -13,10 +13,12 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
+from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.campaign.asked import Maker, ask, grouped
 from dubins_traffic.campaign.group import Group, Outcome
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
@@ -88,7 +90,7 @@ def run_batch(
     records : path
         Folder for the records, made if missing.
     progress : callable, optional
-        Told of every trial that has ended, by 1.
+        Told how many trials have ended, each time.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def run_batch(
         else:
             found.append(_recorded(outcome, controller, folder))
         if progress is not None:
-            progress(1)
+            progress(len(found))
     return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
 
 
@@ -149,7 +151,7 @@ def _compiled(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
     together: list[Instance] = []
     asked: list[Instance] = []
     for instance in instances:
-        if not _can_share(instance):
+        if not _can_share(instance) or not _is_fit(instance):
             found.append(_alone(instance, COMPILED))
         else:
             (together if _undisturbed(instance) else asked).append(instance)
@@ -185,6 +187,18 @@ def _apart(
 def _can_share(instance: Instance) -> bool:
     remote = any(agent.kind == REMOTE for agent in instance.e_agents)
     return instance.simulator == "embedded" and not instance.problem.formulas and not remote
+
+
+def _is_fit(instance: Instance) -> bool:
+    """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
+    lawful = any(agent.kind in KEEP_RULES for agent in instance.e_agents)
+    try:
+        check_fit(instance.problem, owes=False)
+        if lawful:
+            check_fit(instance.problem, owes=True)
+    except InputError:
+        return False
+    return True
 
 
 def _undisturbed(instance: Instance) -> bool:

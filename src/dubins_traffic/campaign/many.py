@@ -16,6 +16,7 @@ from dubins_traffic.campaign.warm import companion
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.simulators import registry as simulators
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
@@ -40,6 +41,7 @@ class Job:
     record: Path | None = None
     overwrite: bool = False
     deadline: float | None = None
+    show: bool = False
 
     def run(self, cancelled: Event | None = None) -> Result:
         """Run the job here; `cancelled` interrupts it after at most one simulated second."""
@@ -55,6 +57,7 @@ class Job:
             overwrite=self.overwrite,
             deadline=self.deadline,
             sinks=() if cancelled is None else (_Watch(cancelled),),
+            simulator=simulators.load(instance.simulator, show=self.show),
         )
 
 
@@ -94,7 +97,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     with ProcessPoolExecutor(
         min(workers, len(jobs)), mp_context=context, initializer=_begin, initargs=(cancelled,)
     ) as pool:
-        with _deaf_to_interrupts():
+        with deaf_to_interrupts():
             pending = {pool.submit(_run, job) for job in jobs}
         try:
             while pending:
@@ -108,7 +111,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Generator[None]:
+def deaf_to_interrupts() -> Generator[None]:
     """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -61,6 +61,8 @@ def plan(
     overwrite_data: bool = False,
     records: str | os.PathLike[str] | None = None,
     deadline: float | None = None,
+    simulator: str | None = None,
+    show: bool = False,
 ) -> Plan:
     """Return what is to be run, checked as far as can be before anything runs.
 
@@ -85,6 +87,10 @@ def plan(
         ``trial-0000-0000.mcap`` for its first run. Records of the same names are replaced.
     deadline : float, optional
         Wall-clock seconds within which each `act` must answer.
+    simulator : str, optional
+        Its name, instead of that in the source.
+    show : bool
+        Whether the simulator shows the trials in a window of its own, at the pace of the clock.
 
     Raises
     ------
@@ -100,24 +106,29 @@ def plan(
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
     if isinstance(found, Configuration):
-        configuration = found
+        configuration = found if simulator is None else found.with_simulator(simulator)
         count = found.number_trials if trials is None else trials
         _check_count(count, repeat)
-        jobs = _drawn(found, controller, count, seed or 0)
+        jobs = _drawn(configuration, controller, count, seed or 0)
     else:
         _check_count(1, repeat)
         configuration = None
         instance = found.instance if isinstance(found, Record) else found
+        instance = replace(instance, simulator=simulator or instance.simulator)
         other_seed = None if seed == instance.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if jobs and jobs[0].instance is not None:
-        _check_simulator(os.fspath(source), jobs[0].instance.simulator)
-    target = None if data is None else _data_file(Path(data), overwrite_data)
-    folder = None if records is None else _folder(Path(records))
+        _check_simulator(
+            "--simulator" if simulator else os.fspath(source), jobs[0].instance.simulator, show=show
+        )
+    target = None if data is None else check_data_file(Path(data), overwrite_data)
+    folder = None if records is None else check_folder(Path(records))
     several = [(job, f"-{run:04d}" if repeat > 1 else "") for job in jobs for run in range(repeat)]
     return Plan(
-        tuple(_complete(job, suffix, folder, deadline) for job, suffix in several), configuration, target
+        tuple(_complete(job, suffix, folder, deadline, show=show) for job, suffix in several),
+        configuration,
+        target,
     )
 
 
@@ -129,9 +140,9 @@ def _drawn(configuration: Configuration, controller: str, trials: int, seed: int
     return jobs
 
 
-def _complete(job: Job, suffix: str, folder: Path | None, deadline: float | None) -> Job:
+def _complete(job: Job, suffix: str, folder: Path | None, deadline: float | None, *, show: bool) -> Job:
     record = None if folder is None else folder / f"trial-{job.trial:04d}{suffix}.mcap"
-    return replace(job, record=record, overwrite=True, deadline=deadline)
+    return replace(job, record=record, overwrite=True, deadline=deadline, show=show)
 
 
 def _refuse(source: str, options: dict[str, object]) -> None:
@@ -146,9 +157,9 @@ def _refuse(source: str, options: dict[str, object]) -> None:
             )
 
 
-def _check_simulator(source: str, name: str) -> None:
+def _check_simulator(source: str, name: str, *, show: bool) -> None:
     try:
-        simulators.load(name).close()
+        simulators.load(name, show=show).close()
     except InputError as error:
         raise error.within(file=source) from None
 
@@ -166,7 +177,8 @@ def _check_deadline(deadline: float | None) -> None:
         raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
 
 
-def _data_file(path: Path, overwrite: bool) -> Path:
+def check_data_file(path: Path, overwrite: bool) -> Path:
+    """Return `path` if a file can be written there; InputError if not, or if one exists and may not be replaced."""
     if path.exists() and not overwrite:
         raise InputError("exists", file=str(path), expected="a new file; -F overwrites")
     if path.is_dir() or not path.parent.is_dir():
@@ -175,7 +187,8 @@ def _data_file(path: Path, overwrite: bool) -> Path:
     return path
 
 
-def _folder(folder: Path) -> Path:
+def check_folder(folder: Path) -> Path:
+    """Return `folder`, made if missing; InputError if that can't be."""
     expected = "a folder, or a place for one"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dubins_traffic.campaign.single import Result, Trial, run_trial
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError, PeerError, TransportError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
@@ -63,7 +64,8 @@ def run_remote(session: Session) -> Iterator[Result]:
     while session.trials is None or done < session.trials:
         if instance is None:
             instance = hand_over(session.supply(number), session.remote)
-        if _await_start(session, instance) is Next.DRAW:
+        asked, instance = _await_start(session, instance)
+        if asked is Next.DRAW:
             instance, number, repetition = None, number + 1, 0
             continue
         yield run_trial(
@@ -103,23 +105,36 @@ def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
     return replace(instance, e_agents=agents)
 
 
-def _await_start(session: Session, instance: Instance) -> Next:
-    """Show the world until someone starts it or wants another one."""
+def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
+    """Show the world until someone starts it or wants another one; return it with its cars where they were put."""
     maestro, link = session.maestro, session.link
     if maestro is None:
-        return Next.RUN
-    maestro.interrupt = lambda detail: link.inbox.stop(End.RESET, detail) if detail else link.inbox.wake()
+        return Next.RUN, instance
+    inbox = link.inbox
+    maestro.interrupt = lambda detail: inbox.stop(End.RESET, detail) if detail else inbox.wake()
     maestro.enter(Phase.PREPARING)
+    inbox.placed()
     try:
-        with Trial(instance, link=link):
-            maestro.enter(Phase.READY)
-            link.idle(lambda: maestro.next is not None)
+        while True:
+            with Trial(instance, link=link):
+                if maestro.phase is Phase.PREPARING:
+                    maestro.enter(Phase.READY)
+                link.idle(lambda: maestro.next is not None or inbox.news)
+            if maestro.next is not None:
+                break
+            instance = _placed(instance, inbox.placed())
     except PeerError as error:
         raise TransportError(error.detail) from error
-    asked = maestro.next or Next.RUN
-    if asked is Next.RUN:
+    if maestro.next is Next.RUN:
         maestro.enter(Phase.RUNNING)
-    return asked
+        return Next.RUN, instance
+    return maestro.next, instance
+
+
+def _placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
+    """Return `instance` with cars at other starts."""
+    old = zip(instance.names, instance.starts, strict=True)
+    return replace(instance, starts=tuple(places.get(name, start) for name, start in old))
 
 
 def _record(folder: Path | None, number: int, repetition: int) -> Path | None:

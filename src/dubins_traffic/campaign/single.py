@@ -107,6 +107,7 @@ def run_trial(
     deadline: float | None = None,
     sinks: Sequence[Sink] = (),
     link: Link | None = None,
+    simulator: Simulator | None = None,
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -126,6 +127,8 @@ def run_trial(
         Further sinks.
     link : Link, optional
         To the drivers of remote cars. If the ego is one, `controller` is not looked at.
+    simulator : Simulator, optional
+        Instead of the one that the instance names; closed when the trial is over.
 
     Raises
     ------
@@ -143,7 +146,7 @@ def run_trial(
         writer = RecordWriter(record, controller=name, overwrite=overwrite)
     first = () if writer is None else (writer,)
     try:
-        with Trial(instance, sinks=(*first, scorer, *sinks), link=link) as trial:
+        with Trial(instance, sinks=(*first, scorer, *sinks), link=link, simulator=simulator) as trial:
             try:
                 ending, measured = run(trial, driver, deadline)
             finally:

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.cli.run import FAULTS, progress
+from dubins_traffic.cli.progress import progress
+from dubins_traffic.cli.run import FAULTS
 
 EXAMPLES = options.examples(
     "batch town --trials 1000",
@@ -57,7 +58,8 @@ def batch(
     from dubins_traffic.problem.configuration import load_config
 
     drawn = load_config(configuration)
-    with progress(drawn.number_trials if trials is None else trials) as advance:
+    count = drawn.number_trials if trials is None else trials
+    with progress(count) as tell:
         done = run_batch(
             drawn,
             controller,
@@ -67,7 +69,7 @@ def batch(
             threads=threads,
             keep=keep,
             records=records,
-            progress=lambda _one: advance(),
+            progress=lambda done: tell(done, count),
         )
     show(done.sheet, json=json)
     failed = [outcome for outcome in done.outcomes if outcome.ending.end in FAULTS]

@@ -83,6 +83,10 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
         console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
 
+    margins = [f"{rule} {value:.3f} m" for rule, value in verdict.robustness.items() if value is not None]
+    if margins:
+        console.print(f"  robustness: {', '.join(margins)}", markup=False)
+
 
 def _breaches(verdict: Verdict) -> Table:
     """Return the breaches as a table."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -12,32 +13,68 @@ from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "convert town.json -o town.rnd",
+    "convert town.json -o town.sdf --sdf 1.9",
     "convert out/trial-0000.mcap -o trial.csv",
     "convert out/trial-0000.mcap -o trial.parquet",
+    "convert out/trial-0000.mcap -o trial.bag",
 )
 CONTAINERS = (".json", ".rnd", ".txt")
+WORLD = ".sdf"
+
+
+class Sdf(StrEnum):
+    """Versions of SDF."""
+
+    CLASSIC = "1.6"
+    NEW = "1.9"
 
 
 def convert(
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="A road network or a record.", show_default=False)
+        str, typer.Argument(metavar="FILE", help="A road network, a record or a bag.", show_default=False)
     ],
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="FILE", help="What to write; its suffix says as what.")
     ],
+    sdf: Annotated[
+        Sdf,
+        typer.Option(
+            "--sdf", help="Version of a world for Gazebo: 1.6 for 11 and older, 1.9 for newer ones."
+        ),
+    ] = Sdf.CLASSIC,
 ) -> None:
-    """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv` or `.parquet`)."""
+    """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
+
+    A road network becomes a world for Gazebo too (`.sdf`).
+    A ROS 1 bag becomes a record (`.mcap`); beside a bag stands the trial data of 2016, `.trial.json`.
+    """
+    from dubins_traffic.campaign.bag_reader import bag_to_record, is_bag
+    from dubins_traffic.campaign.bags import write_bag
     from dubins_traffic.campaign.sources import load
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.network import RoadNetwork
+    from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
+    if is_bag(file):
+        if Path(output).suffix.lower() != ".mcap":
+            raise InputError(
+                "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
+            )
+        bag_to_record(file, output, overwrite=True)
+        return
     found = load(file)
-    if isinstance(found, Record):
+    if isinstance(found, Record) and Path(output).suffix.lower() == ".bag":
+        options.tell(str(write_bag(found, output)))
+    elif isinstance(found, Record):
         export(found, output)
     elif isinstance(found, RoadNetwork):
-        if Path(output).suffix.lower() not in CONTAINERS:
-            expected = f"a suffix of {', '.join(CONTAINERS)}"
+        suffix = Path(output).suffix.lower()
+        if suffix == WORLD:
+            write_sdf(found, output, Version(sdf.value))
+            return
+        if suffix not in CONTAINERS:
+            expected = f"a suffix of {', '.join((*CONTAINERS, WORLD))}"
             raise InputError(
                 "not a container of road networks", file=output, value=Path(output).suffix, expected=expected
             )

@@ -10,17 +10,23 @@ import typer
 
 from dubins_traffic.cli import (
     batch,
+    campaign,
     check,
+    check_controller,
     convert,
     faults,
+    gazebo,
     instance,
+    lcm,
     listing,
     network,
     plot,
     replay,
+    ros1,
     run,
     score,
     spec,
+    synth,
 )
 
 app = typer.Typer(
@@ -60,10 +66,16 @@ app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
+app.command("synth", epilog=synth.EXAMPLES)(synth.synth)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
+app.add_typer(campaign.campaign, name="campaign")
+app.add_typer(ros1.app, name="ros1")
+app.add_typer(gazebo.app, name="gazebo")
+app.add_typer(lcm.app, name="lcm")
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

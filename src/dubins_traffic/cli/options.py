@@ -32,6 +32,13 @@ def controllers(incomplete: str) -> Sequence[str]:
     return [name for name in names() if name.startswith(incomplete)]
 
 
+def simulators(incomplete: str) -> Sequence[str]:
+    """Complete the name of a simulator."""
+    from dubins_traffic.simulators.registry import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
 Config = Annotated[
     str,
     typer.Argument(

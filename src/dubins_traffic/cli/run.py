@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,8 +17,9 @@ EXAMPLES = options.examples(
     "run demo --controller simple --trials 20 --jobs 2 --records out",
     "run my-trials.json --controller my_controller.py:MyController -f data.json",
     "run out/trial-0003.mcap --controller simple --json",
+    "run demo --simulator gazebo --records out",
 )
-FAULTS = ("controller_fault", "agent_fault", "deadline")
+FAULTS = ("controller_fault", "agent_fault", "deadline", "world_lost")
 """Ends of a trial that make the exit status 1."""
 
 
@@ -84,11 +83,25 @@ def run(
             "--deadline", metavar="SECONDS", help="End a trial whose controller takes longer to act."
         ),
     ] = None,
+    simulator: Annotated[
+        str | None,
+        typer.Option(
+            "--simulator",
+            metavar="S",
+            help="What moves the cars; `list simulators` names them.",
+            show_default="as the source says",
+            autocompletion=options.simulators,
+        ),
+    ] = None,
+    gui: Annotated[
+        bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
     from dubins_traffic.campaign.many import run_trials
     from dubins_traffic.campaign.plan import plan
+    from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
 
     if data is not None and data_over is not None:
@@ -104,13 +117,15 @@ def run(
         overwrite_data=data is None,
         records=records,
         deadline=deadline,
+        simulator=simulator,
+        show=gui,
     )
     results: list[Result] = []
     try:
-        with progress(len(todo.jobs)) as advance:
+        with progress(len(todo.jobs)) as tell:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
-                advance()
+                tell(len(results), len(todo.jobs))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
         raise
@@ -123,16 +138,3 @@ def run(
         faults.tell(f"trial {result.instance.trial}: {ending.end}: {ending.detail}")
     if failed:
         raise typer.Exit(faults.FAILED)
-
-
-@contextmanager
-def progress(trials: int) -> Generator[Callable[[], object]]:
-    """Show how many of the trials are done, on standard error and only to people."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (SpinnerColumn(), "trials", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("trials", total=trials)
-        yield lambda: progress.advance(task)

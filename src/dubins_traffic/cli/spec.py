@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
@@ -139,17 +140,30 @@ def _told(spec: Specification, format: Format, period: float, source: str) -> st
         return write(spec, period)
     except FormulaError as error:
         refused = error
-    sides = [(formula, replace(spec, assumptions=(formula,), guarantees=())) for formula in spec.assumptions]
-    sides += [(formula, replace(spec, assumptions=(), guarantees=(formula,))) for formula in spec.guarantees]
-    for formula, alone in sides:
+    for formula, alone in _parts(spec):
         try:
             write(alone, period)
         except FormulaError as error:
-            raise _refusal(error, formula, format, source) from None
+            raise _refusal(error, refused, formula, format, source) from None
     raise refused.within(file=source, field=f"--format {format}")
 
 
-def _refusal(error: FormulaError, formula: Formula, format: Format, source: str) -> InputError:
+def _parts(spec: Specification) -> Iterator[tuple[Formula, Specification]]:
+    """Yield each formula of a specification, and a specification of it alone."""
+    from dubins_traffic.spec.logic.formula import propositions
+
+    outputs = set(spec.outputs)
+    for place, formula in enumerate((*spec.assumptions, *spec.guarantees)):
+        names = propositions(formula)
+        sides = ((formula,), ()) if place < len(spec.assumptions) else ((), (formula,))
+        inputs = tuple(name for name in names if name not in outputs)
+        yield formula, type(spec)(*sides, inputs, tuple(name for name in names if name in outputs))
+
+
+def _refusal(
+    error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str
+) -> InputError:
+    """Return what to say of a formula that can't be said, given what would have to change for the whole."""
     from dubins_traffic.spec.logic.printer import to_spin
 
     return InputError(
@@ -157,5 +171,5 @@ def _refusal(error: FormulaError, formula: Formula, format: Format, source: str)
         file=source,
         field=f"--format {format}",
         value=to_spin(formula),
-        expected=error.expected,
+        expected=whole.expected,
     )

@@ -40,7 +40,7 @@ def load(spec: str) -> Controller:
     ----------
     spec : str
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
-        directory; a file may import its neighbours.
+        directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again.
 
     Raises
     ------
@@ -51,6 +51,8 @@ def load(spec: str) -> Controller:
     if spec in _BUILT_IN:
         module, name = _BUILT_IN[spec]
         return cast(Controller, getattr(importlib.import_module(module), name)())
+    if spec.endswith(".mcap"):
+        return cast(Controller, importlib.import_module("dubins_traffic.controllers.scripted").replay(spec))
     place, colon, name = spec.rpartition(":")
     if not (colon and place and name.isidentifier()):
         raise _refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))

@@ -6,6 +6,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
     FIRST,
@@ -40,7 +41,8 @@ class Rules:
         self._drivers: Drivers | None = None
 
     def start(self, problem: Problem) -> None:
-        """Find the round."""
+        """Find the round; InputError if the car can't keep the rules."""
+        check_fit(problem, owes=False)
         cars = 1 + len(problem.e_agents)
         ints, floats = blank(cars)
         stage, distance = stages(problem)

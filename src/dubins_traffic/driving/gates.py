@@ -90,7 +90,7 @@ def mind_gate(
             j = desk.near[k]
             if labels.crosses[b, j] == v:
                 inside += shares_way(b, j, way, roads.degree[row], state, build)
-        free = (roads.degree[row] > 1 or inside == 0) and has_room(
+        free = (roads.degree[row] == 2 or inside == 0) and has_room(
             b, n, ints[NEXT], inside, state, labels, roads, drivers, desk
         )
     if bits & LEFT != 0 and ints[MOOD] & LEFT_SIDE == 0:
@@ -100,8 +100,8 @@ def mind_gate(
 
 @jit_inline
 def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) -> int:
-    """Return 1 if a car in the disc is on this way, or in a dead end."""
-    if degree < 2:
+    """Return 1 if a car in the disc is on this way, or in a disc that is no bend."""
+    if degree != 2:
         return 1
     _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
     return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0

@@ -37,7 +37,10 @@ from dubins_traffic.driving.law_tables import (
     REACH,
     ROUND,
     ROUNDING,
+    SLOWEST,
     SPEED,
+    TAILGATING,
+    THROUGH_SPEED,
     TIGHTEST,
     UNTIL,
     WAITED,
@@ -45,7 +48,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, stays_right
 from dubins_traffic.driving.safety import motion_is_safe
 from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to_go
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
@@ -54,21 +57,21 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import lane_end, lane_start, nearest_segment
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import BLOCKED
+from dubins_traffic.spec.propositions import BLOCKED, LEFT
 
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
 asked, and on its way to another exit it might leave the disc outside its lane."""
-IN_DISC = 0.65
-"""Least speed in a disc, metres per second: a way through takes less than 2.6 m, and 5 s are allowed."""
+BUMPER = 0.005
+"""Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
 DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
 HURRY = 0.25
 """Metres in which a car returns to its way."""
 SLANT, STEEP = 0.7, 0.9
-"""Sine of the largest angle to its way at which a car drives; the same when it pulls out."""
-ALIGNED = 0.8
-"""Cosine of the angle to where it should head beyond which a car turns in place."""
+"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return."""
+ALIGNED, NIMBLE = 0.8, 0.98
+"""Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 VERGE = 0.02
 """What the ego's centre keeps from the edge of the road whatever happens, metres."""
 GAIN = 8.0
@@ -163,13 +166,16 @@ def drive(
     gap, who, close = look_ahead(
         b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, desk
     )
-    speed = floats[SPEED]
+    rides = ints[MOOD] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
+    passes = floats[ASIDE] != 0.0
+    speed = build[FASTEST] if rides or passes else floats[SPEED]
     if labels.crosses[b, n] >= 0:
-        speed = min(max(speed, IN_DISC), build[FASTEST])
+        speed = min(max(speed, build[THROUGH_SPEED]), build[FASTEST])
     speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
-    kept = wanted_gap(b, n, who, way, state, labels, ints, part)
-    speed = min(speed, max(0.0, gap - kept) / build[PERIOD])
-    if ints[KIND] == NEMESIS and before_ego(b, n, near, state, labels, roads, drivers, desk):
+    kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
+    ahead = max(0.0, state.speed[b, who]) if rides else 0.0
+    speed = min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead)
+    if ints[KIND] == NEMESIS and not passes and before_ego(b, n, near, state, labels, roads, drivers, desk):
         speed = min(speed, DAWDLE)
     if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, net, ints[LANE]):
         floats[HOLD] -= build[PERIOD]
@@ -179,15 +185,43 @@ def drive(
     )
     if part != BEFORE and ints[WAITED] > ticks_of(STUCK, build) and ints[KIND] != ROUND:
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
-    speed, yaw_rate = steer(c, s, left - offset, px, py, part, way, speed, floats[ASIDE] != 0.0, build)
-    if close and not is_safe(b, n, speed, yaw_rate, near, state, obstacles, build, desk):
-        speed = 0.0
-        if build[HALF_LENGTH] > 0.0 and not is_safe(
-            b, n, speed, yaw_rate, near, state, obstacles, build, desk
-        ):
-            yaw_rate = 0.0
+    trusted = who if rides else -1
+    speed, yaw_rate = move(
+        b, n, speed, left, offset, px, py, part, outside, way, near if close else 0, trusted, state, labels,
+        obstacles, drivers, desk,
+    )  # fmt: skip
     if speed != 0.0 and ints[KIND] == ROUND and leaves_road(x, y, c, s, speed, yaw_rate, net, roads, build):
         speed = 0.0
+    return speed, yaw_rate
+
+
+@jit_inline
+def move(
+    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, part: int, outside: bool,
+    way: Way, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
+    build = drivers.build[b]
+    c, s = state.c[b, n], state.s[b, n]
+    passes = drivers.floats[b, n, ASIDE] != 0.0
+    steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
+    aligned = NIMBLE if passes and left < offset else ALIGNED
+    speed, yaw_rate = steer(c, s, left - offset, px, py, part, way, allowed, steep, aligned, build)
+    if passes or build[TIGHTEST] > 0.0:
+        speed, yaw_rate = keep_right(
+            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, desk
+        )
+    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
+    if not safe and passes and offset == 0.0:
+        speed, yaw_rate = steer(c, s, 0.0, px, py, part, way, allowed, steep, aligned, build)
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
+    if not safe:
+        speed = 0.0
+        if build[HALF_LENGTH] > 0.0 and not is_safe(
+            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk
+        ):
+            yaw_rate = 0.0
     return speed, yaw_rate
 
 
@@ -212,9 +246,35 @@ def pass_what_stands(
     elif floats[ASIDE] != 0.0:
         speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)
         offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0
-    elif bits & BLOCKED != 0 and ints[WAITED] >= ticks_of(PASSING_WAIT, build) and ints[WAITED] % 4 == 0:
+    elif (bits & BLOCKED != 0 or who < -1) and waited_long(ints, bits, build):
         find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
     return speed, offset
+
+
+@jit_inline
+def waited_long(ints: Any, bits: Any, build: Any) -> bool:
+    """Tell whether it is time to look for a way past: not in every tick, and sooner for who is left already."""
+    return (ints[WAITED] >= ticks_of(PASSING_WAIT, build) or bits & LEFT != 0) and ints[WAITED] % 4 == 0
+
+
+@jit_inline
+def keep_right(
+    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: Way, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+) -> tuple[float, float]:  # fmt: skip
+    """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
+    build = drivers.build[b]
+    bits = np.int64(labels.bits[b, n])
+    lawless = drivers.ints[b, n, MOOD] & LEFT_SIDE != 0
+    if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
+        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, desk
+    ):  # fmt: skip
+        return speed, yaw_rate
+    leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
+    if drivers.floats[b, n, ASIDE] != 0.0 or not leans or build[SLOWEST] >= 0.0:
+        return 0.0, 0.0
+    speed = min(speed, -build[SLOWEST])
+    return -speed, -min(speed / build[TIGHTEST], build[YAW_MOST])
 
 
 @jit_inline
@@ -267,10 +327,12 @@ def before_ego(
 @jit_inline
 def steer(
     c: float, s: float, left: float, px: float, py: float, part: int, way: Way, speed: float,
-    steep: bool, build: Any,
+    most: float, aligned: float, build: Any,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return (speed, yaw rate) of a car `left` of the line it should drive, whose direction is (px, py)."""
-    most = STEEP if steep else SLANT
+    """Return (speed, yaw rate) of a car `left` of the line it should drive, whose direction is (px, py).
+
+    `most` is the sine of the largest angle to that line, `aligned` the cosine beyond which the car turns in place.
+    """
     sine = min(max(-left / HURRY, -most), most)
     cosine = sqrt(1.0 - sine * sine)
     hx = px * cosine - py * sine
@@ -278,7 +340,7 @@ def steer(
     cross = c * hy - s * hx
     dot = c * hx + s * hy
     limit = build[YAW_MOST]
-    if dot < ALIGNED and build[TIGHTEST] == 0.0:
+    if dot < aligned and build[TIGHTEST] == 0.0:
         turn = limit
         if dot > 0.0:
             turn = min(limit, abs(cross) / build[PERIOD])
@@ -320,10 +382,10 @@ def leaves_road(
 
 @jit
 def is_safe(
-    b: int, n: int, speed: float, yaw_rate: float, near: int, state: State, obstacles: ObstacleTable,
-    build: Any, desk: Desk,
+    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
+    obstacles: ObstacleTable, build: Any, desk: Desk,
 ) -> bool:  # fmt: skip
-    """Tell whether a command can't bring about a contact, whatever the others do in this tick."""
+    """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     period = build[PERIOD]
     p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
@@ -335,7 +397,7 @@ def is_safe(
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
         far = 2.0 * reach + 0.2
-        if dx * dx + dy * dy < far * far and not motion_is_safe(
+        if j != trusted and dx * dx + dy * dy < far * far and not motion_is_safe(
             x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
             state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel,
         ):  # fmt: skip

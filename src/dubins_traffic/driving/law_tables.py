@@ -10,12 +10,10 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.spec.parameters import RuleParameters
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.problem.instance import Problem
 
 ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
@@ -42,12 +40,18 @@ long it will still stand in the disc ahead, s.
 """
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
-DEGREE, FASTEST, FORFEIT = 9, 10, 11
-BUILD = 12
+DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED = range(9, 18)
+BUILD = 18
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
-crossing; the car's top speed, m/s; seconds after which who does not enter on its turn loses its place.
+crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
+place; least speed in a disc, m/s; how far left of the centre line a body may reach, how far behind and ahead what
+stands makes a car overtake, and what must be free of the right lane, metres.
 """
+
+LONGEST_WAY = 2.21
+"""Length of the longest way through a disc, in units of R + rho."""
+PROMPT = 0.8
 
 ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
 """Bits of MOOD."""
@@ -107,6 +111,13 @@ def desk(cars: int, segments: int) -> Desk:
     )
 
 
+def through_speed(problem: Problem) -> float:
+    """Return the speed at which the longest way through a disc takes PROMPT of the time that E4 allows, m/s."""
+    longest = LONGEST_WAY * (problem.intersection_radius + problem.car.body.reach)
+    allowed = RuleParameters.from_mapping(problem.rules).exit_time
+    return longest / (PROMPT * allowed) if allowed > 0.0 else problem.car.bounds.speed
+
+
 def build_of(problems: Sequence[Problem]) -> Floats:
     """Return `Drivers.build`."""
     cars = pack_cars([problem.car for problem in problems])
@@ -123,22 +134,12 @@ def build_of(problems: Sequence[Problem]) -> Floats:
         np.array([problem.period for problem in problems]),
         np.array([own.crossing_degree for own in rules]),
         cars.speed_high,
+        cars.speed_low,
         np.array([own.forfeit_time for own in rules]),
+        np.array([through_speed(problem) for problem in problems]),
+        np.array([own.left_set for own in rules]),
+        np.array([own.overtaking_behind for own in rules]),
+        np.array([own.overtaking_ahead for own in rules]),
+        np.array([own.blocked_gap for own in rules]) + 2.0 * (cars.half_width + cars.rounding),
     )
     return np.ascontiguousarray(np.stack([column.astype(np.float64) for column in columns], axis=1))
-
-
-def pack_roads(instances: Sequence[Instance]) -> tuple[RoadTable, Ints]:
-    """Return the roads of a batch, each network once, and each trial's number in them."""
-    numbers: dict[tuple[int, float], int] = {}
-    networks: list[RoadNetwork] = []
-    widths: list[float] = []
-    net = np.zeros(len(instances), dtype=np.int64)
-    for b, instance in enumerate(instances):
-        key = (id(instance.problem.network), instance.problem.car.w)
-        if key not in numbers:
-            numbers[key] = len(networks)
-            networks.append(instance.problem.network)
-            widths.append(2.0 * instance.problem.car.w)
-        net[b] = numbers[key]
-    return pack(networks, widths), net

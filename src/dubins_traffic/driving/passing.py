@@ -9,13 +9,21 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.law_tables import (
     ASIDE,
+    BEHIND,
     DISC,
+    FASTEST,
+    FORE,
+    HALF_LENGTH,
     HALF_WIDTH,
     LANE,
     MIDDLE,
+    NEEDED,
+    OVER,
+    PERIOD,
     REACH,
     ROUNDING,
-    SPEED,
+    SLOWEST,
+    TIGHTEST,
     UNTIL,
     WAITED,
     Desk,
@@ -23,22 +31,29 @@ from dubins_traffic.driving.law_tables import (
 )
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import STANDS
+from dubins_traffic.spec.blocking import narrows
+from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, OVERTAKING, STANDS, STOPPED
+from dubins_traffic.spec.shape import half_extent
 
 PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
 BERTH = 0.12
 """What is kept free beside what stands, metres."""
 SLIP = 0.25
-"""So far past what stands a car begins to return, metres."""
+"""So far past what stands a car begins to return, metres, beyond the length of a rectangle."""
 BACK = 0.4
 """So far after that its body is back in the right lane, metres."""
 TURNING = 1.2
 """Seconds that passing takes beyond what the distance asks for."""
 SPARE = 0.6
 """Metres to spare before a car that comes."""
+SLOW = 0.05
+"""A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
+LINE, SURE = 0.002, 0.03
+"""What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
 EDGE = 0.05
 """What the centre keeps from the edge of the road, metres."""
 
@@ -56,6 +71,34 @@ def aside(way: Way, x: float, y: float) -> float:
 
 
 @jit
+def stop_line(build: Any) -> float:
+    """Return metres from the intersection, negative, to where a car on the right lane has to be back in it."""
+    edge = build[DISC] + build[REACH] + 0.03
+    return -sqrt(edge * edge - build[MIDDLE] * build[MIDDLE])
+
+
+@jit
+def half_width(b: int, j: Any, way: Way, state: State, build: Any) -> float:
+    """Return half the extent of a car across the lane."""
+    return half_extent(
+        way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
+        build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING],
+    )  # fmt: skip
+
+
+@jit
+def within_lane(offset: float, build: Any) -> bool:
+    """Tell whether a body so far left of the middle of the right lane does not reach over the centre line."""
+    return offset + build[HALF_WIDTH] + build[ROUNDING] <= build[MIDDLE]
+
+
+@jit
+def can_come_back(build: Any) -> bool:
+    """Tell whether a car that has begun to pull out can still stay in its lane: it turns in place, or backs up."""
+    return build[TIGHTEST] == 0.0 or build[SLOWEST] < 0.0
+
+
+@jit
 def find_way_past(
     b: int, n: int, way: Way, who: int, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
@@ -67,13 +110,14 @@ def find_way_past(
     own = along(way, state.x[b, n], state.y[b, n])
     end, offset = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
-    edge = build[DISC] + reach + 0.03
-    line = -sqrt(edge * edge - build[MIDDLE] * build[MIDDLE])
-    until = end + SLIP
+    line = stop_line(build)
+    until = end + SLIP + 2.0 * build[HALF_LENGTH]
     back = until + BACK
-    if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line:
+    if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
-    time = (back - own) / (0.8 * floats[SPEED]) + TURNING
+    if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, build):
+        return
+    time = (back - own) / (0.8 * build[FASTEST]) + TURNING
     comes = 0.7 * time + SPARE
     room = line - back
     j = desk.head[drivers.ints[b, n, LANE] >> 1]
@@ -82,7 +126,9 @@ def find_way_past(
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
         if j != n and key > own - 0.5:
             stands = labels.bits[b, j] & STANDS != 0
-            if abs(left - offset) < 2.0 * reach + 0.1 and key < back + (0.5 if stands else comes):
+            before = key > own or left > build[MIDDLE]
+            wide = half_width(b, j, way, state, build) + build[HALF_WIDTH] + build[ROUNDING] + 0.1
+            if before and abs(left - offset) < wide and key < back + (0.5 if stands else comes):
                 return
             if not stands and left < build[MIDDLE]:
                 if key < end:
@@ -121,7 +167,6 @@ def extent(
     end = own - 1.0
     offset = -1.0
     reach = build[REACH]
-    wide = build[HALF_WIDTH] + build[ROUNDING]
     for _ in range(3):
         horizon = max(own, end) + 1.5
         j = desk.head[lane >> 1]
@@ -130,7 +175,7 @@ def extent(
             left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
             if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < build[MIDDLE]:
                 end = max(end, key)
-                offset = max(offset, left + wide)
+                offset = max(offset, left + half_width(b, j, way, state, build))
             j = desk.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
             row = obstacles.part[p]
@@ -155,6 +200,11 @@ def keep_passing(
     if own >= floats[UNTIL]:
         if abs(left) < 0.05:
             floats[ASIDE] = 0.0
+        elif labels.bits[b, n] & LEFT != 0:
+            pass_again(b, own, way, near, state, floats, build, desk)
+        return speed
+    if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(floats[ASIDE], build):
+        floats[ASIDE] = 0.0
         return speed
     length = 2.0 * build[REACH]
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
@@ -170,7 +220,8 @@ def keep_passing(
         its = aside(way, state.x[b, j], state.y[b, j])
         if its > build[MIDDLE] or abs(its) > 2.0 * build[MIDDLE]:
             continue
-        if labels.bits[b, j] & STANDS != 0 and own - length < key <= floats[UNTIL]:
+        stands = labels.bits[b, j] & STANDS != 0 or abs(state.speed[b, j]) < SLOW
+        if stands and own - length < key <= floats[UNTIL]:
             return speed
         if abs(key - own) < length + BERTH:
             beside = True
@@ -179,3 +230,70 @@ def keep_passing(
         floats[ASIDE] = 0.0
         return speed
     return 0.0 if before else speed
+
+
+@jit
+def pass_again(
+    b: int, own: float, way: Way, near: int, state: State, floats: Any, build: Any, desk: Desk
+) -> None:  # fmt: skip
+    """Go on passing what has moved up meanwhile and stands where the car would return, if there is room."""
+    length = 2.0 * build[REACH] + BERTH
+    for k in range(near):
+        j = desk.near[k]
+        key = along(way, state.x[b, j], state.y[b, j])
+        until = key + SLIP + 2.0 * build[HALF_LENGTH]
+        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < build[MIDDLE] and 0.0 < key - own < length
+        if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(build):
+            floats[UNTIL] = until
+
+
+@jit
+def stays_right(
+    b: int, n: int, speed: float, yaw_rate: float, way: Way, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+) -> bool:  # fmt: skip
+    """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
+    build = drivers.build[b]
+    x, y, c, s = advance(
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, build[PERIOD]
+    )
+    half = half_extent(way.tx, way.ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
+    if aside(way, x, y) + half <= build[MIDDLE] + build[OVER] - LINE:
+        return True
+    if labels.bits[b, n] & OVERTAKING == 0:
+        return False
+    own = along(way, x, y)
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        key = along(way, row[0], row[1])
+        there = own - row[7] <= key <= own + row[7] + build[FORE]
+        if there and abs(aside(way, row[0], row[1])) - row[7] < build[MIDDLE]:
+            return True
+    return surely_stands(b, n, own, way, state, labels, drivers, desk)
+
+
+@jit
+def surely_stands(
+    b: int, n: int, own: float, way: Way, state: State, labels: Labels, drivers: Drivers, desk: Desk
+) -> bool:  # fmt: skip
+    """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
+
+    Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
+    crossing; and it may drive off.
+    """
+    build = drivers.build[b]
+    lane = drivers.ints[b, n, LANE]
+    found = False
+    j = desk.head[lane >> 1]
+    while j >= 0:
+        bits = labels.bits[b, j]
+        if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
+            return False
+        if j != n and bits & STANDS != 0 and state.speed[b, j] == 0.0:
+            key = along(way, float(state.x[b, j]), float(state.y[b, j]))
+            left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - build[MIDDLE]
+            half = half_width(b, j, way, state, build)
+            if own - build[BEHIND] + SURE < key < own + build[FORE] - SURE:
+                found = found or narrows(left - half, left + half, 2.0 * build[MIDDLE], build[NEEDED])
+        j = desk.link[j]
+    return found

@@ -27,14 +27,16 @@ from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import APPROACH, EXCUSED, STANDS
+from dubins_traffic.spec.propositions import APPROACH, EXCUSED, LEFT, STANDS
 
 QUEUE_GAP = 0.12
 """Gap kept behind a car that waits, metres."""
 MOVING_GAP = 0.25
 """Gap kept behind a car that drives, metres."""
-STANDING_GAP = 0.72
-"""Gap kept behind what stands where there is room: enough to pull out, and for the e-agent of 2016 to drive off."""
+STANDING_GAP, NEAR_ENOUGH = 0.72, 1.4
+"""Gap kept behind what stands where there is room: enough to pull out, and for the e-agent of 2016 to drive off; and
+the largest distance between centres, at which it still counts as blocking the lane, metres.
+"""
 FACING_GAP = 0.8
 """Gap kept from a car that comes, metres."""
 CLOSE_GAP = 0.06
@@ -184,12 +186,16 @@ def wanted_gap(
     labels: Labels,
     ints: Any,
     part: int,
+    reach: float,
 ) -> float:
     """Return the gap to keep from `who`."""
     if who == -1:
         return 0.0
+    standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)
+    if labels.bits[b, n] & LEFT != 0:
+        standing = QUEUE_GAP
     if who < -1:
-        return STANDING_GAP
+        return standing
     if ints[MOOD] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
@@ -202,5 +208,5 @@ def wanted_gap(
     if in_disc or waits:
         return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
     if its & STANDS != 0 or (ints[KIND] == ROUND and part == BEFORE):
-        return STANDING_GAP
+        return standing
     return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 else MOVING_GAP

@@ -15,6 +15,7 @@ from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Laser
+    from dubins_traffic.protocols import Scans
 
 
 new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknownMemberType]
@@ -34,13 +35,21 @@ class Senses:
         From where other cars are seen, metres; by default the problem's sensing radius.
     laser : Laser, optional
         Instead of the problem's laser.
+    scanner : Scans, optional
+        Finds what the laser's rays meet; by default that is worked out from the state.
     """
 
     def __init__(
-        self, instance: Instance, car: int = EGO, radius: float | None = None, laser: Laser | None = None
+        self,
+        instance: Instance,
+        car: int = EGO,
+        radius: float | None = None,
+        laser: Laser | None = None,
+        scanner: Scans | None = None,
     ) -> None:
         problem = instance.problem
         self._car = car
+        self._scanner = scanner
         self._instance = instance
         self._names = instance.names
         self._body = problem.car.body
@@ -69,7 +78,7 @@ class Senses:
                 noise.position_noise, noise.heading_noise,
             )  # fmt: skip
         if self._laser is not None:
-            self._sweep(tick, state)
+            self._sweep(tick, state, self._laser)
         reals = self._reals[:count].tolist()
         wholes = self._wholes[:count].tolist()
         own, labelled = reals[0], wholes[0]
@@ -90,23 +99,42 @@ class Senses:
             SensedCar, (self._names[index], index, pose, twist, self._body, new(Propositions, whole[1:]))
         )
 
-    def _sweep(self, tick: int, state: State) -> None:
-        """Scan when the laser's next sweep is due; in between the last scan stays."""
+    def sweep(self, state: State) -> Floats:
+        """Return the ranges of a laser sweep in `state`, (rays,), metres, from right to left.
+
+        Raises
+        ------
+        ValueError
+            If there is no laser.
+        """
         laser = self._laser
-        assert laser is not None
-        sweep = int(tick * laser.rate / self._rate + 1e-9)
-        if sweep > self._latest:
-            self._latest = sweep
-            ranges = np.zeros(laser.rays)
-            scan(
-                state,
-                0,
-                self._car,
-                self._cars,
-                self._obstacles,
-                self._rays,
-                laser.range_min,
-                laser.range_max,
-                ranges,
-            )
-            self._scan = ranges
+        if laser is None:
+            raise ValueError("no laser")
+        if self._scanner is not None:
+            return _cut(self._scanner.scan(self._car, self._rays, laser.range_max), laser)
+        ranges = np.zeros(laser.rays)
+        scan(
+            state,
+            0,
+            self._car,
+            self._cars,
+            self._obstacles,
+            self._rays,
+            laser.range_min,
+            laser.range_max,
+            ranges,
+        )
+        return ranges
+
+    def _sweep(self, tick: int, state: State, laser: Laser) -> None:
+        """Scan when the laser's next sweep is due; in between the last scan stays."""
+        number = int(tick * laser.rate / self._rate + 1e-9)
+        if number > self._latest:
+            self._latest = number
+            self._scan = self.sweep(state)
+
+
+def _cut(ranges: Floats, laser: Laser) -> Floats:
+    """Return ranges with those beyond the laser's as REP 117 of ROS says (see `cars.sensing.scan`)."""
+    far = np.where(ranges >= laser.range_max, np.inf, ranges)
+    return np.where(ranges < laser.range_min, -np.inf, far)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -96,6 +96,10 @@ class Configuration:
         except InputError as error:
             raise error.within(file=file) from None
         return Configuration(own, settings, network, agents, file)
+
+    def with_simulator(self, name: str) -> Configuration:
+        """Return the configuration with another simulator; its document stays as it was read."""
+        return replace(self, settings=self.settings.model_copy(update={"simulator": name}))
 
     def to_document(self) -> dict[str, Any]:
         """Return the document, equal to the one that was read."""

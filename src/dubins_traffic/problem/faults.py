@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from difflib import get_close_matches
+from typing import Any, TypeVar, cast
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from dubins_traffic.errors import InputError
@@ -36,6 +37,10 @@ _EXPECTED = {
 }
 
 
+ALIKE = 0.8
+"""Similarity of two keys (2 matches / characters) from which one is taken for the other misspelt."""
+
+
 class Strict(BaseModel):
     """Base of all models: exact types (no true for 1, no 1.0 for 1), finite numbers, unknown keys refused."""
 
@@ -46,6 +51,22 @@ class Open(Strict):
     """The same for documents whose unknown keys are kept."""
 
     model_config = ConfigDict(extra="allow")
+
+
+class Careful(Open):
+    """The same, but a key that looks like a known one misspelt is refused: kept, it would silently mean nothing."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _spelt(cls, document: object) -> object:
+        if isinstance(document, dict):
+            keys = cast(dict[object, object], document)
+            known = [info.alias or name for name, info in cls.model_fields.items()]
+            for key, value in keys.items():
+                near = get_close_matches(str(key), known, n=1, cutoff=ALIKE)
+                if near and key not in known and near[0] not in keys:
+                    raise fault("unknown key", f"{near[0]}, or a key less like it", str(key), value)
+        return cast(object, document)
 
 
 def fault(problem: str, expected: str, field: str = "", value: object = None) -> PydanticCustomError:

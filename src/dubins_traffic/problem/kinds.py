@@ -123,7 +123,9 @@ class Lawful(Strict):
     )
     left: Share = Field(default=0.0, description="share of roads driven on the left (E1)")
     blocks: Share = Field(default=0.0, description="share of intersections in which it stands for 9 s (E4)")
-    tailgates: Share = Field(default=0.0, description="share of roads on which it keeps hardly any gap")
+    tailgates: Share = Field(
+        default=0.0, description="share of roads on which it hangs on to the car ahead at top speed (E2)"
+    )
     parks: Share = Field(
         default=0.0, description="share of visits to a goal at which it parks there (E4, E6)"
     )

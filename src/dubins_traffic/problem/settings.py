@@ -11,7 +11,7 @@ from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, model_va
 from dubins_traffic.cars.body import Obstacle
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
-from dubins_traffic.problem.faults import Open, Strict, fault
+from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.problem.parts import (
@@ -114,7 +114,7 @@ class AgentEntry0(Open):
     name: str = Field(pattern=NAME, description="its name, used in labels and messages")
 
 
-class AgentEntry(Open):
+class AgentEntry(Careful):
     """One e-agent, or `count` of them."""
 
     type: str = Field(
@@ -228,7 +228,7 @@ class Settings0(Open):
 VERSION_0_KEYS = frozenset(info.alias or name for name, info in Settings0.model_fields.items())
 
 
-class World(Open):
+class World(Careful):
     """What configurations and instances of version 1 say alike."""
 
     e_agents: list[AgentEntry] = Field(

@@ -37,6 +37,22 @@ class End(StrEnum):
     WORLD_LOST = "world_lost"
 
 
+FAULTS = frozenset(
+    {
+        End.CONTROLLER_FAULT,
+        End.AGENT_FAULT,
+        End.DEADLINE,
+        End.PEER_SILENT,
+        End.PEER_LOST,
+        End.PEER_FLOOD,
+        End.PEER_GARBAGE,
+        End.TRANSPORT_LOST,
+        End.WORLD_LOST,
+    }
+)
+"""Ends that are somebody's fault and not a trial's own."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ending:
     """The named end of a trial, after `ticks` ticks, and a line of detail for people."""

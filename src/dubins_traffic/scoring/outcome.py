@@ -6,13 +6,17 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dubins_traffic.cars.state import EGO, Contact
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, NONE, Contact, Frames
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.goals import GoalVisits, Visits
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
+from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import (
     CLEARANCE,
@@ -62,7 +66,7 @@ def score_of(
     collisions, among_others = _collisions(instance, contacts)
     verdict = None
     if instance.problem.rules:
-        verdict = _verdict(instance, b, tally, contacts, breaches, running, collisions, visits)
+        verdict = _verdict(instance, b, tally, contacts, breaches, running, collisions, visits, ticks)
     return Score(
         trial=instance.trial,
         seed=instance.seed,
@@ -132,6 +136,7 @@ def _verdict(
     running: Running,
     collisions: tuple[Collision, ...],
     visits: Visits,
+    ticks: int,
 ) -> Verdict:
     def was_sensed(car: int, first: int, last: int) -> bool:
         return first <= tally.sensed[b, car] <= last
@@ -145,4 +150,26 @@ def _verdict(
         [row[INSIDE] != 0 for row in _goal_rows(b, tally)],
         was_sensed,
         running,
+        _margins(instance, b, tally, ticks),
     )
+
+
+def _margins(instance: Instance, b: int, tally: Tally, ticks: int) -> dict[str, float | None]:
+    """Return what `scoring.margins` finds in the ego's frames, and the smallest gap that has been counted."""
+    poses: Floats = tally.pose[b, : ticks + 1, :, None]
+    marks: Ints = tally.mark[b, : ticks + 1, :, None]
+    nothing, none = np.zeros_like(poses[:, 0]), np.full_like(marks[:, 0], NONE)
+    frames = Frames(
+        0,
+        instance.problem.rate,
+        *(poses[:, k] for k in range(4)),
+        *[nothing] * 4,
+        *[none] * 3,
+        lane=marks[:, 1],
+        bits=marks[:, 0].astype(np.uint32),
+    )
+    margins = Margins()
+    margins.begin(instance)
+    margins.frames(frames)
+    gap = float(tally.floats[b, CLEARANCE])
+    return {**margins.result(), "1.collision": None if math.isinf(gap) else max(0.0, gap)}

@@ -48,7 +48,8 @@ class Tally(NamedTuple):
     `ints` (B, INTS), `floats` (B, FLOATS); `goal_off` (B,) and `goal` (G, GOAL_INTS): the goals of trial b from row
     goal_off[b] on, each once; `counts` (B, N): 1 for the e-agents that count in the score of 2016; `sensed` (B, N): the
     last tick at which the car was within the ego's sensing radius, -1 before; `before` (B, N, 2): where the cars were
-    in the frame before; `left` (B,): whether the ego was left there.
+    in the frame before; `left` (B,): whether the ego was left there; `pose` (B, F, 4) and `mark` (B, F, 2): x, y,
+    cosine and sine of the ego in each frame, its flags and lane state.
     """
 
     ints: Ints
@@ -59,6 +60,8 @@ class Tally(NamedTuple):
     sensed: Ints
     before: Floats
     left: Ints
+    pose: Floats
+    mark: Ints
 
 
 def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
@@ -86,6 +89,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     goal = np.zeros((len(goals), GOAL_INTS), dtype=np.int64)
     goal[:, VERTEX] = goals
     sensed = np.full((trials, cars), -1, dtype=np.int64)
+    frames = 1 + max(max(1, instance.ticks) for instance in instances)
     return Tally(
         ints,
         floats,
@@ -95,6 +99,8 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
         sensed,
         np.zeros((trials, cars, 2)),
         np.zeros(trials, dtype=np.int64),
+        np.zeros((trials, frames, 4)),
+        np.zeros((trials, frames, 2), dtype=np.int64),
     )
 
 
@@ -109,6 +115,10 @@ def count_frame(
     x, y = state.x[b, EGO], state.y[b, EGO]
     bits = np.int64(labels.bits[b, EGO])
     left = 1 if bits & LEFT != 0 else 0
+    pose = tally.pose[b, tick]
+    pose[0], pose[1], pose[2], pose[3] = x, y, state.c[b, EGO], state.s[b, EGO]
+    tally.mark[b, tick, 0] = bits
+    tally.mark[b, tick, 1] = labels.lane[b, EGO]
     if tick > 0:
         moved = _moved(b, EGO, state, tally)
         floats[DISTANCE] += moved

@@ -18,6 +18,7 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import GoalDiscs, Visiting, Visits
+from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.spec.exceptions import Exceptions
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.tables import ticks
@@ -118,6 +119,8 @@ class Verdict:
         `gap_limit_s` the longest that `satisfied` allows (None if there is no round through all goals).
     formulas : dict
         What holds of each formula so far, in four values.
+    robustness : dict
+        How far the ego stayed from breaking rules 1 and 2, metres (`dubins_traffic.scoring.margins`).
     """
 
     verdict: Ruling
@@ -129,6 +132,7 @@ class Verdict:
     longest_gap_s: float | None
     gap_limit_s: float | None
     formulas: dict[str, Status]
+    robustness: dict[str, float | None]
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
@@ -142,6 +146,7 @@ class Verdict:
             "longest_gap_s": self.longest_gap_s,
             "gap_limit_s": self.gap_limit_s,
             "formulas": dict(self.formulas),
+            "robustness": dict(self.robustness),
         }
 
 
@@ -181,6 +186,8 @@ class Judging:
         self._visiting.begin(instance)
         self._collisions = Collisions()
         self._collisions.begin(instance)
+        self._margins = Margins()
+        self._margins.begin(instance)
         self._goals = GoalDiscs(instance)
         self._at_goal = np.zeros(len(self._goals.goals), dtype=bool)
 
@@ -192,6 +199,7 @@ class Judging:
         self._breaches += breaches
         self._collisions.frames(replace(frames, contacts=contacts))
         self._visiting.frames(frames)
+        self._margins.frames(frames)
         if len(frames):
             dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
             radius = self._instance.problem.sensing_radius
@@ -214,6 +222,7 @@ class Judging:
             self._at_goal.tolist(),
             self._was_sensed,
             self._referee.running[0],
+            self._margins.result(),
         )
 
     def _was_sensed(self, car: int, first: int, last: int) -> bool:
@@ -231,6 +240,7 @@ def reach_verdict(
     at_goal: Sequence[bool],
     was_sensed: Callable[[int, int, int], bool],
     running: Running,
+    margins: dict[str, float | None],
 ) -> Verdict:
     """Return the verdict on a trial.
 
@@ -248,6 +258,8 @@ def reach_verdict(
         Asked for (car, first, last): whether the car was within the sensing radius at a frame from first to last.
     running
         What hangs over the cars after the last frame.
+    margins
+        How far the ego stayed from breaking rules 1 and 2.
     """
     rate = instance.problem.rate
     violations = tuple(_violation(instance, breach) for breach in breaches)
@@ -276,6 +288,7 @@ def reach_verdict(
         gap,
         limit if math.isfinite(limit) else None,
         _formulas(rules, rate, breaches, visits, at_goal, running),
+        margins,
     )
 
 

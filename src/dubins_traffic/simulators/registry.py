@@ -9,6 +9,7 @@ from dubins_traffic.protocols import Simulator
 
 _DESCRIPTIONS = {
     "embedded": "exact arcs and contacts, batches, equal bytes for equal seeds; the default",
+    "gazebo": "wheels, inertia and contact in Gazebo 11, one trial at a time; `dubins-traffic gazebo install` first",
 }
 
 
@@ -17,18 +18,31 @@ def names() -> Mapping[str, str]:
     return dict(_DESCRIPTIONS)
 
 
-def load(name: str) -> Simulator:
+def load(name: str, *, show: bool = False) -> Simulator:
     """Return a new simulator.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    show : bool
+        Whether it shows what it does in a window of its own, at the pace of the clock.
 
     Raises
     ------
     InputError
-        If there is none of that name.
+        If there is none of that name, it can't be used here or it shows nothing.
     """
+    if show and name == "embedded":
+        raise InputError("shows nothing", field="simulator", value=name, expected="gazebo, for --gui")
     if name == "embedded":
         from dubins_traffic.simulators.embedded import Embedded
 
         return Embedded()
+    if name == "gazebo":
+        from dubins_traffic.simulators.gazebo.simulator import Gazebo
+
+        return Gazebo(show=show)
     raise InputError(
         "unknown simulator", field="simulator", value=name, expected=f"one of {', '.join(_DESCRIPTIONS)}"
     )

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from threading import Condition
 from time import monotonic
 
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.protocols import End
+
+MOST_PLACES = 10_000
 
 
 @dataclass(slots=True)
@@ -48,6 +51,7 @@ class Inbox:
         self._slots: dict[str, Slot] = {}
         self._peers: dict[str, int] = {}
         self._stop: tuple[End, str] | None = None
+        self._places: dict[str, Pose] = {}
 
     def expect(self, cars: Sequence[str]) -> None:
         """Begin a trial in which the commands of `cars` are wanted; peers that are there stay there."""
@@ -83,7 +87,9 @@ class Inbox:
             slot.commands += 1
             if now - slot.window >= 1.0:
                 slot.window, slot.in_window = now, 0
-            slot.in_window += 1
+            slot.in_window += (
+                slot.fresh
+            )  # the first answer to a frame is asked for, however quickly frames follow
             if slot.in_window > self._flood and slot.fault is None:
                 slot.fault = (End.PEER_FLOOD, f"more than {self._flood} commands in a second")
             slot.speed, slot.yaw_rate, slot.tick = speed, yaw_rate, tick
@@ -129,6 +135,24 @@ class Inbox:
         with self.condition:
             self.paused = paused
             self.condition.notify_all()
+
+    def place(self, car: str, pose: Pose) -> None:
+        """Keep where a car shall be, of the cars that there are."""
+        with self.condition:
+            if car in self._places or len(self._places) < MOST_PLACES:
+                self._places[car] = pose
+            self.condition.notify_all()
+
+    def placed(self) -> dict[str, Pose]:
+        """Return where cars shall be, once."""
+        with self.condition:
+            places, self._places = self._places, {}
+        return places
+
+    @property
+    def news(self) -> bool:
+        """Whether cars shall be placed."""
+        return bool(self._places)
 
     def wake(self) -> None:
         """Let who waits look again."""

@@ -12,7 +12,7 @@ from dubins_traffic.cars.state import EGO, Labels, Observation, State
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import PeerError
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Clock, End, Ending, Streams, Transport, View
+from dubins_traffic.protocols import Clock, End, Ending, Polled, Streams, Transport, View
 from dubins_traffic.record.wall import summary
 from dubins_traffic.transports.inbox import Inbox, Slot
 from dubins_traffic.transports.shown import between, kept, onward
@@ -68,6 +68,7 @@ class Link:
         self._patience = patience or Patience()
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
+        self._polled = transport if isinstance(transport, Polled) else None
         self._interval = IDLE if self._stream is None else self._stream.interval
         transport.open(self.inbox)
 
@@ -198,6 +199,9 @@ class Link:
         self._settle()
 
     def _check_silence(self, slot: Slot, tick: int) -> None:
+        """Name a peer that is there and says nothing; one that has gone is given its time to come back."""
+        if slot.gone_since is not None:
+            return
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
         if monotonic() - since > self._patience.silence:
             detail = f"no command for {self._patience.silence:g} s at tick {tick}"
@@ -213,8 +217,11 @@ class Link:
                 if done():
                     return True
                 now = monotonic()
-                if now < until:
-                    inbox.condition.wait(min(until, now + IDLE, self._wake(still)) - now)
+                pause = min(until, now + IDLE, self._wake(still)) - now if now < until else 0.0
+                if self._polled is None and pause > 0.0:
+                    inbox.condition.wait(pause)
+            if self._polled is not None:
+                self._polled.receive(pause)
             now = monotonic()
             if now >= until and not done():
                 return False
@@ -271,8 +278,10 @@ class Link:
             wake = min(due, self._next_view) if self._stream is not None else due
             with self.inbox.condition:
                 self._check(None)
-                if wake > now:
+                if self._polled is None and wake > now:
                     self.inbox.condition.wait(wake - now)
+            if self._polled is not None:
+                self._polled.receive(wake - now)
 
     def _halt(self) -> None:
         """Let time stand still while the world is paused."""

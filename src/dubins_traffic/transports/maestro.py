@@ -51,6 +51,11 @@ class Maestro:
         """What has been asked for since the instance was put up."""
         return self._next
 
+    @property
+    def phase(self) -> Phase:
+        """Where the session stands."""
+        return self._phase
+
     def enter(self, phase: Phase) -> None:
         """Say where the session stands now."""
         with self._lock:

@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Contact, Event, Observation
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
-from dubins_traffic.protocols import Driver, End, Ending, Simulator, Sink, Watcher
+from dubins_traffic.protocols import Driver, End, Ending, Scans, Simulator, Sink, Watcher
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
@@ -65,7 +65,7 @@ class Trial:
         self._labels = self._labeller.reset(self._state)
         for agent in self._agents:
             agent.reset([instance], self._state)
-        self._senses = Senses(instance)
+        self._senses = Senses(instance, scanner=simulator if isinstance(simulator, Scans) else None)
         self._buffer = FrameBuffer(instance, sinks)
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0

@@ -21,12 +21,22 @@ from dubins_traffic.spec.logic.formula import (
     implies,
     make,
     propositions,
+    subformulas,
     ticks,
 )
 from dubins_traffic.spec.logic.gr1 import gr1, slugs_text, tulip_text
-from dubins_traffic.spec.logic.printer import SPIN, Brackets, Style, number, written
+from dubins_traffic.spec.logic.printer import (
+    SPIN,
+    Brackets,
+    Style,
+    number,
+    written,
+    written_implication,
+    written_together,
+)
 from dubins_traffic.spec.logic.rewrite import mapped
 from dubins_traffic.spec.logic.translation import (
+    MAX_NEXT,
     for_signals,
     in_ticks,
     until_and_release_only,
@@ -94,6 +104,11 @@ def _without_past(spec: Specification) -> Specification:
     )
 
 
+def _whole(spec: Specification, style: Style) -> str:
+    """Return the text of `spec.whole`, which may be longer than a formula can be."""
+    return written_implication(spec.assumptions, spec.guarantees, style)
+
+
 def spin(spec: Specification, period: float) -> str:
     """Return one formula for SPIN.
 
@@ -102,12 +117,24 @@ def spin(spec: Specification, period: float) -> str:
     Raises
     ------
     FormulaError
-        If a bound is too long to be written out.
+        If a bound is too long to be written out; says which period would do.
     """
+    bounds = [
+        part.bounds
+        for side in (spec.assumptions, spec.guarantees)
+        for one in side
+        for part in subformulas(one)
+    ]
+    longest = max((high for _, high in filter(None, bounds)), default=0.0)
+    if ticks(longest, period) > MAX_NEXT:
+        raise FormulaError(
+            f"a bound of {number(longest)} s is too long to be written out with next",
+            expected=f"a period of at least {longest / MAX_NEXT:.4g} s, or a format that counts",
+        )
     plain = _changed(
         _without_past(spec), lambda formula: written_out(until_and_release_only(in_ticks(formula, period)))
     )
-    return written(plain.whole, SPIN)
+    return _whole(plain, SPIN)
 
 
 def _colon(bounds: Bounds) -> str:
@@ -119,7 +146,7 @@ _SPOT: Final = Style({Op.AND: "&", Op.OR: "|", Op.TRUE: "1", Op.FALSE: "0"}, bou
 
 def spot(spec: Specification, period: float) -> str:
     """Return one formula as Spot reads it; bounds in ticks: ``F[0:300] p``."""
-    return written(_changed(_without_past(spec), lambda formula: in_ticks(formula, period)).whole, _SPOT)
+    return _whole(_changed(_without_past(spec), lambda formula: in_ticks(formula, period)), _SPOT)
 
 
 def _positive(name: str) -> str:
@@ -159,7 +186,7 @@ def stl(spec: Specification, period: float) -> str:
     def change(formula: Formula) -> Formula:
         return for_signals(_rounded(formula, period))
 
-    return written(_changed(spec, change).whole, _STL)
+    return _whole(_changed(spec, change), _STL)
 
 
 def _rounded(formula: Formula, period: float) -> Formula:
@@ -250,7 +277,7 @@ _LATEX: Final = Style(
 def latex(spec: Specification, period: float) -> str:  # noqa: ARG001 - all formats are called alike
     """Return the specification for LaTeX with amsmath and amssymb; bounds in seconds."""
     lines = [
-        f"  \\varphi_{{\\mathrm{{{side}}}}} &= {written(conj(*formulas), _LATEX)}"
+        f"  \\varphi_{{\\mathrm{{{side}}}}} &= {written_together(formulas, _LATEX)}"
         for side, formulas in (("env", spec.assumptions), ("sys", spec.guarantees))
     ]
     return "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"

@@ -40,7 +40,7 @@ from dubins_traffic.spec.logic.formula import (
 from dubins_traffic.spec.logic.monitor import parts
 from dubins_traffic.spec.logic.printer import Brackets, Style, written
 from dubins_traffic.spec.logic.rewrite import mapped, nnf, renamed, simplify
-from dubins_traffic.spec.logic.translation import fresh, without_past
+from dubins_traffic.spec.logic.translation import FreshNames, without_past
 
 
 @dataclass(frozen=True)
@@ -100,22 +100,23 @@ def gr1(
     system = Side(list(outputs))
     environment.first += [memory.initially for memory in memories]
     environment.step += [memory.step for memory in memories]
-    taken = {*environment.variables, *system.variables}
+    taken = FreshNames([*environment.variables, *system.variables])
     for place, formula in enumerate(changed):
         side = environment if place < len(assumptions) else system
         for part in parts(formula):
             _Sorter(side, period, taken).sort(simplify(part))
+    own = set(environment.variables)
     for formula in environment.first:
-        _keep_to(environment, propositions(formula), formula, "first")
+        _keep_to(own, propositions(formula), formula, "first")
     for formula in environment.step:
         ahead = {name for part in subformulas(formula) if part.op is Op.X for name in propositions(part)}
-        _keep_to(environment, sorted(ahead), formula, "next")
+        _keep_to(own, sorted(ahead), formula, "next")
     return GR1(environment, system)
 
 
-def _keep_to(side: Side, names: Sequence[str], formula: Formula, when: str) -> None:
+def _keep_to(own: set[str], names: Sequence[str], formula: Formula, when: str) -> None:
     for name in names:
-        if name not in side.variables:
+        if name not in own:
             raise FormulaError(
                 f"an assumption restricts what the system chooses {when}",
                 value=str(formula),
@@ -126,7 +127,7 @@ def _keep_to(side: Side, names: Sequence[str], formula: Formula, when: str) -> N
 class _Sorter:
     """Puts one part of a conjunction where it belongs."""
 
-    def __init__(self, side: Side, period: float, taken: set[str]) -> None:
+    def __init__(self, side: Side, period: float, taken: FreshNames) -> None:
         self._side = side
         self._period = period
         self._taken = taken
@@ -203,8 +204,8 @@ class _Sorter:
         return name
 
     def _name(self, stem: str) -> str:
-        name = fresh(stem, self._taken)
-        self._taken.update((name, f"{name}_runs", f"{name}_full"))
+        name = self._taken.make(stem)
+        self._taken.take(f"{name}_runs", f"{name}_full")
         return name
 
     def _latch(self, name: str, update: Formula) -> None:
@@ -230,15 +231,19 @@ def _is_step(formula: Formula) -> bool:
     )
 
 
-def _texts(counters: Sequence[Counter], formulas: Sequence[Formula]) -> list[str]:
-    """Return formulas with primes for next and comparisons for counters."""
+def _style(counters: Sequence[Counter]) -> Style:
+    """Return the style of formulas with comparisons for counters."""
     known = {f"{counter.name}_runs": f"({counter.name} > 0)" for counter in counters}
     known |= {f"{counter.name}_full": f"({counter.name} = {counter.limit})" for counter in counters}
-    style = Style(
+    return Style(
         {Op.AND: "&", Op.OR: "|", Op.TRUE: "TRUE", Op.FALSE: "FALSE"},
         Brackets.ALL,
         name=lambda name: known.get(name, name),
     )
+
+
+def _texts(style: Style, formulas: Sequence[Formula]) -> list[str]:
+    """Return formulas with primes for next."""
     return [written(mapped(formula, _primed), style) for formula in formulas]
 
 
@@ -255,22 +260,27 @@ class _Text:
     recurs: list[str]
 
 
-def _side_text(side: Side, counters: Sequence[Counter]) -> _Text:
-    first = _texts(counters, side.first) + [f"{counter.name} = 0" for counter in side.counters]
-    step = _texts(counters, side.step)
+def _side_texts(spec: GR1) -> tuple[_Text, _Text]:
+    """Return the texts of the environment and of the system."""
+    style = _style([*spec.environment.counters, *spec.system.counters])
+    return _side_text(spec.environment, style), _side_text(spec.system, style)
+
+
+def _side_text(side: Side, style: Style) -> _Text:
+    first = _texts(style, side.first) + [f"{counter.name} = 0" for counter in side.counters]
+    step = _texts(style, side.step)
     for counter in side.counters:
-        conditions = _texts(counters, [condition for condition, _ in counter.steps])
+        conditions = _texts(style, [condition for condition, _ in counter.steps])
         step += [
             f"({condition}) -> ({counter.name}' = {value})"
             for condition, (_, value) in zip(conditions, counter.steps, strict=True)
         ]
-    return _Text(first, step, _texts(counters, side.recurs))
+    return _Text(first, step, _texts(style, side.recurs))
 
 
 def slugs_text(spec: GR1) -> str:
     """Return the specification in slugs' structured form."""
-    counters = [*spec.environment.counters, *spec.system.counters]
-    environment, system = (_side_text(side, counters) for side in (spec.environment, spec.system))
+    environment, system = _side_texts(spec)
     sections: Final = {
         "INPUT": _declared(spec.environment),
         "OUTPUT": _declared(spec.system),
@@ -290,7 +300,7 @@ def _declared(side: Side) -> list[str]:
 
 def tulip_text(spec: GR1) -> str:
     """Return a Python file that makes the specification with TuLiP."""
-    counters = [*spec.environment.counters, *spec.system.counters]
+    texts = _side_texts(spec)
     lines = [
         '"""GR(1) specification for TuLiP."""',
         "",
@@ -298,8 +308,7 @@ def tulip_text(spec: GR1) -> str:
         "",
         "specification = GRSpec(",
     ]
-    for prefix, side in (("env", spec.environment), ("sys", spec.system)):
-        text = _side_text(side, counters)
+    for prefix, side, text in zip(("env", "sys"), (spec.environment, spec.system), texts, strict=True):
         domains: dict[str, object] = dict.fromkeys(side.variables, "boolean")
         domains |= {counter.name: (0, counter.limit) for counter in side.counters}
         lines += [

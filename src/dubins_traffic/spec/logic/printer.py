@@ -5,12 +5,12 @@ What `to_spin` and `to_ascii` return, `parse` reads back as the same formula.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from dubins_traffic.spec.logic.formula import Bounds, Formula, Op, subformulas
+from dubins_traffic.spec.logic.formula import Bounds, Formula, Op, conj, implies, prop, subformulas
 
 _JUNCTIONS: Final = (Op.AND, Op.OR, Op.IMPLIES, Op.IFF)
 
@@ -88,6 +88,45 @@ def written(formula: Formula, style: Style) -> str:
         ]
         done[part] = _one(part, inner, style)
     return done[formula]
+
+
+_AND: Final = conj(prop("p"), prop("q"))
+_IMPLIES: Final = implies(prop("p"), prop("q"))
+"""Stand for formulas that would be too long to be made; only what is at their top matters."""
+
+
+def written_together(formulas: Sequence[Formula], style: Style) -> str:
+    """Return the conjunction of `formulas` spelled in a style.
+
+    It is not made: it may have more parts than a formula can have.
+    """
+    return _together(formulas, style)[1]
+
+
+def written_implication(left: Sequence[Formula], right: Sequence[Formula], style: Style) -> str:
+    """Return that the conjunction of `left` implies that of `right`, in a style; only the latter if `left` is empty."""
+    sides = [_together(formulas, style) for formulas in (left, right)]
+    if not left:
+        return sides[1][1]
+    inner = [
+        text if _bare(_IMPLIES, place, top, style.brackets) else f"({text})"
+        for place, (top, text) in enumerate(sides)
+    ]
+    return _one(_IMPLIES, inner, style)
+
+
+def _together(formulas: Sequence[Formula], style: Style) -> tuple[Formula, str]:
+    """Return a formula with the same top as the conjunction of `formulas`, and the conjunction's text."""
+    flat = [part for formula in formulas for part in (formula.args if formula.op is Op.AND else (formula,))]
+    if len(flat) < 2:
+        whole = conj(*flat)
+        return whole, written(whole, style)
+    texts = [written(part, style) for part in flat]
+    inner = [
+        text if _bare(_AND, place, part, style.brackets) else f"({text})"
+        for place, (part, text) in enumerate(zip(flat, texts, strict=True))
+    ]
+    return _AND, _one(_AND, inner, style)
 
 
 def _one(part: Formula, inner: list[str], style: Style) -> str:

@@ -64,13 +64,31 @@ class Memory:
         return iff(next_(prop(self.name)), self.update)
 
 
-def fresh(stem: str, taken: Iterable[str]) -> str:
-    """Return `stem` with the first number that makes it a new name."""
-    known = set(taken)
-    count = 1
-    while f"{stem}_{count}" in known:
-        count += 1
-    return f"{stem}_{count}"
+class FreshNames:
+    """Makes names of propositions that are not taken.
+
+    Parameters
+    ----------
+    taken : iterable of str
+        Names that there are.
+    """
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = set(taken)
+        self._last: dict[str, int] = {}
+
+    def take(self, *names: str) -> None:
+        """Take note of names that there are as well."""
+        self._taken.update(names)
+
+    def make(self, stem: str) -> str:
+        """Return `stem` with the first number that makes it a new name, and take it."""
+        count = self._last.get(stem, 0) + 1
+        while f"{stem}_{count}" in self._taken:
+            count += 1
+        self._last[stem] = count
+        self._taken.add(f"{stem}_{count}")
+        return f"{stem}_{count}"
 
 
 def without_past(formulas: Sequence[Formula]) -> tuple[tuple[Formula, ...], tuple[Memory, ...]]:
@@ -84,7 +102,7 @@ def without_past(formulas: Sequence[Formula]) -> tuple[tuple[Formula, ...], tupl
     FormulaError
         If a past operator ranges over a future one.
     """
-    taken = {name for formula in formulas for name in propositions(formula)}
+    names = FreshNames(name for formula in formulas for name in propositions(formula))
     memories: dict[Formula, Memory] = {}
     meanings: dict[Formula, Formula] = {}
 
@@ -94,8 +112,7 @@ def without_past(formulas: Sequence[Formula]) -> tuple[tuple[Formula, ...], tupl
         _check_plain(part)
         memory = memories.get(part)
         if memory is None:
-            name = fresh("past", taken)
-            taken.add(name)
+            name = names.make("past")
             memory = memories[part] = _memory(part, name, meanings)
             meanings[prop(name)] = memory.meaning
         return _now(part, prop(memory.name))

@@ -1,0 +1,45 @@
+"""Random instances for the benchmarks of drivers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+
+
+def random_roads(draws: Draws, largest: int, density: float) -> dict[str, Any]:
+    """Return the network of a configuration: random, with 6 to `largest` intersections.
+
+    It has anything from a tree to, of the segments that a grid has more than a tree, the share `density`.
+    """
+    intersections = draws.between(6, largest)
+    most = math.floor(2 * intersections - 2 * math.sqrt(intersections))
+    segments = draws.between(intersections - 1, int(intersections + density * (most - intersections)))
+    return {"random": {"intersections": intersections, "segments": segments, "rigid_motion": True}}
+
+
+def random_trial(
+    network: Mapping[str, Any],
+    e_agents: Sequence[Mapping[str, Any]],
+    seconds: float,
+    seed: int,
+    number: int,
+    **more: Any,
+) -> Instance:
+    """Return a trial with 1 to 4 goals on a network; `more` are further entries of the configuration."""
+    configuration = {
+        "version": 1,
+        "problem_domain": "dubins_traffic",
+        "network": network,
+        "e-agents": list(e_agents),
+        "number_trials": 1,
+        "duration": seconds,
+        "number_goals_bounds": [1, 4],
+        **more,
+    }
+    return draw(load_config(configuration), seed, number)

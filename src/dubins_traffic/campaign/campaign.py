@@ -1,0 +1,329 @@
+"""A campaign: which trials it consists of, in which order, and from which seeds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
+from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
+from dubins_traffic.files import read_text
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.faults import parse
+from dubins_traffic.problem.files import plain
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.simulators import registry as simulators
+
+CAR_STEPS = 2_000_000
+"""Car-steps of a chunk whose size the file does not give."""
+MOST_IN_CHUNK = 2_000
+CHUNKS = 64
+"""At least so many chunks are made, if there are as many trials."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One combination of a configuration and a value of each factor.
+
+    `values` tells the factors as tables do; `first` is the number of its first trial, of which there are `count` for
+    each controller. Trial k of every controller is ``draw(settled, seed, k)``, with `settled` the configuration that
+    has the values put in.
+    """
+
+    index: int
+    configuration: str
+    values: Mapping[str, Scalar]
+    seed: int
+    first: int
+    count: int
+    settled: Configuration
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A unit of work: `count` trials, from number `trial`, of one controller in one cell.
+
+    Attributes
+    ----------
+    number : int
+        Number of the first of them in the campaign; the others follow.
+    configuration : Configuration
+        What the instances are drawn from, with `seed` and the number of the trial.
+    controller : str
+        What `controllers.registry.load` takes.
+    deadline : float or None
+        Seconds within which each `act` must answer.
+    """
+
+    number: int
+    configuration: Configuration
+    seed: int
+    controller: str
+    trial: int
+    count: int
+    deadline: float | None = None
+
+    @property
+    def end(self) -> int:
+        """The number after the last."""
+        return self.number + self.count
+
+    def part(self, number: int, end: int) -> Chunk:
+        """Return the chunk of the trials from `number` up to before `end`."""
+        trial = self.trial + number - self.number
+        return Chunk(
+            number, self.configuration, self.seed, self.controller, trial, end - number, self.deadline
+        )
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A checked campaign.
+
+    Parameters
+    ----------
+    document : Mapping
+        What the file says, with the configurations and their road networks written in; JSON.
+    model : CampaignModel
+        The same, checked, with defaults.
+    places : tuple of str
+        The controllers, those given by a file with its full path.
+    cells : tuple of Cell
+        All combinations, configurations outermost.
+    file : str or None
+        Where it was read.
+
+    Notes
+    -----
+    Trials are numbered cell by cell, in a cell controller by controller.
+    """
+
+    document: Mapping[str, Any]
+    model: CampaignModel
+    places: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    file: str | None = field(default=None, compare=False)
+
+    @staticmethod
+    def from_document(
+        document: Mapping[str, Any],
+        file: str | None = None,
+        folder: Path | None = None,
+        places: tuple[str, ...] | None = None,
+    ) -> Campaign:
+        """Check `document`; relative paths are looked up in `folder`, then in the current directory.
+
+        Parameters
+        ----------
+        document : Mapping
+            What a campaign file says.
+        file : str, optional
+            Named in messages.
+        folder : Path, optional
+            The folder in which the file stands.
+        places : tuple of str, optional
+            Where the controllers are, instead of where the document says.
+
+        Raises
+        ------
+        InputError
+            For the first thing wrong, with its field.
+        """
+        own = plain(document, file)
+        model = parse(CampaignModel, own, file=file)
+        try:
+            configurations = [
+                _configuration(entry, k, folder) for k, entry in enumerate(model.configurations)
+            ]
+            _check_names([entry.name for entry in model.configurations], "configurations")
+            _check_names([bare_name(spec) for spec in model.controllers], "controllers")
+            found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
+            cells = tuple(_cells(model, configurations))
+        except InputError as error:
+            raise error.within(file=file) from None
+        return Campaign(_complete(model, configurations), model, found, cells, file)
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """What the controllers are called in tables."""
+        return tuple(bare_name(spec) for spec in self.model.controllers)
+
+    @property
+    def total(self) -> int:
+        """Number of trials, all controllers together."""
+        return len(self.places) * sum(cell.count for cell in self.cells)
+
+    @cached_property
+    def factors(self) -> tuple[str, ...]:
+        """Names of the factors, in the order of the table's columns."""
+        return tuple(self.cells[0].values)
+
+    def chunks(self) -> Iterator[Chunk]:
+        """Make all units of work, in order; they depend on the campaign alone."""
+        for cell in self.cells:
+            size = self.model.chunk or self._size(cell)
+            for k, place in enumerate(self.places):
+                start = cell.first + k * cell.count
+                for trial in range(0, cell.count, size):
+                    count = min(size, cell.count - trial)
+                    yield Chunk(
+                        start + trial, cell.settled, cell.seed, place, trial, count, self.model.deadline
+                    )
+
+    def chunk(self, cell: Cell, controller: int, trial: int) -> Chunk:
+        """Return one trial as a chunk of its own."""
+        number = cell.first + controller * cell.count + trial
+        return Chunk(number, cell.settled, cell.seed, self.places[controller], trial, 1, self.model.deadline)
+
+    def _size(self, cell: Cell) -> int:
+        settings = cell.settled.settings
+        seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
+        steps = seconds * settings.rate * (1 + len(cell.settled.agents))
+        return max(1, min(int(CAR_STEPS / steps), MOST_IN_CHUNK, -(-self.total // CHUNKS)))
+
+
+def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+    """Return the campaign in the TOML file at `path`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or something in it is wrong.
+    """
+    name = os.fspath(path)
+    try:
+        document = tomllib.loads(read_text(name))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
+    return Campaign.from_document(document, name, Path(name).parent)
+
+
+def seed_of(root: int, configuration: str, values: Mapping[str, Scalar]) -> int:
+    """Return the seed of a cell: 64 bits of SHA-256 over the root seed, the configuration's name and the factors.
+
+    Neither the controllers nor other cells come into it, so that these may be added without a change of instances.
+    """
+    told = json.dumps([root, configuration, dict(sorted(values.items()))], separators=(",", ":"))
+    return int.from_bytes(hashlib.sha256(told.encode()).digest()[:8], "little")
+
+
+def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -> Configuration:
+    where = f"configurations[{index}]"
+    try:
+        if entry.document is not None:
+            return Configuration.from_document(entry.document, folder=folder)
+        name = entry.file or ""
+        beside = (folder or Path()) / name
+        return load_config(beside if beside.is_file() else name)
+    except InputError as error:
+        problem = ": ".join(part for part in (error.file, error.field, error.problem) if part)
+        raise InputError(problem, field=where, value=error.value, expected=error.expected) from None
+
+
+def _place(spec: str, index: int, folder: Path | None) -> str:
+    """Return where a controller is, having loaded it once."""
+    path, colon, name = spec.rpartition(":")
+    if colon and path.endswith(".py"):
+        beside = (folder or Path()) / Path(path).expanduser()
+        found = beside if beside.is_file() else Path(path).expanduser()
+        spec = f"{found.resolve()}:{name}"
+    try:
+        controllers.load(spec)
+    except InputError as error:
+        raise InputError(
+            error.problem, field=f"controllers[{index}]", value=error.value, expected=error.expected
+        ) from None
+    return spec
+
+
+def _check_names(names: list[str], what: str) -> None:
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError("name taken", field=f"{what}[{k}]", value=name, expected="a name of its own")
+
+
+def _cells(model: CampaignModel, configurations: list[Configuration]) -> Iterator[Cell]:
+    factors = levels(model.factors)
+    axes = {**factors, **model.fields}
+    _check_axes(axes, model, len(configurations))
+    first, index = 0, 0
+    for k, configuration in enumerate(configurations):
+        name = model.configurations[k].name
+        for values in product(*axes.values()):
+            chosen = dict(zip(axes, values, strict=True))
+            told = {axis: scalar(value) for axis, value in chosen.items()}
+            settled = _settled(configuration, chosen, set(factors), f"configurations[{k}]", told)
+            count = model.trials or settled.number_trials
+            yield Cell(index, name, told, seed_of(model.seed, name, told), first, count, settled)
+            first += count * len(model.controllers)
+            index += 1
+            if first > MOST_TRIALS:
+                raise InputError(
+                    "too many trials", field="trials", value=first, expected=f"at most {MOST_TRIALS} in all"
+                )
+
+
+def _check_axes(axes: Mapping[str, list[Any]], model: CampaignModel, configurations: int) -> None:
+    count = configurations
+    for name, values in axes.items():
+        field_ = f"fields.{name}" if name in model.fields else f"factors.{name}"
+        told = [scalar(value) for value in values]
+        for k, value in enumerate(told):
+            if (type(value), value) in [(type(other), other) for other in told[:k]]:
+                raise InputError(
+                    "value stands twice", field=f"{field_}[{k}]", value=value, expected="each value once"
+                )
+        count *= len(values)
+    if count > MOST_CELLS:
+        expected = f"at most {MOST_CELLS} of them with the configurations"
+        raise InputError("too many combinations", field="factors", value=count, expected=expected)
+
+
+def _settled(
+    configuration: Configuration,
+    chosen: Mapping[str, Any],
+    factors: set[str],
+    field_: str,
+    told: Mapping[str, Scalar],
+) -> Configuration:
+    """Return the configuration with the chosen values put in, checked."""
+    named = {name: value for name, value in chosen.items() if name in factors}
+    rest = {name: value for name, value in chosen.items() if name not in factors}
+    with_ = ", ".join(f"{name} = {value}" for name, value in told.items())
+    try:
+        document = vary(_inlined(configuration), named, rest)
+        settled = Configuration.from_document(document)
+        simulators.load(settled.settings.simulator).close()
+    except InputError as error:
+        problem = ": ".join(part for part in (error.field, error.problem) if part)
+        where = f"{field_} with {with_}" if with_ else field_
+        raise InputError(problem, field=where, value=error.value, expected=error.expected) from None
+    return settled
+
+
+def _inlined(configuration: Configuration) -> dict[str, Any]:
+    """Return the document of a configuration with the road network written in that it names by path."""
+    document = configuration.to_document()
+    if configuration.network is not None and not isinstance(document.get("rnd"), dict):
+        document["rnd"] = configuration.network.to_document()
+    return document
+
+
+def _complete(model: CampaignModel, configurations: list[Configuration]) -> dict[str, Any]:
+    document = model.model_dump(exclude={"configurations"})
+    document["factors"] = levels(model.factors)
+    document["configurations"] = [
+        {"name": entry.name, "document": _inlined(configuration)}
+        for entry, configuration in zip(model.configurations, configurations, strict=True)
+    ]
+    return document

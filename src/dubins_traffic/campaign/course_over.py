@@ -1,0 +1,185 @@
+"""The course over a transport: the controller is a program, started for each pass."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import socket
+import subprocess
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from threading import Event, Thread
+
+from dubins_traffic.campaign.course import course
+from dubins_traffic.campaign.course_run import DEADLINE, ERRORS, FAREWELL, PATIENCE, Drive, Pass, driven
+from dubins_traffic.campaign.remote import Session, run_remote
+from dubins_traffic.errors import InputError, TransportError
+from dubins_traffic.protocols import End, Transport
+from dubins_traffic.transports.clocks import Lockstep
+from dubins_traffic.transports.inbox import Inbox
+from dubins_traffic.transports.link import EGO_NAME, Link, Patience
+from dubins_traffic.transports.maestro import Maestro
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """A transport, and the environment in which a program finds it."""
+
+    transport: Transport
+    environment: Mapping[str, str]
+
+
+class NotingLink(Link):
+    """Notes what the ego's driver answers."""
+
+    commands: list[tuple[float, float]]
+
+    def announce(self) -> None:
+        """Begin new notes."""
+        self.commands = []
+        super().announce()
+
+    def command(self, car: str, tick: int) -> tuple[float, float]:
+        """Note the command."""
+        command = super().command(car, tick)
+        self.commands.append(command)
+        return command
+
+    @property
+    def answers(self) -> list[float]:
+        """Seconds after which each frame of the trial was answered."""
+        return list(self._answers[EGO_NAME])
+
+
+def run_over(over: str, command: str) -> Pass:
+    """Run the course in lockstep with a program that drives over a transport.
+
+    Parameters
+    ----------
+    over : str
+        ``lcm``, ``ros1`` or ``ros2``.
+    command : str
+        Starts the program, which is told where to go by the variables of its middleware.
+
+    Raises
+    ------
+    InputError
+        If there is no such program.
+    TransportError
+        If the transport can't be opened.
+    """
+    instances = course()
+    names, drives, lost = list(instances), list[Drive](), ""
+    maestro = Maestro()
+    with ExitStack() as stack:
+        meeting = stack.enter_context(_MEETINGS[over](maestro))
+        patience = Patience(begin=PATIENCE / 3)
+        link = NotingLink(meeting.transport, Lockstep(DEADLINE), patience=patience)
+        program = _start(command, meeting.environment)
+        watch = _Watch(program, link.inbox, maestro)
+        try:
+            session = Session(link, list(instances.values()).__getitem__, len(names), maestro)
+            for result in run_remote(session):
+                drives.append(driven(names[len(drives)], result, link.answers, link.commands))
+                watch.proceed()
+        except TransportError as error:
+            lost = str(error)
+        finally:
+            watch.end()
+            farewell = _dismiss(program)
+    return Pass(drives, farewell, lost)
+
+
+class _Watch:
+    """Ends the course if the program has ended, or asks for no trial for too long."""
+
+    def __init__(self, program: subprocess.Popen[bytes], inbox: Inbox, maestro: Maestro) -> None:
+        self._program, self._inbox, self._maestro = program, inbox, maestro
+        self._over, self._left = Event(), PATIENCE
+        self._thread = Thread(target=self._look, name="watch", daemon=True)
+        self._thread.start()
+
+    def proceed(self) -> None:
+        """A trial has ended: the program has its time again."""
+        self._left = PATIENCE
+
+    def end(self) -> None:
+        """Look no longer."""
+        self._over.set()
+        self._thread.join()
+
+    def _look(self) -> None:
+        step = 0.1
+        while not self._over.wait(step):
+            self._left -= step
+            if self._program.poll() is not None:
+                self._inbox.stop(End.PEER_LOST, f"the program ended with status {self._program.returncode}")
+            elif self._left <= 0.0:
+                self._inbox.stop(End.PEER_SILENT, f"no trial began or ended within {PATIENCE:g} s")
+
+
+def _start(command: str, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    try:
+        words = shlex.split(command)
+        return subprocess.Popen(
+            words,
+            env={**os.environ, **environment},
+            stdin=subprocess.DEVNULL,
+            stdout=ERRORS,
+            start_new_session=True,
+        )
+    except (ValueError, IndexError, OSError) as error:
+        raise InputError(
+            f"can't be started: {error}", file="C", value=command, expected="a command line"
+        ) from error
+
+
+def _dismiss(program: subprocess.Popen[bytes]) -> str:
+    """End the program as Ctrl-C does, and say what was wrong with its end."""
+    early = program.poll()
+    if early is not None:
+        return f"the program had ended with status {early}"
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        os.killpg(program.pid, number)
+        try:
+            program.wait(FAREWELL)
+        except subprocess.TimeoutExpired:
+            continue
+        return "" if number == signal.SIGINT else f"the program took {number.name} to end"
+    return "the program could not be ended"
+
+
+@contextmanager
+def _over_lcm(maestro: Maestro) -> Iterator[Meeting]:
+    from dubins_traffic.transports.lcm.connection import DEFAULT_GROUP
+    from dubins_traffic.transports.lcm.transport import Lcm
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        url = f"udpm://{DEFAULT_GROUP}:{probe.getsockname()[1]}?ttl=0"
+    transport = Lcm(url, maestro)
+    try:
+        yield Meeting(transport, {"LCM_DEFAULT_URL": url})
+    finally:
+        transport.close()
+
+
+@contextmanager
+def _over_ros1(maestro: Maestro) -> Iterator[Meeting]:
+    from dubins_traffic.transports.ros1.master import Master
+    from dubins_traffic.transports.ros1.node import leave
+    from dubins_traffic.transports.ros1.transport import Ros1
+
+    with ExitStack() as stack:
+        master = Master(0)
+        stack.callback(master.close)
+        os.environ["ROS_IP"] = "127.0.0.1"
+        stack.callback(leave)
+        transport = Ros1(master.uri, maestro=maestro)
+        stack.callback(transport.close)
+        yield Meeting(transport, {"ROS_MASTER_URI": master.uri, "ROS_IP": "127.0.0.1"})
+
+
+_MEETINGS = {"lcm": _over_lcm, "ros1": _over_ros1}

@@ -1,0 +1,188 @@
+"""The manifest of a campaign's folder: what runs there, from what, with which versions."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, cast
+
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.errors import InputError
+from dubins_traffic.files import read_text, replace_file
+from dubins_traffic.problem.files import parse_json
+
+FORMAT = 0
+NAME = "manifest.json"
+CAMPAIGN = "campaign.json"
+LIBRARIES = ("mcap", "numba", "numpy", "pyarrow")
+
+
+def make(campaign: Campaign, records: str) -> dict[str, Any]:
+    """Return the manifest of a campaign that begins now.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        What is to be run.
+    records : str
+        Which records are kept, as on the command line.
+    """
+    places = zip(campaign.controllers, campaign.places, strict=True)
+    return {
+        "format": FORMAT,
+        "name": campaign.model.name,
+        "trials": campaign.total,
+        "records": records,
+        "campaign": _hash(campaign.document),
+        "configurations": {
+            entry["name"]: _hash(entry["document"]) for entry in campaign.document["configurations"]
+        },
+        "controllers": [
+            {"name": name, "place": place, "file": _hash_of_file(place)} for name, place in places
+        ],
+        "versions": {
+            "dubins-traffic": version("dubins-traffic"),
+            "python": platform.python_version(),
+            **{name: version(name) for name in LIBRARIES},
+        },
+        "code": _hash_of_code(),
+    }
+
+
+def write(folder: Path, campaign: Campaign, manifest: Mapping[str, Any]) -> None:
+    """Write the campaign and then its manifest, which makes the folder that of a campaign."""
+    for name, document in ((CAMPAIGN, campaign.document), (NAME, manifest)):
+        text = json.dumps(document, indent=1) + "\n"
+        replace_file(folder / name, _writer(text.encode()), durable=True)
+
+
+def read(folder: Path) -> dict[str, Any] | None:
+    """Return the manifest in `folder`; None if there is none.
+
+    Raises
+    ------
+    InputError
+        If it can't be read or is of another format.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        return None
+    manifest = parse_json(read_text(path), str(path))
+    if manifest.get("format") != FORMAT:
+        raise InputError(
+            "unknown format",
+            file=str(path),
+            field="format",
+            value=manifest.get("format"),
+            expected=str(FORMAT),
+        )
+    return manifest
+
+
+def stored_document(folder: Path) -> dict[str, Any]:
+    """Return what was run in `folder`: the campaign file with its configurations written in."""
+    path = folder / CAMPAIGN
+    return parse_json(read_text(path), str(path))
+
+
+def stored_campaign(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
+    """Return the campaign of `folder`, checked anew."""
+    places = tuple(entry["place"] for entry in manifest["controllers"])
+    return Campaign.from_document(stored_document(folder), str(folder / CAMPAIGN), places=places)
+
+
+def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[str, Any]:
+    """Return the manifest of `folder` if `campaign` is what it was begun with.
+
+    Parameters
+    ----------
+    folder : Path
+        A campaign's folder, with a manifest.
+    campaign : Campaign
+        What is to be resumed.
+    records : str or None
+        Which records are kept; None: as before.
+
+    Raises
+    ------
+    InputError
+        If a field of the file or of a configuration, a controller's file, the choice of records or the version of
+        this package is another; names it.
+    """
+    manifest = read(folder) or {}
+    found = _difference(stored_document(folder), campaign.document, "")
+    if found is not None:
+        raise _changed(campaign.file, found[0], found[2], found[1])
+    now = make(campaign, records or manifest["records"])
+    for k, (before, after) in enumerate(zip(manifest["controllers"], now["controllers"], strict=True)):
+        if before["file"] != after["file"]:
+            name = f"controllers[{k}] ({after['place']})"
+            raise _changed(campaign.file, name, after["file"] or "no file", before["file"] or "no file")
+    if now["records"] != manifest["records"]:
+        raise _changed("--records", None, now["records"], manifest["records"])
+    ours = "dubins-traffic"
+    if now["versions"][ours] != manifest["versions"][ours]:
+        raise _changed(
+            str(folder / NAME), f"versions.{ours}", now["versions"][ours], manifest["versions"][ours]
+        )
+    return manifest
+
+
+_ABSENT = "nothing"
+
+
+def _changed(file: str | None, field: str | None, now: object, before: object) -> InputError:
+    expected = f"{json.dumps(before)[:80]}, or a new folder"
+    return InputError(
+        "changed since the campaign began", file=file, field=field, value=now, expected=expected
+    )
+
+
+def _difference(before: Any, now: Any, path: str) -> tuple[str, Any, Any] | None:
+    """Return the path of the first field in which two documents differ, with both values."""
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        old, new = cast("Mapping[str, Any]", before), cast("Mapping[str, Any]", now)
+        for key in dict.fromkeys([*old, *new]):
+            below = f"{path}.{key}" if path else key
+            found = _difference(old.get(key, _ABSENT), new.get(key, _ABSENT), below)
+            if found is not None:
+                return found
+        if list(old) != list(new) and path in ("factors", "fields"):
+            return path, list(old), list(new)
+        return None
+    if isinstance(before, list) and isinstance(now, list):
+        first, second = cast("Sequence[Any]", before), cast("Sequence[Any]", now)
+        if len(first) == len(second):
+            pairs = enumerate(zip(first, second, strict=True))
+            found = (_difference(one, other, f"{path}[{k}]") for k, (one, other) in pairs)
+            return next((each for each in found if each is not None), None)
+    same = type(before) is type(now) and before == now  # pyright: ignore[reportUnknownArgumentType]
+    return None if same else (path, before, now)  # pyright: ignore[reportUnknownVariableType]
+
+
+def _hash(document: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+def _hash_of_file(place: str) -> str | None:
+    """Return the hash of a controller's file, None if it is given by name."""
+    path = Path(place.rpartition(":")[0])
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.suffix == ".py" and path.is_file() else None
+
+
+def _hash_of_code() -> str:
+    """Return one hash over the sources of this package."""
+    root = Path(str(resources.files("dubins_traffic")))
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _writer(data: bytes) -> Callable[[Path], object]:
+    return lambda path: path.write_bytes(data)

@@ -1,0 +1,201 @@
+"""What a report says: the controllers of a campaign compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.campaign import rows, table
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.report.metrics import FAULTS, METRICS, WALL_METRICS, Metric
+from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
+
+CONFIGURATION = "configuration"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What is said of one controller.
+
+    `estimates` holds a row a metric, by column; `verdicts` the share of each verdict in the judged trials, `ends` that
+    of each end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each
+    part of the assumption; `faults` counts collisions by who was at fault.
+    """
+
+    controller: str
+    trials: int
+    judged: int
+    estimates: Mapping[str, Estimate]
+    verdicts: Mapping[str, Share]
+    ends: Mapping[str, Share]
+    broken: Mapping[str, Share]
+    fallen: Mapping[str, Share]
+    collisions: int
+    faults: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """How much `first` exceeds `second` in a metric, trial by trial on the same instances.
+
+    `larger` and `smaller` count the pairs in which the first has more, or less.
+    """
+
+    first: str
+    second: str
+    metric: Metric
+    estimate: Estimate
+    larger: int
+    smaller: int
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """The estimate of a metric for one controller where a factor has a value."""
+
+    factor: str
+    value: str
+    controller: str
+    metric: Metric
+    estimate: Estimate
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A campaign compared: `trials` of `total` have rows, `metrics` are those of which there are values."""
+
+    campaign: Campaign
+    trials: int
+    total: int
+    metrics: Sequence[Metric]
+    standings: Sequence[Standing]
+    differences: Sequence[Difference]
+    levels: Sequence[Level]
+    factors: Mapping[str, Sequence[str]]
+
+
+def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
+    """Compare the controllers of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        What was run.
+    results : pyarrow.Table
+        Its table, or the rows that there are.
+    wall : pyarrow.Table, optional
+        The wall-clock figures of the same trials.
+    """
+    values = {metric.column: _floats(results[metric.column]) for metric in METRICS}
+    if wall is not None:
+        values |= {metric.column: _floats(wall[metric.column]) for metric in WALL_METRICS}
+    known = [
+        metric
+        for metric in (*METRICS, *WALL_METRICS)
+        if metric.column in values and not np.isnan(values[metric.column]).all()
+    ]
+    names: Any = np.array(results["controller"].to_pylist(), dtype=object)
+    chosen = {name: names == name for name in campaign.controllers}
+    factors = _factors(campaign)
+    return Comparison(
+        campaign,
+        len(results),
+        campaign.total,
+        known,
+        [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
+        list(_differences(campaign, results, chosen, known, values)),
+        list(_levels(results, factors, chosen, known, values)),
+        factors,
+    )
+
+
+def _factors(campaign: Campaign) -> dict[str, list[str]]:
+    """Return what varied, with its values as texts, in their order; the configuration is one of them."""
+    found = {CONFIGURATION: list(dict.fromkeys(cell.configuration for cell in campaign.cells))}
+    for name in campaign.factors:
+        found[name] = list(dict.fromkeys(table.told(cell.values[name]) for cell in campaign.cells))
+    varied = {name: values for name, values in found.items() if len(values) > 1}
+    return varied or {CONFIGURATION: found[CONFIGURATION]}
+
+
+def _standing(
+    controller: str, own: Any, metrics: Sequence[Metric], values: Mapping[str, Floats], chosen: Any
+) -> Standing:
+    ends: list[str] = own["end"].to_pylist()
+    verdicts: list[str | None] = own["verdict"].to_pylist()
+    judged = sum(verdict is not None for verdict in verdicts)
+    seen = [verdict.value for verdict in Ruling]
+
+    def happened(column: str) -> Share:
+        return share(int((_floats(own[column]) > 0).sum()), judged)
+
+    return Standing(
+        controller,
+        len(own),
+        judged,
+        {metric.column: estimate(values[metric.column][chosen]) for metric in metrics},
+        {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
+        {end: share(ends.count(end), len(ends)) for end in sorted(set(ends))},
+        {rule: happened(f"breaches.{rule}") for rule in EGO_RULES} if judged else {},
+        {part: happened(f"breaches_of_others.{part}") for part in ASSUMPTIONS} if judged else {},
+        int(np.nansum(_floats(own["collisions"]))),
+        {who: int(np.nansum(_floats(own[column]))) for column, who in FAULTS.items()},
+    )
+
+
+def _differences(
+    campaign: Campaign,
+    results: Any,
+    chosen: Mapping[str, Any],
+    metrics: Sequence[Metric],
+    values: Mapping[str, Floats],
+) -> Iterator[Difference]:
+    """Return the paired differences of all pairs of controllers in all metrics."""
+    cells, _, trials = table.places(campaign, results["number"].to_numpy())
+    pair = np.array([cell.first for cell in campaign.cells])[cells] + trials
+    for first, second in combinations(campaign.controllers, 2):
+        one, other = np.flatnonzero(chosen[first]), np.flatnonzero(chosen[second])
+        _, left, right = np.intersect1d(pair[one], pair[other], return_indices=True)
+        for metric in metrics:
+            column = values[metric.column]
+            differences = column[one[left]] - column[other[right]]
+            larger, smaller = int((differences > 0).sum()), int((differences < 0).sum())
+            yield Difference(first, second, metric, estimate(differences), larger, smaller)
+
+
+def _levels(
+    results: Any,
+    factors: Mapping[str, Sequence[str]],
+    chosen: Mapping[str, Any],
+    metrics: Sequence[Metric],
+    values: Mapping[str, Floats],
+) -> Iterator[Level]:
+    for factor, levels in factors.items():
+        name = factor if factor == CONFIGURATION else table.FACTOR + factor
+        told: Any = np.array([table.told(value) for value in results[name].to_pylist()], dtype=object)
+        for level in levels:
+            here = told == level
+            for controller, own in chosen.items():
+                for metric in metrics:
+                    found = estimate(values[metric.column][here & own], median=False)
+                    yield Level(factor, level, controller, metric, found)
+
+
+def _floats(column: Any) -> Floats:
+    """Return a column of numbers or switches as floats, NaN where it has none."""
+    made = rows.arrow()
+    return (
+        column.cast(made.float64() if column.type != made.bool_() else made.int8())
+        .cast(made.float64())
+        .to_numpy(zero_copy_only=False)
+    )
+
+
+def _mask(own: Any) -> Any:
+    return rows.arrow().array(own)

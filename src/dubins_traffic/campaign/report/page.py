@@ -1,0 +1,289 @@
+"""The page of a report: self-contained HTML, but for the replays beside it that it links to."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+from dubins_traffic.campaign.report import plots
+from dubins_traffic.campaign.report.comparison import Comparison, Difference, Standing
+from dubins_traffic.campaign.report.metrics import Metric, shown, words
+from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
+from dubins_traffic.campaign.report.worst import Bad
+
+MINUS = "\N{MINUS SIGN}"
+HOW = (
+    "Every controller is run on the same instances. Brackets hold 95 % intervals: of means and medians percentiles of "
+    "1,000 bootstrap resamples (of more than 2,000 values the normal interval, and order statistics), of shares "
+    "those of Wilson. A difference is taken trial by trial and set in bold where its interval leaves out 0. Trials "
+    "that came to nothing count among the ends, and in no metric."
+)
+
+
+def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str, Sequence[Bad]]) -> str:
+    """Return the page; equal arguments give equal text.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What it says.
+    manifest : Mapping
+        The manifest of the campaign: versions and hashes.
+    worst : Mapping
+        The worst trials of each controller.
+    """
+    style = _style(comparison)
+    name = comparison.campaign.model.name
+    sections = [
+        _section("Verdicts and collisions", _overview(comparison)),
+        _section("Metrics", _metrics(comparison)),
+        _section("Differences, pair by pair", _differences(comparison)) if comparison.differences else "",
+        *(_section(f"Against {words(factor)}", _plots(comparison, factor)) for factor in comparison.factors),
+        _section("Worst trials", _worst(worst)) if any(worst.values()) else "",
+        _section("Rules and ends", _shares(comparison)),
+        _section("How it was made", _made(manifest)),
+    ]
+    policy = f"default-src 'none'; img-src data:; style-src '{_hash(style)}'"
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{_text(name)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
+        f"{_head(comparison)}\n<main>\n{''.join(sections)}</main>\n</body>\n</html>\n"
+    )
+
+
+def _head(comparison: Comparison) -> str:
+    campaign = comparison.campaign
+    cells = len(campaign.cells)
+    facts = [
+        f"{_count(comparison.trials)} trials",
+        f"{len(campaign.controllers)} controllers",
+        f"{cells} combination{'s' if cells > 1 else ''} of configuration and factors",
+        f"seed {campaign.model.seed}",
+    ]
+    missing = comparison.total - comparison.trials
+    warning = (
+        f'<p class="warning">Unfinished: {_count(missing)} of {_count(comparison.total)} trials have not been run.</p>'
+        if missing
+        else ""
+    )
+    key = "".join(
+        f'<li><span class="dot c{k}"></span>{_text(name)}</li>' for k, name in enumerate(campaign.controllers)
+    )
+    return (
+        f"<header><h1>{_text(campaign.model.name)}</h1><p>{' · '.join(facts)}</p>{warning}"
+        f'<ul class="key">{key}</ul></header>'
+    )
+
+
+def _overview(comparison: Comparison) -> str:
+    figures = ""
+    if any(standing.verdicts for standing in comparison.standings):
+        figures += _image(plots.verdicts(comparison), "Shares of the verdicts")
+    figures += _image(plots.faults(comparison), "Collisions by fault")
+    judged = [
+        [
+            _name(standing, k),
+            _count(standing.judged),
+            *(_share(standing.verdicts.get(verdict)) for verdict in plots.VERDICTS),
+        ]
+        for k, standing in enumerate(comparison.standings)
+    ]
+    collided = [
+        [
+            _name(standing, k),
+            _count(standing.trials),
+            _count(standing.collisions),
+            *(_count(standing.faults[who]) for who in plots.FAULTS),
+        ]
+        for k, standing in enumerate(comparison.standings)
+    ]
+    at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
+    return (
+        f'<div class="figures wide">{figures}</div>'
+        f"{_table(['controller', 'judged', *plots.VERDICTS], judged)}{_table(at_fault, collided)}"
+    )
+
+
+def _metrics(comparison: Comparison) -> str:
+    many = len(comparison.standings)
+    head = ["metric", "", "mean", "95 %", "median", "95 %", "trials"]
+    body: list[list[str]] = []
+    for metric in comparison.metrics:
+        for k, standing in enumerate(comparison.standings):
+            estimate = standing.estimates[metric.column]
+            first = f'<th rowspan="{many}" scope="rowgroup">{_heading(metric)}</th>' if k == 0 else ""
+            body.append([first, _name(standing, k), *_estimate(estimate), _count(estimate.count)])
+    return _table(head, body, "grouped") + f"<p>{HOW}</p>"
+
+
+def _differences(comparison: Comparison) -> str:
+    found: list[str] = []
+    pairs = dict.fromkeys((one.first, one.second) for one in comparison.differences)
+    for first, second in pairs:
+        own = [one for one in comparison.differences if (one.first, one.second) == (first, second)]
+        head = ["metric", "mean", "95 %", "median", "95 %", "more", "less", "equal", "better"]
+        body = [[f"<th>{_heading(one.metric)}</th>", *_difference(one)] for one in own]
+        found.append(f"<h3>{_text(first)} minus {_text(second)}</h3>{_table(head, body)}")
+    return "".join(found)
+
+
+def _difference(one: Difference) -> list[str]:
+    estimate = one.estimate
+    interval = estimate.mean_interval
+    decided = interval is not None and (interval[0] > 0 or interval[1] < 0)
+    cells = _estimate(estimate, signed=True)
+    better = ""
+    if decided and estimate.mean is not None:
+        cells[:2] = [f"<b>{cell}</b>" for cell in cells[:2]]
+        if one.metric.better:
+            better = _text(one.first if (estimate.mean > 0) == (one.metric.better > 0) else one.second)
+    equal = estimate.count - one.larger - one.smaller
+    return [*cells, _count(one.larger), _count(one.smaller), _count(equal), better]
+
+
+def _plots(comparison: Comparison, factor: str) -> str:
+    images = (
+        _image(plots.against(comparison, factor, metric), f"{metric.heading} against {words(factor)}")
+        for metric in comparison.metrics
+    )
+    return f'<div class="figures">{"".join(images)}</div>'
+
+
+def _worst(worst: Mapping[str, Sequence[Bad]]) -> str:
+    head = ["controller", "trial", "configuration", "factors", "why", "replay"]
+    body: list[list[str]] = []
+    for k, (name, trials) in enumerate(worst.items()):
+        for bad in trials:
+            row = bad.row
+            factors = ", ".join(
+                f"{words(key.removeprefix('factor.'))} {value}"
+                for key, value in row.items()
+                if key.startswith("factor.")
+            )
+            link = f'<a href="{bad.replay}">replay</a>' if bad.replay else ""
+            note = f' <span class="note">{_text(bad.note)}</span>' if bad.note else ""
+            cells = [f"{row['number']}", row["configuration"], factors, bad.why]
+            body.append(
+                [f'<th><span class="dot c{k}"></span>{_text(name)}</th>', *map(_text, cells), link + note]
+            )
+    return _table(head, body, "texts")
+
+
+def _shares(comparison: Comparison) -> str:
+    parts: list[str] = []
+    standings = comparison.standings
+    wanted: Mapping[str, list[Mapping[str, Share]]] = {
+        "Trials in which the ego broke a rule": [standing.broken for standing in standings],
+        "Trials in which others broke the assumption": [standing.fallen for standing in standings],
+        "Ends of all trials": [standing.ends for standing in standings],
+    }
+    for title, groups in wanted.items():
+        names = list(dict.fromkeys(name for group in groups for name in group))
+        if not names:
+            continue
+        body = [
+            [_name(standing, k), *(_share(group.get(name)) for name in names)]
+            for k, (standing, group) in enumerate(zip(standings, groups, strict=True))
+        ]
+        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}")
+    return "".join(parts)
+
+
+def _made(manifest: Mapping[str, Any]) -> str:
+    facts = {
+        **manifest["versions"],
+        "campaign file": manifest["campaign"],
+        **{f"configuration {name}": digest for name, digest in manifest["configurations"].items()},
+        **{f"controller {one['name']}": one["file"] for one in manifest["controllers"] if one["file"]},
+        "code": manifest["code"],
+    }
+    body = [[f"<th>{_text(name)}</th>", f"<code>{_text(value)}</code>"] for name, value in facts.items()]
+    return _table(["what", "version or SHA-256"], body, "texts")
+
+
+def _section(title: str, body: str) -> str:
+    return f"<section><h2>{_text(title)}</h2>\n{body}</section>\n"
+
+
+def _table(head: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -> str:
+    """Return a table; cells that begin with <th are whole elements, an empty first cell is spanned from above."""
+    heading = "".join(f"<th>{_text(cell)}</th>" for cell in head)
+    rows: list[str] = []
+    for cells in body:
+        spanned = kind == "grouped" and not cells[0]
+        rows.append(
+            "".join(cell if cell.startswith("<th") else f"<td>{cell}</td>" for cell in cells[spanned:])
+        )
+    lines = "\n".join(f"<tr>{row}</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{heading}</tr></thead>\n'
+        f"<tbody>\n{lines}\n</tbody></table></div>"
+    )
+
+
+def _image(svg: str, alt: str) -> str:
+    data = base64.b64encode(svg.encode()).decode()
+    return f'<img alt="{_text(alt)}" src="data:image/svg+xml;base64,{data}">'
+
+
+def _name(standing: Standing, index: int) -> str:
+    return f'<th class="name"><span class="dot c{index}"></span>{_text(standing.controller)}</th>'
+
+
+def _heading(metric: Metric) -> str:
+    unit = f' <span class="unit">{_text(metric.unit)}</span>' if metric.unit else ""
+    arrow = {1: "↑", -1: "↓", 0: ""}[metric.better]
+    title = {1: "more is better", -1: "less is better", 0: ""}[metric.better]
+    mark = f' <span class="better" title="{title}">{arrow}</span>' if arrow else ""
+    return f"{_text(metric.name)}{unit}{mark}"
+
+
+def _estimate(estimate: Estimate, *, signed: bool = False) -> list[str]:
+    return [
+        _number(estimate.mean, signed),
+        _interval(estimate.mean_interval),
+        _number(estimate.median, signed),
+        _interval(estimate.median_interval),
+    ]
+
+
+def _number(value: float | None, signed: bool = False) -> str:
+    return (
+        f"+{shown(value)}" if signed and value is not None and value > 0 else shown(value).replace("-", MINUS)
+    )
+
+
+def _interval(interval: Interval | None) -> str:
+    return "" if interval is None else f"[{_number(interval[0])}, {_number(interval[1])}]"
+
+
+def _share(share: Share | None) -> str:
+    if share is None or share.share is None or share.interval is None:
+        return shown(None)
+    low, high = share.interval
+    return f'{share.share:.1%} <span class="unit">[{low:.1%}, {high:.1%}]</span>'
+
+
+def _count(value: int) -> str:
+    return f"{value:,}"
+
+
+def _text(text: str) -> str:
+    return html.escape(str(text))
+
+
+def _style(comparison: Comparison) -> str:
+    own = resources.files("dubins_traffic.campaign.report") / "report.css"
+    dots = (f".c{k} {{ background: {plots.colour(k)} }}" for k in range(len(comparison.campaign.controllers)))
+    return "\n".join([own.read_text(encoding="utf-8").strip(), *dots])
+
+
+def _hash(text: str) -> str:
+    """Return the source expression of `text` for a Content-Security-Policy."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"

@@ -1,0 +1,186 @@
+"""The plots of a report, SVG: metrics against factors, shares of verdicts, collisions by fault."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+from dubins_traffic.campaign.report.comparison import Comparison, Level
+from dubins_traffic.campaign.report.metrics import Metric, words
+from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.viewer import palette
+from dubins_traffic.viewer.plot import METADATA, STYLE
+
+SIZE = (3.5, 2.5)
+DODGE = 0.16
+"""Distance of the controllers beside one another, in distances of two values of a factor."""
+MARKERS = "osD^vP*X"
+VERDICTS: Mapping[str, str] = {
+    "satisfied": palette.GOAL_COLOUR,
+    "unfinished": "#56B4E9",
+    "excused": "#E69F00",
+    "violated": palette.CONTACT_COLOUR,
+}
+FAULTS: Mapping[str, str] = {
+    "the ego": palette.CONTACT_COLOUR,
+    "both": "#882255",
+    "the other": "#56B4E9",
+}
+_STYLE: Mapping[str, Any] = {
+    **STYLE,
+    "svg.fonttype": "none",
+    "font.size": 9.0,
+    "axes.edgecolor": palette.FAINT_COLOUR,
+    "axes.labelcolor": palette.INK_COLOUR,
+    "text.color": palette.INK_COLOUR,
+    "xtick.color": palette.FAINT_COLOUR,
+    "ytick.color": palette.FAINT_COLOUR,
+    "xtick.labelcolor": palette.INK_COLOUR,
+    "ytick.labelcolor": palette.INK_COLOUR,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+}
+
+
+def against(comparison: Comparison, factor: str, metric: Metric) -> str:
+    """Return the plot of a metric's mean against a factor, with 95 % intervals, a line a controller: SVG."""
+    levels = [level for level in comparison.levels if level.factor == factor and level.metric is metric]
+    values = list(comparison.factors[factor])
+    places = _places(values)
+    step = min((b - a for a, b in pairwise(places)), default=1.0)
+
+    def draw(axes: Any) -> None:
+        controllers = comparison.campaign.controllers
+        for k, controller in enumerate(controllers):
+            own = [level for level in levels if level.controller == controller]
+            shift = DODGE * step * (k - 0.5 * (len(controllers) - 1))
+            _line(axes, [place + shift for place in places], own, k)
+        axes.set_xticks(places, values)
+        axes.set_xlim(places[0] - 0.5 * step, places[-1] + 0.5 * step)
+        if max(len(value) for value in values) * len(values) > 36:
+            axes.tick_params(axis="x", labelrotation=20.0)
+        axes.set_xlabel(words(factor))
+        _show_zero(axes, levels)
+        axes.set_title(metric.heading, loc="left", fontsize=9.5, fontweight="bold")
+        axes.grid(axis="y", color="#E4E6EA", linewidth=0.8)
+        axes.set_axisbelow(True)
+
+    return _svg(draw, SIZE)
+
+
+def verdicts(comparison: Comparison) -> str:
+    """Return the shares of the verdicts as bars: SVG."""
+    rows = {
+        standing.controller: {name: standing.verdicts[name].share or 0.0 for name in VERDICTS}
+        for standing in comparison.standings
+        if standing.verdicts
+    }
+    return _bars(rows, VERDICTS, "share of the judged trials", percent=True)
+
+
+def faults(comparison: Comparison) -> str:
+    """Return the collisions per 100 trials by fault as bars: SVG."""
+    rows = {
+        standing.controller: {
+            name: 100.0 * standing.faults[name] / max(1, standing.trials) for name in FAULTS
+        }
+        for standing in comparison.standings
+    }
+    return _bars(rows, FAULTS, "collisions of the ego in 100 trials", percent=False)
+
+
+def colour(index: int) -> str:
+    """Return the colour of the controller of a number."""
+    return palette.car_colour(index)
+
+
+def _places(values: Sequence[str]) -> list[float]:
+    """Return where the values of a factor stand on their axis: numbers where they are, if they are not too uneven."""
+    try:
+        numbers = [float(value) for value in values]
+    except ValueError:
+        return [float(k) for k in range(len(values))]
+    gaps = [b - a for a, b in pairwise(numbers)]
+    even = bool(gaps) and min(gaps) > 0.1 * (numbers[-1] - numbers[0])
+    return numbers if even else [float(k) for k in range(len(values))]
+
+
+def _line(axes: Any, places: Sequence[float], levels: Sequence[Level], index: int) -> None:
+    points = [
+        (place, level.estimate.mean, level.estimate.mean_interval)
+        for place, level in zip(places, levels, strict=True)
+        if level.estimate.mean is not None and level.estimate.mean_interval is not None
+    ]
+    if not points:
+        return
+    x = [place for place, _, _ in points]
+    y = [mean for _, mean, _ in points]
+    low = [max(0.0, mean - interval[0]) for _, mean, interval in points]
+    high = [max(0.0, interval[1] - mean) for _, mean, interval in points]
+    axes.errorbar(
+        x,
+        y,
+        yerr=[low, high],
+        color=colour(index),
+        marker=MARKERS[index % len(MARKERS)],
+        markersize=4.5,
+        linewidth=1.4,
+        elinewidth=1.2,
+        capsize=2.5,
+    )
+
+
+def _show_zero(axes: Any, levels: Sequence[Level]) -> None:
+    """Give a metric that is the same everywhere an axis that shows how large it is."""
+    means = {level.estimate.mean for level in levels}
+    if len(means) == 1 and None not in means:
+        value = float(means.pop() or 0.0)
+        axes.set_ylim(min(0.0, 1.1 * value), max(1.0 if value == 0.0 else 0.0, 1.1 * value))
+
+
+def _bars(
+    rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, str], label: str, *, percent: bool
+) -> str:
+    names = list(rows)
+
+    def draw(axes: Any) -> None:
+        left = [0.0] * len(names)
+        for part, fill in colours.items():
+            widths = [rows[name][part] for name in names]
+            axes.barh(names, widths, left=left, color=fill, height=0.6, label=part)
+            for k, width in enumerate(widths):
+                if percent and width > 0.08:
+                    axes.text(
+                        left[k] + 0.5 * width, k, f"{width:.0%}", ha="center", va="center", color="white"
+                    )
+            left = [start + width for start, width in zip(left, widths, strict=True)]
+        axes.invert_yaxis()
+        axes.set_xlabel(label)
+        if percent:
+            axes.set_xlim(0.0, 1.0)
+            axes.xaxis.set_major_formatter(import_module("matplotlib.ticker").PercentFormatter(1.0))
+        else:
+            axes.set_xlim(0.0, max(1.0, *(1.05 * value for value in left)))
+        axes.legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(colours), frameon=False, handlelength=1.0
+        )
+
+    return _svg(draw, (5.6, 0.95 + 0.38 * len(names)))
+
+
+def _svg(draw: Any, size: tuple[float, float]) -> str:
+    try:
+        matplotlib: Any = import_module("matplotlib")
+        made: Any = import_module("matplotlib.figure")
+    except ImportError as error:
+        raise MissingExtraError("a report", "campaign") from error
+    with matplotlib.rc_context(dict(_STYLE)):
+        figure = made.Figure(figsize=size, layout="constrained")
+        draw(figure.add_subplot())
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata=METADATA[".svg"], transparent=True)
+    return stream.getvalue()

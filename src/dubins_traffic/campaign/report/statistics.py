@@ -1,0 +1,117 @@
+"""The statistics of a report: means and medians with bootstrap intervals, paired differences, shares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.kernels.arrays import Floats
+
+LEVEL = 0.95
+RESAMPLES = 1_000
+SEED = 2016
+MOST = 2_000
+"""Of more values than these the interval follows from the normal and the binomial distribution."""
+_BATCH_VALUES = 4_000_000
+
+Interval: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Mean and median of `count` values, each with its 95 % interval; None where there are no values."""
+
+    count: int
+    mean: float | None
+    mean_interval: Interval | None
+    median: float | None
+    median_interval: Interval | None
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """How many of `total` trials, as a share with its 95 % interval (Wilson's)."""
+
+    count: int
+    total: int
+    share: float | None
+    interval: Interval | None
+
+
+def estimate(values: Floats, *, median: bool = True) -> Estimate:
+    """Return the estimates for values, NaN among them left out; without `median` of the mean alone.
+
+    The intervals are percentiles of 1,000 bootstrap resamples from a fixed seed (B. Efron, Annals of Statistics 7,
+    1979); beyond `MOST` values that of the mean is its normal one, and the median lies between order statistics.
+    """
+    known = values[~np.isnan(values)]
+    count = len(known)
+    if count == 0:
+        return Estimate(0, None, None, None, None)
+    mean = math.fsum(known.tolist()) / count
+    if count == 1 or float(known.min()) == float(known.max()):
+        about = (mean, mean)
+    else:
+        about = _normal(known, mean) if count > MOST else _bootstrap(known, np.mean)
+    if not median:
+        return Estimate(count, mean, about, None, None)
+    middle = float(np.median(known))
+    between = _ranks(known) if count > MOST else _bootstrap(known, np.median)
+    return Estimate(count, mean, about, middle, between)
+
+
+def share(count: int, total: int) -> Share:
+    """Return a share of trials."""
+    if not total:
+        return Share(count, total, None, None)
+    found: Any = stats().binomtest(count, total).proportion_ci(LEVEL, method="wilson")
+    return Share(count, total, count / total, (float(found.low), float(found.high)))
+
+
+def stats() -> Any:
+    """Return scipy.stats.
+
+    Raises
+    ------
+    MissingExtraError
+        Without the extra `campaign`.
+    """
+    try:
+        return import_module("scipy.stats")
+    except ImportError as error:
+        raise MissingExtraError("a report", "campaign") from error
+
+
+def _bootstrap(values: Floats, statistic: Callable[..., Any]) -> Interval:
+    if len(values) == 1:
+        return float(values[0]), float(values[0])
+    found: Any = stats().bootstrap(
+        (values,),
+        statistic,
+        n_resamples=RESAMPLES,
+        batch=max(1, _BATCH_VALUES // len(values)),
+        vectorized=True,
+        confidence_level=LEVEL,
+        method="percentile",
+        random_state=np.random.default_rng(SEED),
+    )
+    low, high = found.confidence_interval
+    return float(low), float(high)
+
+
+def _normal(values: Floats, mean: float) -> Interval:
+    half = float(stats().norm.ppf(0.5 + 0.5 * LEVEL)) * float(values.std(ddof=1)) / math.sqrt(len(values))
+    return mean - half, mean + half
+
+
+def _ranks(values: Floats) -> Interval:
+    """Return the order statistics between which the median lies: their ranks are quantiles of a binomial."""
+    ordered = np.sort(values)
+    ranks: Any = stats().binom.ppf([0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], len(values), 0.5)
+    return float(ordered[int(ranks[0])]), float(ordered[int(ranks[1])])

@@ -1,0 +1,160 @@
+"""Sessions over a transport, from what a user names: a configuration, an instance or a record."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from dubins_traffic.campaign.plan import check_data_file, check_folder
+from dubins_traffic.campaign.remote import Session, hand_over, run_remote
+from dubins_traffic.campaign.single import Result, run_trial
+from dubins_traffic.campaign.sources import load
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.scripted import Scripted
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.maestro import Maestro
+
+REHEARSAL = 1.2
+"""Seconds: more than a block of frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """What a session runs: where its instances come from, how many trials, and where things are written.
+
+    `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere.
+    """
+
+    supply: Callable[[int], Instance]
+    trials: int | None
+    configuration: Configuration | None
+    controller: str | None
+    remote: tuple[str, ...]
+    records: Path | None
+    data: Path | None
+    began: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+    def run(self, link: Link, maestro: Maestro | None) -> Iterator[Result]:
+        """Run it over `link`; see `remote.run_remote`."""
+        return run_remote(
+            Session(
+                link,
+                self.supply,
+                self.trials,
+                maestro,
+                self.controller or "",
+                self.remote,
+                self.records,
+            )
+        )
+
+    def conclude(self, results: Sequence[Result]) -> ScoreSheet:
+        """Return the scores, and write the trial data file if one was asked for."""
+        if results and self.data is not None and self.configuration is not None:
+            instances = [result.instance for result in results]
+            TrialData.build(self.configuration, instances, self.began).write(self.data)
+        return ScoreSheet(tuple(result.score for result in results))
+
+
+def programme(
+    source: str | os.PathLike[str],
+    controller: str | None = None,
+    *,
+    trials: int | None = None,
+    endless: bool = False,
+    seed: int | None = None,
+    rnd: str | os.PathLike[str] | None = None,
+    remote: Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+    overwrite_data: bool = False,
+    records: str | os.PathLike[str] | None = None,
+) -> Programme:
+    """Return what a session shall run, checked as far as can be before anything is opened.
+
+    Parameters
+    ----------
+    source : path or str
+        A trials configuration (file or shipped name), an instance or a record.
+    controller : str, optional
+        Drives the ego in this process; by default it is driven elsewhere.
+    trials : int, optional
+        How many trials of a configuration; by default as many as it says.
+    endless : bool
+        Whether trials follow each other until the session is interrupted.
+    seed : int, optional
+        Of a configuration, or of an instance that has none; 0 by default.
+    rnd : path, optional
+        A road network instead of the configuration's.
+    remote : sequence of str
+        Names of e-agents that are driven elsewhere whatever their type says.
+    data : path, optional
+        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+    records : path, optional
+        Folder for the records, made if missing.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong; then nothing has been written.
+    """
+    found = load(source, rnd=rnd, seed=seed or 0)
+    if isinstance(found, RoadNetwork):
+        expected = "a trials configuration, a problem instance or a record"
+        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    if controller is not None:
+        controllers.load(controller)
+    if trials is not None and (trials < 1 or endless):
+        raise InputError(
+            "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
+        )
+    supply = _supply(found, seed or 0)
+    hand_over(supply(0), remote)
+    configuration = found if isinstance(found, Configuration) else None
+    if data is not None and configuration is None:
+        raise InputError(
+            "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
+        )
+    count = trials or (1 if configuration is None else configuration.number_trials)
+    return Programme(
+        supply,
+        None if endless else count,
+        configuration,
+        controller,
+        tuple(remote),
+        None if records is None else check_folder(Path(records)),
+        None if data is None else check_data_file(Path(data), overwrite_data),
+    )
+
+
+def rehearse(instance: Instance) -> None:
+    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts."""
+    agents = tuple(
+        replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
+        if agent.kind == REMOTE
+        else agent
+        for agent in instance.e_agents
+    )
+    brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
+    run_trial(brief, Scripted(np.zeros((brief.ticks, 2))))
+
+
+def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
+    if isinstance(found, Configuration):
+        configuration = found
+        return lambda number: draw(configuration, seed, number)
+    instance = found.instance if isinstance(found, Record) else found
+    return lambda _number: instance

@@ -1,0 +1,134 @@
+"""`dubins-traffic campaign`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import ClusterLostError
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.conduct import Ran
+
+RUN_EXAMPLES = options.examples(
+    "campaign run gaps.toml -o gaps",
+    "campaign run gaps.toml -o gaps --resume --workers 2",
+    "campaign run gaps.toml -o gaps --ray 10.0.0.1:6379 --records failures",
+)
+
+REPORT_EXAMPLES = options.examples("campaign report gaps", "campaign report gaps -o report --worst 5")
+
+campaign = typer.Typer(
+    help="Many trials from one file: controllers compared on the same instances, with error bars.",
+    no_args_is_help=True,
+)
+
+
+@campaign.command("run", epilog=RUN_EXAMPLES)
+def run(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A campaign file, TOML.", show_default=False)],
+    folder: Annotated[
+        str,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder of the campaign, made if missing.",
+            show_default=False,
+        ),
+    ],
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
+        ),
+    ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            "--ray",
+            metavar="ADDRESS",
+            help="Run on a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what has been begun in DIR.")] = False,
+    records: Annotated[
+        str | None,
+        typer.Option(
+            "--records",
+            metavar="WHICH",
+            help="Keep the records of none, all, failures or sample:N trials.",
+            show_default="none, or as before",
+        ),
+    ] = None,
+) -> None:
+    """Run a campaign, or what is left of it. Whatever ends it, finished trials are kept."""
+    from dubins_traffic.campaign.conduct import run_campaign
+    from dubins_traffic.cli.progress import progress
+
+    come = (0, 0)
+
+    def tell(done: int, total: int) -> None:
+        nonlocal come
+        come = (done, total)
+        show(done, total)
+
+    try:
+        with progress() as show:
+            ran = run_campaign(
+                file, folder, workers=workers, ray=ray, resume=resume, records=records, progress=tell
+            )
+    except (KeyboardInterrupt, ClusterLostError) as error:
+        why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+        faults.tell(f"{why}; {come[0]} of {come[1]} trials are kept, --resume goes on")
+        raise typer.Exit(faults.FAILED) from None
+    _conclude(ran)
+
+
+def _conclude(ran: Ran) -> None:
+    """Say what there is, and fail if a trial came to nothing."""
+    from dubins_traffic.campaign.table import RESULTS, faulty
+
+    before = f", {ran.before} of them before" if ran.before else ""
+    print(f"{ran.folder / RESULTS}: {ran.campaign.total} trials{before}")
+    count, first = faulty(ran.folder)
+    if count:
+        faults.tell(f"{count} of {ran.campaign.total} trials ended by a fault; the first: {first}")
+        raise typer.Exit(faults.FAILED)
+
+
+@campaign.command("report", epilog=REPORT_EXAMPLES)
+def report(
+    folder: Annotated[str, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output", "-o", metavar="FOLDER", help="Where to write it.", show_default="DIR/report"
+        ),
+    ] = None,
+    worst: Annotated[
+        int,
+        typer.Option(
+            "--worst", metavar="K", min=0, max=100, help="Replays of the K worst trials of each controller."
+        ),
+    ] = 3,
+    wall: Annotated[
+        bool, typer.Option("--wall", help="Also what was measured on a wall clock, which does not repeat.")
+    ] = False,
+) -> None:
+    """Compare the controllers of a campaign: a table here, a page with plots and replays, and CSV."""
+    from rich.console import Console
+
+    from dubins_traffic.campaign.report.terminal import tables
+    from dubins_traffic.campaign.report.write import write_report
+    from dubins_traffic.cli.progress import progress
+
+    with progress() as show:
+        written = write_report(folder, output, worst=worst, wall=wall, progress=show)
+    console = Console(highlight=False)
+    for table in tables(written.comparison):
+        console.print(table)
+        console.print()
+    options.tell(str(written.page))

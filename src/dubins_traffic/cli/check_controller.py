@@ -1,0 +1,84 @@
+"""`dubins-traffic check-controller`."""
+
+from __future__ import annotations
+
+import json as json_text
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.checkup import Checkup
+
+EXAMPLES = options.examples(
+    "check-controller lanes",
+    "check-controller my_controller.py:MyController --json",
+    "check-controller ./my_controller --over lcm",
+    'check-controller "rosrun my_package my_node" --over ros1',
+)
+
+
+class Over(StrEnum):
+    """Transports over which a program can be checked."""
+
+    ROS1 = "ros1"
+    LCM = "lcm"
+    ROS2 = "ros2"
+
+
+def check_controller(
+    controller: Annotated[
+        str,
+        typer.Argument(
+            metavar="C",
+            help="A built-in name, module:Class or path/to/file.py:Class; with --over a command line.",
+            show_default=False,
+            autocompletion=options.controllers,
+        ),
+    ],
+    over: Annotated[
+        Over | None,
+        typer.Option(
+            "--over", help="C is a program that drives over this, in lockstep.", show_default="none"
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Run a controller through a short course, twice, and say what a competition would say of it.
+
+    Does it start, survive odd instances, answer in time, send finite commands within bounds, do the same again, and
+    end cleanly?
+    """
+    from dubins_traffic.campaign.checkup import check_controller as check
+
+    found = check(controller, None if over is None else over.value)
+    if json:
+        print(json_text.dumps(found.to_json(), indent=2))
+    else:
+        _show(found)
+    if not found.passed:
+        raise typer.Exit(faults.FAILED)
+
+
+def _show(found: Checkup) -> None:
+    """Print findings and the histogram of latencies for people."""
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True)
+    for finding in found.findings:
+        mark = "ok    " if finding.passed else "FAILED"
+        console.print(f"{mark} {finding.check}: {finding.detail}", markup=False)
+    if not found.latency_s:
+        return
+    median, p99, longest = (found.latency_s[name] * 1e3 for name in ("median", "p99", "max"))
+    console.print(
+        f"\nanswers after {median:.3g} ms, 99% of them within {p99:.3g} ms, at most {longest:.3g} ms"
+    )
+    most = max(count for _, count in found.histogram)
+    for edge, count in found.histogram:
+        label = "longer" if edge is None else f"<= {edge * 1e3:.3g} ms"
+        bar = "#" * (40 * count // most)
+        console.print(f"  {label:>10} {count:6} {bar}", markup=False)

@@ -1,0 +1,72 @@
+"""`dubins-traffic lcm`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import options, session
+from dubins_traffic.errors import InputError
+
+app = typer.Typer(help="Trials over LCM, with typed messages by UDP multicast.", no_args_is_help=True)
+EXAMPLES = options.examples(
+    "lcm run demo --lockstep",
+    "lcm run my-trials.json --trials 3 --records out --url udpm://239.255.76.67:7700?ttl=0",
+    "lcm run demo --remote agent0 --controller lanes",
+)
+
+
+@app.command("run", epilog=EXAMPLES)
+def run(
+    source: session.Source,
+    url: Annotated[
+        str | None,
+        typer.Option(
+            "--url",
+            metavar="URL",
+            help="Where messages go.",
+            show_default="$LCM_DEFAULT_URL, else multicast within this machine",
+        ),
+    ] = None,
+    controller: session.Controller = None,
+    remote: session.Remote = None,
+    trials: session.Trials = None,
+    endless: session.Endless = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Begin each trial when a program asks START, not at once.")
+    ] = False,
+    lockstep: session.Lockstep = False,
+    factor: session.Factor = 1.0,
+    deadline: session.Deadline = 5.0,
+    begin: session.Begin = 60.0,
+    silence: session.Silence = 5.0,
+    seed: options.Seed = 0,
+    rnd: session.Network = None,
+    data: session.Data = None,
+    data_over: session.DataOver = None,
+    records: session.Records = None,
+    json: options.Json = False,
+) -> None:
+    """Run trials whose ego, or some of whose e-agents, are driven over LCM. Ctrl-C keeps all finished trials."""
+    from dubins_traffic.campaign.lcm import Terms, run_over_lcm
+    from dubins_traffic.campaign.sessions import programme
+    from dubins_traffic.transports.link import Patience
+
+    if data is not None and data_over is not None:
+        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
+    todo = programme(
+        source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
+        data=data or data_over, overwrite_data=data is None, records=records,
+    )  # fmt: skip
+    terms = Terms(url, wait, lockstep, factor, deadline, Patience(begin=begin, silence=silence))
+    session.conduct(todo, run_over_lcm(todo, terms), json=json)
+
+
+@app.command("messages", epilog=options.examples("lcm messages -o dubins_traffic_lcm.lcm"))
+def messages(output: options.Output = None) -> None:
+    """Print the definitions of the messages, from which lcm-gen makes code for C, C++, Java, Lua, Go, ..."""
+    from importlib.resources import files
+
+    definitions = files("dubins_traffic.transports.lcm") / "dubins_traffic_lcm.lcm"
+    options.write(definitions.read_text(encoding="utf-8"), output)

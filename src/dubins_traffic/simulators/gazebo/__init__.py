@@ -1,0 +1,1 @@
+"""Gazebo: the same trials on wheels, with inertia and contact, behind the same protocol."""

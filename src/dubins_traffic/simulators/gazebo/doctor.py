@@ -1,0 +1,83 @@
+"""Looks whether Gazebo can be used, one thing after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
+from dubins_traffic.simulators.gazebo import build, prefix
+from dubins_traffic.simulators.gazebo.link import Kind, LostError
+from dubins_traffic.simulators.gazebo.prefix import Installation
+from dubins_traffic.simulators.gazebo.server import Server
+from dubins_traffic.simulators.gazebo.vehicle import WHEEL_RADIUS
+from dubins_traffic.simulators.gazebo.world import world
+
+STEPS: Final = 200
+SPEED: Final = 0.5
+SLACK: Final = 0.01
+"""How far, metres, the car may be from where it should be after `STEPS` steps of 5 ms at `SPEED` m/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at: whether it is well, and what was seen."""
+
+    what: str
+    well: bool
+    seen: str
+
+
+def examine(folder: Path) -> Iterator[Finding]:
+    """Yield what is found about the installation in `folder`; what follows from a failure is left out."""
+    try:
+        yield Finding("compiler", True, build.compiler())
+    except InputError as error:
+        yield Finding("compiler", False, str(error))
+    try:
+        installation = prefix.find(folder)
+    except InputError as error:
+        yield Finding("installation", False, str(error))
+        return
+    manifest = prefix.read_manifest(folder) or {}
+    yield Finding("installation", True, str(folder))
+    yield Finding("gzserver", True, f"{installation.gzserver}, version {manifest.get('gazebo')}")
+    yield Finding("plugin", True, str(installation.plugin))
+    try:
+        drive_ahead(installation)
+        yield Finding("one car drives ahead", True, f"{SPEED} m/s for 1 s")
+    except InputError as error:
+        yield Finding("one car drives ahead", False, str(error))
+
+
+def drive_ahead(installation: Installation) -> None:
+    """Start a server, let one car drive for a second, and end it.
+
+    Raises
+    ------
+    InputError
+        If anything of this fails, or the car is not where it should be.
+    """
+    text = world([Pose(0.0, 0.0, 1.0, 0.0)], Disc(), (), 1.0 / STEPS, str(installation.plugin))
+    server = Server(installation, text)
+    try:
+        rate = SPEED / WHEEL_RADIUS
+        x, y = server.ask(Kind.STEP, np.array([STEPS, rate, rate]))[:2].tolist()
+    except LostError as error:
+        why = server.explain(error)
+        raise InputError(f"Gazebo does not work here ({why})", file=str(installation.gzserver)) from error
+    finally:
+        server.close()
+    if abs(x - SPEED) > SLACK or abs(y) > SLACK:
+        raise InputError(
+            "Gazebo moves a car wrongly",
+            file=str(installation.gzserver),
+            value=(x, y),
+            expected=f"({SPEED}, 0) to within {SLACK} m",
+        )

@@ -1,0 +1,74 @@
+"""Road networks as worlds of their own, to look at in Gazebo: what the program genroad made in 2016."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+from xml.etree.ElementTree import Element
+
+from dubins_traffic.files import write_text
+from dubins_traffic.simulators.gazebo.roads import roads
+from dubins_traffic.simulators.gazebo.sdf import numbers, pose, tag, text, visual
+from dubins_traffic.simulators.gazebo.world import ground
+
+if TYPE_CHECKING:
+    from dubins_traffic.roads.network import RoadNetwork
+
+GRASS: Final = (0.35, 0.45, 0.3)
+
+
+class Version(StrEnum):
+    """Versions of SDF: that of Gazebo 11 and older, and that of the Gazebos after it."""
+
+    CLASSIC = "1.6"
+    NEW = "1.9"
+
+
+def to_sdf(network: RoadNetwork, version: Version = Version.CLASSIC) -> str:
+    """Return a world with the ground, light, and a road with its marker for each segment.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+        Of which the roads are made.
+    version : Version
+        Of SDF.
+    """
+    plane = tag("geometry", tag("plane", numbers("normal", 0, 0, 1), numbers("size", 1000, 1000)))
+    grass = visual("grass", pose(0.0, 0.0, 0.0), plane, GRASS)
+    earth = ground()
+    link = earth.find("link")
+    assert link is not None
+    link.append(grass)
+    world = tag("world", numbers("gravity", 0.0, 0.0, -9.81), _sun(), earth, *roads(network), name="roads")
+    return text(tag("sdf", world, version=version.value))
+
+
+def outlook(network: RoadNetwork) -> list[Element]:
+    """Return what makes a trial worth looking at: light, roads, and a camera from which all of them are seen."""
+    low, high = network.points.min(axis=0), network.points.max(axis=0)
+    x, y = (0.5 * (low + high)).tolist()
+    away = 3.0 + 1.2 * float((high - low).max())
+    camera = tag("camera", pose(x, y - 0.5 * away, away, 0.0, 1.1, 0.5 * math.pi), name="view")
+    return [tag("gui", camera), _sun(), *roads(network)]
+
+
+def write_sdf(network: RoadNetwork, path: str | PathLike[str], version: Version = Version.CLASSIC) -> None:
+    """Write `to_sdf` to a file, whole or not at all; InputError if it can't be written."""
+    write_text(Path(path), to_sdf(network, version))
+
+
+def _sun() -> Element:
+    return tag(
+        "light",
+        pose(0.0, 0.0, 10.0),
+        tag("cast_shadows", "false"),
+        numbers("diffuse", 0.8, 0.8, 0.8, 1.0),
+        numbers("specular", 0.1, 0.1, 0.1, 1.0),
+        numbers("direction", -0.3, 0.2, -1.0),
+        name="sun",
+        type="directional",
+    )

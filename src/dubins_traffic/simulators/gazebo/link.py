@@ -1,0 +1,113 @@
+"""Messages to the world plugin and its answers (docs/gazebo-plugin.md)."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.kernels.arrays import Floats
+
+PROTOCOL: Final = 1
+HEAD: Final = struct.Struct("=II")
+BODY: Final = 7
+"""Numbers per car in an answer: x, y, cos, sin, velocity along x and y, yaw rate."""
+CONTACT: Final = 7 + 2 * BODY
+"""Numbers per contact: step, car, other, point x, y, normal x, y; then both bodies before the impact."""
+
+
+class Kind(IntEnum):
+    """Kinds of messages; an answer has the kind of its question."""
+
+    HELLO = 1
+    STEP = 2
+    STATE = 3
+    PLACE = 4
+    SCAN = 5
+    QUIT = 6
+    REFUSED = 0xFFFFFFFF
+
+
+class LostError(DubinsTrafficError):
+    """The plugin has gone, is silent or answers nonsense."""
+
+
+class Link:
+    """One end of the socket whose other end the plugin holds.
+
+    Parameters
+    ----------
+    line : socket
+        Connected; closed with the link.
+    patience : float
+        Seconds within which an answer must come.
+    """
+
+    def __init__(self, line: socket.socket, patience: float) -> None:
+        self._line = line
+        self.be_patient(patience)
+
+    def be_patient(self, seconds: float) -> None:
+        """Wait that long for each answer from now on."""
+        self.patience = seconds
+        # The kernel keeps the time: a timeout of Python's own costs further calls for each message.
+        limit = struct.pack("ll", int(seconds), int(seconds % 1.0 * 1e6))
+        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
+        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
+
+    def ask(self, kind: Kind, values: Floats) -> Floats:
+        """Send a message and return the numbers of its answer.
+
+        Raises
+        ------
+        LostError
+            If no answer comes within the patience, the other end has gone, or it does not know the message.
+        """
+        self.send(kind, values)
+        return self.receive(kind)
+
+    def send(self, kind: Kind, values: Floats) -> None:
+        """Send a message; LostError if it can't be."""
+        try:
+            self._line.sendall(HEAD.pack(kind, len(values)) + values.tobytes())
+        except OSError as error:
+            raise LostError(f"its socket is closed ({error.strerror or error})") from None
+
+    def ready(self, seconds: float) -> bool:
+        """Whether there is something to receive, or will be within that time."""
+        return bool(select.select([self._line], [], [], seconds)[0])
+
+    def receive(self, kind: Kind) -> Floats:
+        """Return the numbers of the answer to a message of this kind that has been sent; LostError as `ask`."""
+        try:
+            data = self._take(b"", HEAD.size)
+            answer, count = HEAD.unpack_from(data)
+            data = self._take(data, HEAD.size + 8 * count)
+        except BlockingIOError:
+            raise LostError(f"it has not answered for {self.patience:g} s") from None
+        except OSError as error:
+            raise LostError(f"its socket is closed ({error.strerror or error})") from None
+        if answer != kind:
+            raise LostError(f"it refused {kind.name}")
+        return np.frombuffer(data, dtype=np.float64, offset=HEAD.size)
+
+    def quit(self) -> None:
+        """Tell the other end to end, and close this one."""
+        with contextlib.suppress(OSError):
+            self._line.send(HEAD.pack(Kind.QUIT, 0), socket.MSG_DONTWAIT)
+        self._line.close()
+
+    def _take(self, data: bytes, size: int) -> bytes:
+        """Return `data` with as much after it as makes `size` bytes at least; nothing follows an answer."""
+        while len(data) < size:
+            part = self._line.recv(65536)
+            if not part:
+                raise LostError("it has gone")
+            data += part
+        return data

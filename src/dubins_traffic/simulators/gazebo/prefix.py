@@ -1,0 +1,149 @@
+"""Where Gazebo is: a folder of ours, or the machine's own; and what its programs need around them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, cast
+
+from platformdirs import user_cache_path
+
+from dubins_traffic import files
+from dubins_traffic.errors import InputError
+from dubins_traffic.simulators.gazebo import build
+
+VARIABLE: Final = "DUBINS_TRAFFIC_GAZEBO"
+"""The environment variable that names another folder than the default."""
+MANIFEST: Final = "installed.json"
+FORMAT: Final = 1
+COMMAND: Final = "dubins-traffic gazebo install"
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """A Gazebo that can be started: `root` is what was unpacked, or None where the machine's own is used."""
+
+    prefix: Path
+    gzserver: Path
+    root: Path | None
+
+    @property
+    def plugin(self) -> Path:
+        """The compiled world plugin."""
+        return self.prefix / build.folder_name() / build.PLUGIN
+
+    @property
+    def confinement(self) -> Path:
+        """The library that is preloaded into the server."""
+        return self.prefix / build.folder_name() / build.CONFINEMENT
+
+    @property
+    def gzclient(self) -> Path:
+        """The program that shows what a server does."""
+        return self.gzserver.with_name("gzclient")
+
+    def environment(self) -> dict[str, str]:
+        """Return the variables that Gazebo's programs need to find their libraries and files."""
+        return {} if self.root is None else surroundings(self.root)
+
+
+def surroundings(root: Path) -> dict[str, str]:
+    """Return the variables with which programs below `root` find their libraries and files."""
+    system = library_folder(root)
+    folders = (
+        system / "blas",
+        system / "lapack",
+        system,
+        root / "lib" / system.name,
+        root / "usr" / "lib",
+        system / "pulseaudio",
+        system / "gazebo-11" / "plugins",
+    )
+    return {
+        "LD_LIBRARY_PATH": os.pathsep.join(map(str, folders)),
+        "GAZEBO_RESOURCE_PATH": str(root / "usr" / "share" / "gazebo-11"),
+        "GAZEBO_PLUGIN_PATH": str(system / "gazebo-11" / "plugins"),
+        "OGRE_RESOURCE_PATH": str(system / "OGRE-1.9.0"),
+        "LIBGL_DRIVERS_PATH": str(system / "dri"),
+        "QT_PLUGIN_PATH": str(system / "qt5" / "plugins"),
+    }
+
+
+def library_folder(root: Path) -> Path:
+    """Return the folder of the libraries of this machine's kind below `root`."""
+    found = sorted((root / "usr" / "lib").glob("*-linux-gnu"))
+    return found[0] if found else root / "usr" / "lib"
+
+
+def place(prefix: str | os.PathLike[str] | None = None) -> Path:
+    """Return the folder of the installation: the one given, else the environment's, else one in the user's cache."""
+    chosen = prefix or os.environ.get(VARIABLE)
+    return Path(chosen).expanduser().absolute() if chosen else user_cache_path("dubins-traffic") / "gazebo"
+
+
+def own_server() -> Path | None:
+    """Return the machine's own gzserver if there is one on the path."""
+    found = shutil.which("gzserver")
+    return None if found is None else Path(found)
+
+
+def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
+    """Return the installation in `prefix` (see `place`), checked as far as can be without starting it.
+
+    Raises
+    ------
+    InputError
+        If there is none, it was not finished, or what it was finished with has gone or is of another version.
+    """
+    folder = place(prefix)
+    manifest = read_manifest(folder)
+    if manifest is None:
+        problem = "Gazebo is not installed"
+        if folder.is_dir() and any(folder.iterdir()):
+            problem = "the installation of Gazebo was not finished; the command goes on where it stopped"
+        raise _unfit(problem, folder)
+    root = None if manifest.get("own") else folder / "root"
+    installation = Installation(folder, Path(str(manifest.get("gzserver"))), root)
+    if not os.access(installation.gzserver, os.X_OK):
+        raise _unfit(f"{installation.gzserver} has gone", folder)
+    for built in (installation.plugin, installation.confinement):
+        if not built.is_file():
+            other = manifest.get("plugin") != build.folder_name()
+            problem = "is of another version of this package" if other else "has gone"
+            raise _unfit(f"Gazebo's plugin {problem} ({built.name})", folder)
+    return installation
+
+
+def read_manifest(folder: Path) -> Mapping[str, Any] | None:
+    """Return what the last finished installation wrote down, or None."""
+    try:
+        found: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    usable = isinstance(found, dict) and cast("dict[str, Any]", found).get("format") == FORMAT
+    return cast("dict[str, Any]", found) if usable else None
+
+
+def write_manifest(folder: Path, gzserver: Path, *, own: bool, version: str) -> None:
+    """Write down that the installation is finished."""
+    manifest = {
+        "format": FORMAT,
+        "gazebo": version,
+        "gzserver": str(gzserver),
+        "own": own,
+        "plugin": build.folder_name(),
+    }
+    files.write_text(folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+
+
+def _unfit(problem: str, folder: Path) -> InputError:
+    command = COMMAND
+    if folder != place():
+        command += f" --prefix {folder}"
+    return InputError(
+        problem, file=str(folder), field="simulator", value="gazebo", expected=f"`{command}` first"
+    )

@@ -1,0 +1,202 @@
+"""The answer for a problem: who wins, from where, under which assumption, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.game import Progress, build
+from dubins_traffic.synthesis.instance import arena_of, assumption_of, start_positions
+from dubins_traffic.synthesis.routes import route_bound
+from dubins_traffic.synthesis.solver import Ranks, Solution, solve
+from dubins_traffic.synthesis.story import told
+from dubins_traffic.synthesis.strengthening import smallest
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What synthesis says of an instance.
+
+    Attributes
+    ----------
+    solution : Solution
+        Who wins from which position.
+    instance : Instance
+        Of which it says so.
+    route_bound : int
+        Against how many e-agents an ego on shortest routes is proved to win.
+    seconds : float
+        Wall-clock time taken.
+    limit : int or None
+        Bytes of memory that may be used.
+    """
+
+    solution: Solution
+    instance: Instance
+    route_bound: int
+    seconds: float
+    limit: int | None = field(repr=False)
+
+    @cached_property
+    def starts(self) -> list[int]:
+        """The positions in which the instance may start; none if that is not known."""
+        return start_positions(self.solution.game.board, self.instance)
+
+    @property
+    def realizable(self) -> bool:
+        """Whether the ego wins from all positions in which the instance may start; if these aren't known, from all."""
+        return wins(self.solution, self.starts)
+
+    @property
+    def outcome(self) -> str:
+        """Where the ego wins: everywhere, from the starts, nowhere, or elsewhere only."""
+        if self.solution.everywhere:
+            return "everywhere"
+        if self.realizable:
+            return "starts"
+        return "elsewhere" if self.solution.winning.any() else "nowhere"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the answer for machines."""
+        return {
+            "states": self.solution.game.positions,
+            "winning": int(self.solution.winning.sum()),
+            "vacuous": int(self.solution.vacuous.sum()),
+            "realizable": self.realizable,
+            "route_bound": self.route_bound,
+            "seconds": round(self.seconds, 3),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the answer for people."""
+        game = self.solution.game
+        board = game.board
+        where = {
+            "everywhere": "everywhere",
+            "starts": "where the instance starts, but not everywhere",
+            "elsewhere": "from some positions, but not where the instance starts",
+            "nowhere": "nowhere",
+        }[self.outcome]
+        found = [
+            f"{board.others} e-agents, {board.arena.cells} cells, crossings from degree "
+            f"{board.arena.order_degree} on; assumed: {board.assumption}",
+            f"{game.positions:,} positions, {game.to.shape[0]:,} moves of the environment",
+            f"The ego wins {where}.",
+        ]
+        vacuous = int(self.solution.vacuous.sum())
+        if vacuous:
+            found.append(
+                f"Warning: in {vacuous:,} positions it wins only by bringing the e-agents to where they can't keep "
+                "their assumption. The strategy never does so, and gives these positions up."
+            )
+        if self.route_bound > 0:
+            found.append(f"On shortest routes it is proved to win against up to {self.route_bound} e-agents.")
+        return found
+
+    def explain(self, progress: Progress | None = None) -> list[str]:
+        """Return why the ego wins, or how it is stopped and what to assume so that it is not.
+
+        Raises
+        ------
+        InputError
+            If a game that would have to be solved for it is too large.
+        """
+        if self.realizable:
+            pairs = zip(self.solution.game.board.arena.goals, self.solution.ranks, strict=True)
+            return [self._waits(goal, ranks) for goal, ranks in pairs]
+        counter = Counterstrategy(self.solution)
+        lost = ~self.solution.winning
+        start = next((place for place in self.starts if lost[place]), int(np.argmax(lost)))
+        board = self.solution.game.board
+
+        def enough(solution: Solution) -> bool:
+            return wins(solution, start_positions(solution.game.board, self.instance))
+
+        better = smallest(board, enough, limit=self.limit, progress=progress)
+        names = " or ".join(str(assumption) for assumption in better)
+        return [
+            *told(counter, start),
+            f"The ego would win if this were assumed: {names}."
+            if names
+            else "The ego would not win even if all of E1 to E6 were assumed.",
+        ]
+
+    def _waits(self, goal: int, ranks: Ranks) -> str:
+        """Return in how many positions on the way to a goal the ego gets on by itself or waits, and for what."""
+        arena = self.solution.game.board.arena
+        held = ranks.rank > 0
+        debt = ranks.debt[ranks.rank[held]]
+        nodes = len(arena.nodes)
+        parts = {
+            "gets nearer whatever the others do": debt < 0,
+            "waits until one enters (E3, E5)": (debt >= nodes) & (debt < arena.cells),
+            "waits until one leaves (E4)": (debt >= 0) & (debt < nodes),
+            "waits until the goal is freed (E6)": debt >= arena.cells,
+        }
+        shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
+        return f"On the way to {list(arena.network.intersections[goal])} it {shares} positions."
+
+
+def wins(solution: Solution, starts: list[int]) -> bool:
+    """Say whether the ego wins from these positions; from all, if there are none."""
+    return bool(solution.winning[starts].all()) if starts else solution.everywhere
+
+
+def answer(
+    instance: Instance,
+    *,
+    cars: int | None = None,
+    assumption: Assumption | None = None,
+    order_degree: int | None = None,
+    limit: int | None = None,
+    progress: Progress | None = None,
+) -> Answer:
+    """Return what synthesis says of an instance.
+
+    Parameters
+    ----------
+    instance : Instance
+        Roads, goals, starts and e-agents.
+    cars : int, optional
+        E-agents; those of the instance, if not given.
+    assumption : Assumption, optional
+        Of the e-agents; that of the instance's problem, if not given.
+    order_degree : int, optional
+        Least degree of a crossing; as the problem says, if not given.
+    limit, progress
+        As for `game.build`.
+
+    Raises
+    ------
+    InputError
+        As `game.build` and `Arena.of`.
+    """
+    begun = perf_counter()
+    arena = arena_of(instance.problem, order_degree)
+    others = len(instance.e_agents) if cars is None else cars
+    board = Board(arena, assumption_of(instance.problem) if assumption is None else assumption, others)
+    bound = route_bound(arena, board.assumption)
+    try:
+        game = build(board, limit=limit, progress=progress)
+    except InputError as error:
+        raise _with_bound(error, bound) from None
+    return Answer(solve(game, progress=progress), instance, bound, perf_counter() - begun, limit)
+
+
+def _with_bound(error: InputError, bound: int) -> InputError:
+    """Return the refusal of a game that says what is known without it."""
+    if bound <= 0:
+        return error
+    error.expected = (
+        f"{error.expected}; on shortest routes the ego is proved to win against up to {bound} e-agents"
+    )
+    return error

@@ -1,0 +1,143 @@
+"""The cells of the game on a road network: places of one car each, and which lead where.
+
+A cell is a *node* or a lane. An intersection is one node, entered from all its lanes and left by any lane out of it.
+In a bend that is no crossing opposing cars pass each other, as they do on the road: such a bend is two nodes, each
+with one lane in and one lane out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.network import RoadNetwork
+
+LARGEST_NODES: Final = 250
+"""Nodes of the largest game; they are numbered in bytes."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A cell in an intersection.
+
+    Attributes
+    ----------
+    vertex : int
+        The intersection.
+    inbound : tuple of int
+        Lanes that end here; the place of a lane in this tuple is its slot.
+    exits : tuple of int
+        Lanes out.
+    crossing : bool
+        Whether the rules of crossings hold here.
+    """
+
+    vertex: int
+    inbound: tuple[int, ...]
+    exits: tuple[int, ...]
+    crossing: bool
+
+
+@dataclass(frozen=True)
+class Arena:
+    """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1.
+
+    Attributes
+    ----------
+    network : RoadNetwork
+        The roads.
+    order_degree : int
+        Least degree of an intersection that is a crossing.
+    goals : tuple of int
+        Intersections.
+    nodes : tuple of Node
+        In the order of their intersections.
+    """
+
+    network: RoadNetwork
+    order_degree: int
+    goals: tuple[int, ...]
+    nodes: tuple[Node, ...]
+
+    @classmethod
+    def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> Arena:
+        """Return the cells of a network.
+
+        Parameters
+        ----------
+        network : RoadNetwork
+            The roads.
+        goals : sequence of int
+            Intersections that the ego is to visit; each counts once.
+        order_degree : int
+            Least degree of an intersection that is a crossing.
+
+        Raises
+        ------
+        InputError
+            If there is no goal, or the network has too many intersections for the game.
+        """
+        if not goals:
+            raise InputError("no goals", field="goals", expected="at least one")
+        nodes: list[Node] = []
+        for v, degree in enumerate(network.degrees.tolist()):
+            out = network.arms(v)
+            crossing = degree >= order_degree
+            if degree == 2 and not crossing:
+                first, second = out
+                nodes += [Node(v, (first ^ 1,), (second,), False), Node(v, (second ^ 1,), (first,), False)]
+            else:
+                nodes.append(Node(v, tuple(lane ^ 1 for lane in out), out, crossing))
+        if len(nodes) > LARGEST_NODES:
+            raise InputError(
+                "too large a network for the game",
+                value=f"{len(nodes)} cells in intersections",
+                expected=f"at most {LARGEST_NODES}",
+            )
+        return cls(network, order_degree, tuple(dict.fromkeys(goals)), tuple(nodes))
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.nodes) + self.network.lanes
+
+    @cached_property
+    def lane_end(self) -> tuple[tuple[int, int], ...]:
+        """Node and slot in which each lane ends."""
+        found = {
+            lane: (n, slot) for n, node in enumerate(self.nodes) for slot, lane in enumerate(node.inbound)
+        }
+        return tuple(found[lane] for lane in range(self.network.lanes))
+
+    def nodes_of(self, vertex: int) -> tuple[int, ...]:
+        """Return the nodes in an intersection."""
+        return tuple(n for n, node in enumerate(self.nodes) if node.vertex == vertex)
+
+    @cached_property
+    def goal_nodes(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes in each goal."""
+        return tuple(self.nodes_of(goal) for goal in self.goals)
+
+    def following(self, cell: int) -> tuple[int, ...]:
+        """Return the cells to which a car may move from `cell`."""
+        count = len(self.nodes)
+        if cell < count:
+            return tuple(count + lane for lane in self.nodes[cell].exits)
+        return (self.lane_end[cell - count][0],)
+
+    def name(self, cell: int) -> str:
+        """Return how people call a cell, by lattice points: ``[0, 1]`` or ``[0, 1] > [0, 2]``."""
+        points = self.network.intersections
+        count = len(self.nodes)
+        if cell >= count:
+            first, last = (list(points[v]) for v in self.network.lane_ends(cell - count))
+            return f"{first} > {last}"
+        node = self.nodes[cell]
+        place = str(list(points[node.vertex]))
+        if len(self.nodes_of(node.vertex)) == 1:
+            return place
+        first, _ = self.network.lane_ends(node.inbound[0])
+        return f"{place} from {list(points[first])}"

@@ -1,0 +1,125 @@
+"""What the game assumes of the e-agents: E1 to E6, each kept, left out or weakened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Final
+
+from dubins_traffic.errors import InputError
+
+
+class Order(StrEnum):
+    """How an intersection is entered (E1)."""
+
+    KEPT = "kept"
+    """In the order of arrival, by all."""
+    IGNORED = "ignored"
+    """By the ego in the order of arrival, by e-agents in any."""
+    NONE = "none"
+    """There is no order: whoever finds it clear may enter, the ego too."""
+
+
+class Forfeits(StrEnum):
+    """How often an e-agent that is first at a clear intersection may give up its place (E3)."""
+
+    NEVER = "never"
+    ONCE = "once"
+    """Once in a wait."""
+    ALWAYS = "always"
+    """Any number of times."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """What is assumed of the e-agents; as it stands, all of E1 to E6.
+
+    Attributes
+    ----------
+    order : Order
+        E1.
+    yields : bool
+        E2: no e-agent moves into the cell of the ego.
+    enters : bool
+        E3: who is first at a clear intersection enters at last.
+    forfeits : Forfeits
+        Whether places in the order may be given up.
+    leaves : bool
+        E4: who is in an intersection with a free exit leaves at last.
+    arrives : bool
+        E5: who is in a lane comes to its end at last, and so into the order, or through a bend.
+    frees : bool
+        E6: every goal is free again and again.
+    """
+
+    order: Order = Order.KEPT
+    yields: bool = True
+    enters: bool = True
+    forfeits: Forfeits = Forfeits.NEVER
+    leaves: bool = True
+    arrives: bool = True
+    frees: bool = True
+
+    @classmethod
+    def parse(cls, words: Iterable[str]) -> Assumption:
+        """Return the assumption that the words name, such as ``E1`` and ``E3:once``; what is not named is left out.
+
+        Raises
+        ------
+        InputError
+            If a word is none of ours or a part is named twice.
+        """
+        found = NOTHING
+        seen: set[str] = set()
+        for word in words:
+            name = _NAMES.get(word.strip().lower())
+            if name is None:
+                raise InputError("not an assumption", field="--assume", value=word, expected=_known())
+            part = part_of(name)
+            if part in seen:
+                raise InputError("assumed twice", field="--assume", value=part, expected="each part once")
+            seen.add(part)
+            found = replace(found, **WORDS[name])
+        return found
+
+    @classmethod
+    def of_rules(cls, assumed: Mapping[str, bool]) -> Assumption:
+        """Return the assumption of a problem, from E1 to E6 each assumed or not."""
+        return cls.parse(name for name, kept in assumed.items() if kept)
+
+    def words(self) -> tuple[str, ...]:
+        """Return the words that `parse` understands as this assumption."""
+        return tuple(word for word, change in WORDS.items() if replace(self, **change) == self)
+
+    def __str__(self) -> str:
+        return ",".join(self.words()) or "nothing"
+
+
+NOTHING: Final = Assumption(Order.IGNORED, False, False, Forfeits.NEVER, False, False, False)
+"""No assumption at all."""
+
+WORDS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "E1": {"order": Order.KEPT},
+    "E1:any-order": {"order": Order.NONE},
+    "E2": {"yields": True},
+    "E3": {"enters": True, "forfeits": Forfeits.NEVER},
+    "E3:one-forfeit": {"enters": True, "forfeits": Forfeits.ONCE},
+    "E3:forfeits": {"enters": True, "forfeits": Forfeits.ALWAYS},
+    "E4": {"leaves": True},
+    "E5": {"arrives": True},
+    "E6": {"frees": True},
+}
+"""What each word assumes."""
+
+
+_NAMES: Final = {word.lower(): word for word in WORDS}
+
+
+def part_of(word: str) -> str:
+    """Return which of E1 to E6 a word is about."""
+    return word.partition(":")[0]
+
+
+def _known() -> str:
+    return "some of " + ", ".join(WORDS)

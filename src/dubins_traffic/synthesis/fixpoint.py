@@ -1,0 +1,302 @@
+"""The inner fixpoints of GR(1), compiled: from where can the ego reach a goal, if it waits while the others owe moves.
+
+Computed is, for one goal, mu Y . (target) or Cpre(Y) or OR_i nu X . (Cpre(Y or X) and debt_i), as in the algorithm of
+Piterman, Pnueli and Sa'ar (VMCAI 2006, equation 2). Cpre(S) holds in a position if whatever the environment makes of
+it, the ego can get into S.
+
+Each position watches one of its moves from which the ego can't yet get into Y, and looks for another only when that
+changes. So all steps Cpre(Y) together look at each move once. In the same way each debt watches the moves that end it:
+while one of them leads astray, the position can't be in X, and need not be looked at.
+
+The rank of a position is the step in which it came into Y. Ranks of one layer (`start`) belong to one X.
+"""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.synthesis.arrays import Bytes, Flags
+from dubins_traffic.synthesis.search import (
+    NEXT_RANK,
+    NO_DEBT,
+    NOBODY,
+    QUEUED,
+    RANKED,
+    STOPPED,
+    TAKEN,
+    UNFRIENDLY,
+    UNRANKED,
+    Graph,
+    Search,
+)
+
+
+@jit
+def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
+    """Set `found` (N,) to Cpre(`safe`); `ready` (N+1,) is room."""
+    count = safe.shape[0]
+    ready[count] = 0
+    for position in range(count):
+        ready[position] = 0
+        for e in range(g.ego_at[position], g.ego_at[position + 1]):
+            if safe[g.ego_to[e]]:
+                ready[position] = 1
+                break
+    for position in range(count):
+        found[position] = True
+        for e in range(g.to_at[position], g.to_at[position + 1]):
+            if ready[g.to[e]] == 0:
+                found[position] = False
+                break
+
+
+@jit_inner
+def _watch(g: Graph, s: Search, position: int) -> bool:
+    """Let a position watch its next move that is not ready; true if there is none."""
+    first = g.to_at[position]
+    for e in range(first + s.seen[position], g.to_at[position + 1]):
+        to = g.to[e]
+        if s.ready[to] == 0:
+            s.seen[position] = e - first
+            s.next_watcher[position] = s.watchers[to]
+            s.watchers[to] = position
+            return False
+    s.seen[position] = g.to_at[position + 1] - first
+    return True
+
+
+@jit_inner
+def _watch_owed(g: Graph, s: Search, o: int) -> None:
+    """Let a debt watch the next of its ends that is not ready; if there is none it becomes a candidate."""
+    position = g.owner[o]
+    first = g.to_at[position]
+    for e in range(first + s.owed_seen[o], g.to_at[position + 1]):
+        to = g.to[e]
+        if (g.moved[e] & g.owed_mask[o]) != 0 and s.ready[to] == 0:
+            s.owed_seen[o] = e - first
+            s.owed_next[o] = s.owed_watchers[to]
+            s.owed_watchers[to] = o
+            return
+    s.next_candidate[o] = s.candidates[g.owed[o]]
+    s.candidates[g.owed[o]] = o
+
+
+@jit_inner
+def _rank(s: Search, position: int, rank: int) -> None:
+    """Take a position into Y."""
+    s.rank[position] = rank
+    s.queue[s.control[QUEUED]] = position
+    s.control[QUEUED] += 1
+    s.control[RANKED] += 1
+
+
+@jit_inner
+def _attract(g: Graph, s: Search) -> None:
+    """Take into Y, again and again, what is in Cpre(Y)."""
+    while s.control[TAKEN] < s.control[QUEUED] and s.control[STOPPED] == 0:
+        reached = s.queue[s.control[TAKEN]]
+        s.control[TAKEN] += 1
+        following = int(s.rank[reached]) + 1
+        while following < s.control[NEXT_RANK] and s.start[following] != following:
+            following += 1
+        for e in range(g.back_at[reached], g.back_at[reached + 1]):
+            _make_ready(g, s, g.back[e], following)
+    if s.control[QUEUED] > 0:
+        last = s.rank[s.queue[s.control[QUEUED] - 1]]
+        for rank in range(s.control[NEXT_RANK], last + 1):
+            s.start[rank] = rank
+            s.debt[rank] = NO_DEBT
+        s.control[NEXT_RANK] = max(s.control[NEXT_RANK], last + 1)
+
+
+@jit_inner
+def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
+    """The ego can get into Y from `to`: tell all who watch it."""
+    if s.ready[to]:
+        return
+    s.ready[to] = 1
+    position = int(s.watchers[to])
+    while position != NOBODY:
+        after = int(s.next_watcher[position])
+        if s.rank[position] == UNRANKED and _watch(g, s, position):
+            _rank(s, position, following)
+        position = after
+    o = int(s.owed_watchers[to])
+    while o != NOBODY:
+        after = int(s.owed_next[o])
+        if s.rank[g.owner[o]] == UNRANKED:
+            _watch_owed(g, s, o)
+        o = after
+
+
+@jit_inner
+def _stays(g: Graph, s: Search, position: int) -> bool:
+    """Say whether the ego can get from a position into Y or the marked ones, whatever the environment does."""
+    for e in range(g.to_at[position] + s.seen[position], g.to_at[position + 1]):
+        to = g.to[e]
+        if s.ready[to]:
+            continue
+        if to >= s.mark.shape[0]:
+            return False
+        found = False
+        for k in range(g.ego_at[to], g.ego_at[to + 1]):
+            if s.mark[g.ego_to[k]]:
+                found = True
+                break
+        if not found:
+            return False
+    return True
+
+
+@jit_inner
+def _gather(g: Graph, s: Search, kind: int) -> int:
+    """Mark and list the candidates of a kind that are not in Y yet; return how many."""
+    count = 0
+    kept = NOBODY
+    o = s.candidates[kind]
+    while o != NOBODY:
+        after = s.next_candidate[o]
+        position = g.owner[o]
+        if s.rank[position] == UNRANKED:
+            s.next_candidate[o] = kept
+            kept = o
+            s.members[count] = position
+            s.mark[position] = 1
+            count += 1
+        o = after
+    s.candidates[kind] = kept
+    return count
+
+
+@jit_inner
+def _shrink(g: Graph, s: Search, count: int) -> int:
+    """Unmark members until the ego can stay among those left; return how many are left, first in `members`."""
+    before = count + 1
+    while count < before:
+        before = count
+        count = 0
+        for k in range(before):
+            position = s.members[k]
+            if _stays(g, s, position):
+                s.members[count] = position
+                count += 1
+            else:
+                s.mark[position] = 0
+    return count
+
+
+@jit_inner
+def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
+    """Take the members into Y as one layer, ranked by their depth if `layered`; say whether there are any."""
+    first = s.control[NEXT_RANK]
+    rank = first
+    for k in range(count):
+        position = s.members[k]
+        s.mark[position] = 0
+        if layered:
+            rank = first + s.depth[position] - 1
+        _rank(s, position, rank)
+    if count > 0:
+        for filled in range(first, rank + 1):
+            s.start[filled] = first
+            s.debt[filled] = kind
+        s.control[NEXT_RANK] = rank + 1
+    return count > 0
+
+
+@jit_inner
+def _wait(g: Graph, s: Search, kind: int) -> bool:
+    """Take into Y where the ego can wait until the environment pays a debt; say whether there is any such place."""
+    return _settle(s, kind, _shrink(g, s, _gather(g, s, kind)), False)
+
+
+@jit_inner
+def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
+    """Do as `_wait`, but only where the environment can pay: some of its moves, answered by the ego, lead into Y.
+
+    Who needs more moves gets a higher rank, so that the ego, which seeks low ranks, does answer so.
+    """
+    count = _shrink(g, s, _gather(g, s, kind))
+    before = count + 1
+    while 0 < count < before:
+        before = count
+        count = _possible(g, s, count)
+        if count < before:
+            s.control[UNFRIENDLY] = 1
+            count = _shrink(g, s, count)
+    return _settle(s, kind, count, True)
+
+
+@jit_inner
+def _possible(g: Graph, s: Search, count: int) -> int:
+    """Keep the members from which the environment has a way into Y, sorted by its length; return how many."""
+    for k in range(count):
+        s.depth[s.members[k]] = 0
+    kept = 0
+    before = -1
+    depth = 1
+    while before < kept:
+        before = kept
+        for k in range(before, count):
+            position = s.members[k]
+            if _one_nearer(g, s, position, depth):
+                s.depth[position] = depth
+                s.members[k] = s.members[kept]
+                s.members[kept] = position
+                kept += 1
+        depth += 1
+    for k in range(kept, count):
+        s.mark[s.members[k]] = 0
+    return kept
+
+
+@jit_inner
+def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
+    """Say whether some move of the environment, answered by the ego, leads into Y or to a member of less depth."""
+    for e in range(g.to_at[position], g.to_at[position + 1]):
+        to = g.to[e]
+        if s.ready[to]:
+            return True
+        if to >= s.mark.shape[0]:
+            continue
+        for k in range(g.ego_at[to], g.ego_at[to + 1]):
+            nearer = s.depth[g.ego_to[k]]
+            if s.mark[g.ego_to[k]] and 0 < nearer < depth:
+                return True
+    return False
+
+
+@jit
+def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: Search) -> None:
+    """Rank all positions from which the ego can reach a target.
+
+    Parameters
+    ----------
+    g : Graph
+        The game.
+    target : (N,) bool
+        Where the goal has been reached.
+    cells : int
+        Debts below that number are ended by a move of one car.
+    friendly : bool
+        Whether the ego waits for a goal to be freed only where the environment can free it.
+    s : Search
+        Fresh room; the result.
+    """
+    for position in range(target.shape[0]):
+        if target[position]:
+            _rank(s, position, 0)
+    for position in range(target.shape[0]):
+        if not target[position]:
+            _watch(g, s, position)
+            for o in range(g.owed_at[position], g.owed_at[position + 1]):
+                _watch_owed(g, s, o)
+    _attract(g, s)
+    more = True
+    while more and s.control[STOPPED] == 0:
+        more = False
+        for kind in range(s.candidates.shape[0]):
+            if s.candidates[kind] == NOBODY or (kind >= cells and more):
+                continue
+            if _wait_friendly(g, s, kind) if friendly and kind >= cells else _wait(g, s, kind):
+                more = True
+                _attract(g, s)

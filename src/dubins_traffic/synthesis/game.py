@@ -1,0 +1,282 @@
+"""The game as an explicit graph: every position, every move of both sides, and what is owed where."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.synthesis.arrays import Bytes, Cells, Flags, Numbers
+from dubins_traffic.synthesis.board import MOST_OTHERS, Board
+from dubins_traffic.synthesis.moves import Moves, Work, expand
+
+Progress: TypeAlias = Callable[[str, float], object]
+"""Told what is being done, and which share of it."""
+
+MOST_POSITIONS: Final = 2**31 - 1
+"""Positions are numbered in 32 bits, one number more than there are."""
+BLOCK: Final = 8192
+SAMPLE: Final = 512
+PROGRAM: Final = 160 << 20
+"""Bytes that the program takes without any game, about."""
+SPARE: Final = 1.2
+"""What the allocator does not give back, as a factor."""
+LARGEST_CHOICE: Final = 1 << 18
+"""Moves that the environment may have in one position."""
+WORKERS: Final = min(2, os.cpu_count() or 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """How large a game will be.
+
+    Attributes
+    ----------
+    positions : int
+        Exact.
+    moves : int
+        Of the environment, about.
+    bytes : int
+        Memory at the peak, about.
+    """
+
+    positions: int
+    moves: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Game:
+    """The game: N positions, E moves of the environment, F of the ego, O debts.
+
+    Position N is none: it stands for the ego having been rammed.
+
+    Attributes
+    ----------
+    board : Board
+        What the numbers of positions mean.
+    to_at : (N+1,) int64
+        Where the moves of the environment from each position begin in `to`.
+    to : (E,) int32
+        The positions to which they lead; there the ego moves.
+    moved : (E,) uint8
+        Which of the e-agents that may move entered or left a node, as bits.
+    ego_at : (N+1,) int64
+        Where the moves of the ego from each position begin in `ego_to`.
+    ego_to : (F,) int32
+        The positions to which they lead; there the environment moves.
+    owed_at : (N+1,) int64
+        Where the debts of each position begin.
+    owed : (O,) int16
+        A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k is freed.
+    owed_mask : (O,) uint8
+        The bits of `moved` that end the debt; others may.
+    ego_cell : (N,) int16
+        Cell of the ego.
+    """
+
+    board: Board
+    to_at: Ints
+    to: Numbers
+    moved: Bytes
+    ego_at: Ints
+    ego_to: Numbers
+    owed_at: Ints
+    owed: Cells
+    owed_mask: Bytes
+    ego_cell: Cells
+
+    @property
+    def positions(self) -> int:
+        """N."""
+        return self.ego_cell.shape[0]
+
+    @property
+    def debts(self) -> int:
+        """How many kinds of debts there may be: one a cell and one a goal."""
+        return self.board.arena.cells + len(self.board.arena.goals)
+
+    def at_goal(self, goal: int) -> Flags:
+        """Return where (N,) the ego is at a goal."""
+        return np.isin(self.ego_cell, np.array(self.board.arena.goal_nodes[goal], dtype=np.int16))
+
+    @cached_property
+    def bytes(self) -> int:
+        """Memory that the arrays take."""
+        arrays = (self.to_at, self.to, self.moved, self.ego_at, self.ego_to, self.owed_at, self.owed)
+        return sum(array.nbytes for array in (*arrays, self.owed_mask, self.ego_cell))
+
+
+def estimate(board: Board) -> Estimate:
+    """Return how large the game on a board will be, from a sample of its positions.
+
+    Raises
+    ------
+    InputError
+        If there are too many e-agents, or more positions than can be numbered; or fewer cells than cars.
+    """
+    if not 1 <= board.others <= MOST_OTHERS:
+        raise InputError(
+            "not a number of e-agents of the game",
+            field="--cars",
+            value=board.others,
+            expected=f"1 to {MOST_OTHERS}",
+        )
+    count = board.positions
+    if count == 0:
+        raise InputError(
+            "more cars than cells", value=board.others + 1, expected=f"at most {board.arena.cells}"
+        )
+    if count >= MOST_POSITIONS:
+        raise InputError(
+            "too large a game", value=f"{count} positions", expected=f"less than {MOST_POSITIONS}"
+        )
+    sizes = np.zeros(3)
+    picked = np.unique(np.linspace(0, count - 1, min(SAMPLE, count)).astype(np.int64))
+    work, out = Work.of(board.tables), room(1, LARGEST_CHOICE)
+    for position in picked.tolist():
+        out.used[:] = 0
+        expand(board.tables, board.others, count, position, position + 1, work, out, position)
+        sizes += out.used
+    moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
+    goals = len(board.arena.goals)
+    building = 2 * (5 * moves + 4 * ego_moves + 3 * debts) + 26 * count
+    solving = 5 * moves + 8 * ego_moves + 7 * debts + count * (26 + goals * 46) + goals * debts * 12
+    return Estimate(count, int(moves), int(PROGRAM + SPARE * max(building, solving)))
+
+
+def build(
+    board: Board, *, limit: int | None = None, progress: Progress | None = None, workers: int = WORKERS
+) -> Game:
+    """Return the game on a board.
+
+    Parameters
+    ----------
+    board : Board
+        The positions.
+    limit : int, optional
+        Bytes of memory that may be used; half of what the machine has, if not given.
+    progress : callable, optional
+        Told about it now and then.
+    workers : int
+        Threads.
+
+    Raises
+    ------
+    InputError
+        If the game would take more memory than `limit`, and as `estimate`.
+    """
+    expected = estimate(board)
+    allowed = memory() // 2 if limit is None else limit
+    if expected.bytes > allowed:
+        raise InputError(
+            "too large a game",
+            value=f"{expected.positions} positions, about {expected.bytes / 2**20:.0f} MiB",
+            expected=f"at most {allowed / 2**20:.0f} MiB (--memory), so fewer cars or a smaller network",
+        )
+    what = f"build {expected.positions:,} positions, about {expected.bytes / 2**20:.0f} MiB"
+    each = max(64, 4 * expected.moves // expected.positions)
+    pieces: list[Moves] = []
+    for piece in _expanded(board, each, workers):
+        pieces += piece
+        if progress:
+            progress(what, sum(part.many.shape[0] for part in pieces) / expected.positions)
+    return Game(
+        board,
+        _starts([part.many for part in pieces]),
+        np.concatenate([part.to for part in pieces]),
+        np.concatenate([part.moved for part in pieces]),
+        _starts([part.ego_many for part in pieces]),
+        np.concatenate([part.ego_to for part in pieces]),
+        _starts([part.owed_many for part in pieces]),
+        np.concatenate([part.owed for part in pieces]),
+        np.concatenate([part.owed_mask for part in pieces]),
+        np.concatenate([part.ego_cell for part in pieces]),
+    )
+
+
+def memory() -> int:
+    """Return how many bytes of memory the machine has."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def _expanded(board: Board, each: int, workers: int) -> Iterator[list[Moves]]:
+    """Yield the moves of all positions, in order."""
+    count = board.positions
+    blocks = iter(range(0, count, BLOCK))
+    with ThreadPoolExecutor(workers) as pool:
+        running: list[Future[list[Moves]]] = []
+        try:
+            for first in blocks:
+                running.append(pool.submit(_block, board, first, min(first + BLOCK, count), each))
+                if len(running) > 2 * workers:
+                    yield running.pop(0).result()
+            while running:
+                yield running.pop(0).result()
+        finally:
+            for future in running:
+                future.cancel()
+
+
+def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
+    """Return the moves of some positions; `each` guesses how many moves the environment has in one."""
+    pieces: list[Moves] = []
+    work = Work.of(board.tables)
+    count = board.positions
+    while first < last:
+        out = room(last - first, each)
+        done = expand(board.tables, board.others, count, first, last, work, out, first)
+        if done == first:
+            each *= 2
+            continue
+        pieces.append(_trimmed(out, done - first))
+        first = done
+    return pieces
+
+
+def room(rows: int, each: int) -> Moves:
+    """Return room for the moves of `rows` positions, about `each` of the environment from one."""
+    margin = 64
+    return Moves(
+        np.empty(rows * each + margin, dtype=np.int32),
+        np.empty(rows * each + margin, dtype=np.uint8),
+        np.empty(rows * 5 + margin, dtype=np.int32),
+        np.empty(rows * (2 * MOST_OTHERS) + margin, dtype=np.int16),
+        np.empty(rows * (2 * MOST_OTHERS) + margin, dtype=np.uint8),
+        np.empty(rows, dtype=np.int16),
+        np.empty(rows, dtype=np.int32),
+        np.empty(rows, dtype=np.int32),
+        np.empty(rows, dtype=np.int32),
+        np.zeros(3, dtype=np.int64),
+    )
+
+
+def _trimmed(out: Moves, rows: int) -> Moves:
+    """Return a copy of what has been used."""
+    moves, ego_moves, debts = out.used.tolist()
+    return Moves(
+        out.to[:moves].copy(),
+        out.moved[:moves].copy(),
+        out.ego_to[:ego_moves].copy(),
+        out.owed[:debts].copy(),
+        out.owed_mask[:debts].copy(),
+        out.ego_cell[:rows].copy(),
+        out.many[:rows].copy(),
+        out.ego_many[:rows].copy(),
+        out.owed_many[:rows].copy(),
+        out.used,
+    )
+
+
+def _starts(counts: list[Numbers]) -> Ints:
+    """Return where the entries of each position begin, and where the last end."""
+    total = np.zeros(sum(part.shape[0] for part in counts) + 1, dtype=np.int64)
+    np.cumsum(np.concatenate(counts), out=total[1:])
+    return total

@@ -1,0 +1,98 @@
+"""A problem as a game: its roads and goals, what it assumes, and where the cars of an instance start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations, product
+
+import numpy as np
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.queues import EGO, OTHER, Scene
+
+PARTS = ("E1", "E2", "E3", "E4", "E5", "E6")
+
+
+def arena_of(problem: Problem, order_degree: int | None = None) -> Arena:
+    """Return the cells of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Roads and goals.
+    order_degree : int, optional
+        Least degree of a crossing; that of the problem's rules, if not given.
+
+    Raises
+    ------
+    InputError
+        As `Arena.of`.
+    """
+    rules = RuleParameters.from_mapping(problem.rules)
+    degree = rules.crossing_degree if order_degree is None else order_degree
+    return Arena.of(problem.network, problem.goal_vertices, degree)
+
+
+def assumption_of(problem: Problem) -> Assumption:
+    """Return what a problem assumes of its e-agents. Places in the order are never given up."""
+    rules = RuleParameters.from_mapping(problem.rules)
+    return Assumption.parse(part for part in PARTS if getattr(rules, f"assume_{part.lower()}"))
+
+
+def start_positions(board: Board, instance: Instance) -> list[int]:
+    """Return the positions in which an instance may start; none if two cars start in one cell, or others play.
+
+    Cars that start in lanes to one crossing may be in any order there.
+    """
+    if len(instance.starts) != board.others + 1:
+        return []
+    cells = [cell_of(board.arena, instance.problem, pose) for pose in instance.starts]
+    if len(set(cells)) < len(cells):
+        return []
+    choices = [list(_scenes(board, node, cells)) for node in range(len(board.arena.nodes))]
+    return sorted({board.number(scenes) for scenes in product(*choices)})
+
+
+def cell_of(arena: Arena, problem: Problem, pose: Pose) -> int:
+    """Return the cell in which a pose lies: the node whose disc holds the centre, else the lane by heading."""
+    network = arena.network
+    place = np.array([[pose.x, pose.y]])
+    vertices, distances = network.nearest_intersection(place)
+    heading = np.array([np.cos(pose.theta), np.sin(pose.theta)])
+    if distances.item() < problem.intersection_radius:
+        nodes = arena.nodes_of(int(vertices.item()))
+        return max(nodes, key=lambda n: max(_along(arena, lane, heading) for lane in arena.nodes[n].exits))
+    segment = int(network.nearest_segment(place)[0].item())
+    return len(arena.nodes) + max(
+        (2 * segment, 2 * segment + 1), key=lambda lane: _along(arena, lane, heading)
+    )
+
+
+def _along(arena: Arena, lane: int, heading: Floats) -> float:
+    """Return how far one gets along a lane by a step of the heading."""
+    along = float(heading @ arena.network.tangents[lane >> 1])
+    return -along if lane & 1 else along
+
+
+def _scenes(board: Board, node: int, cells: list[int]) -> Iterator[Scene]:
+    """Yield the scenes that a node may have with the cars in these cells, the ego's first."""
+    arena = board.arena
+    kind = board.scenery(node).kind
+    inside = (EGO if cells[0] == node else OTHER) if node in cells else None
+    waiting = [
+        (slot, EGO if cells[0] == len(arena.nodes) + lane else OTHER)
+        for slot, lane in enumerate(arena.nodes[node].inbound)
+        if len(arena.nodes) + lane in cells
+    ]
+    parked: tuple[int, ...] = ()
+    if kind.parks:
+        parked = tuple(slot for slot, who in waiting if who == OTHER)
+        waiting = [(slot, who) for slot, who in waiting if who == EGO]
+    for queue in permutations(waiting) if kind.ordered else (tuple(sorted(waiting)),):
+        yield Scene(inside, queue, parked)

@@ -1,0 +1,359 @@
+"""The moves of the game, compiled: what the environment may make of a position, and then the ego.
+
+A turn of the environment moves any of its cars at once: each that may goes on by one cell. First all leave their
+cells, then they arrive, so a lane may be entered in the turn in which it is left. Cars that come to one crossing in
+one turn take their places in an order that the environment chooses.
+"""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.synthesis.board import MOST_OTHERS, Tables
+from dubins_traffic.synthesis.positions import (
+    ARRIVALS,
+    MOST_CHOICES,
+    RAMMED,
+    UNITS,
+    Moves,
+    Work,
+    rank,
+    unrank,
+)
+from dubins_traffic.synthesis.queues import EGO, IMPOSSIBLE, SLOTS
+
+STAY = -1
+RENEW = -2
+ENTER = -3
+"""Choices of an e-agent; what is not negative is the lane into which it leaves."""
+INSIDE = -1
+"""The slot of a car in a node."""
+
+
+@jit_inner
+def _units(t: Tables, work: Work) -> None:
+    """List the e-agents that may move and their choices; note whether one may ram the ego."""
+    count = 0
+    work.total[RAMMED] = 0
+    for v in range(t.base.shape[0]):
+        scene = t.base[v] + work.scenes[v]
+        if t.inside[scene] == 1:
+            choices = 1
+            for k in range(t.exit_at[v], t.exit_at[v + 1]):
+                lane = t.exits[k]
+                end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
+                bit = 1 << t.lane_slot[lane]
+                if (t.taken[end] & bit) == 0 or (t.open[end] & bit) != 0:
+                    work.choice[count, choices] = lane
+                    choices += 1
+                elif (t.others_slots[end] & bit) == 0 and t.switches[0] == 0:
+                    work.total[RAMMED] = 1
+            count = _unit(work, count, v, INSIDE, choices)
+        movable = t.open[scene] | t.may_forfeit[scene] | t.parked[scene]
+        for slot in range(SLOTS):
+            bit = 1 << slot
+            if movable & bit:
+                choices = 1
+                if t.open[scene] & bit:
+                    work.choice[count, choices] = ENTER
+                    choices += 1
+                if (t.may_forfeit[scene] | t.parked[scene]) & bit:
+                    work.choice[count, choices] = RENEW
+                    choices += 1
+                count = _unit(work, count, v, slot, choices)
+    work.total[UNITS] = count
+
+
+@jit_inner
+def _unit(work: Work, count: int, node: int, slot: int, choices: int) -> int:
+    """Note an e-agent with more choices than to stay; return how many there are."""
+    work.choice[count, 0] = STAY
+    work.node[count] = node
+    work.slot[count] = slot
+    work.choices[count] = choices
+    work.chosen[count] = 0
+    return count + 1
+
+
+@jit_inner
+def _next_choice(work: Work) -> bool:
+    """Go on to the next joint choice; false after the last."""
+    for u in range(work.total[UNITS]):
+        work.chosen[u] += 1
+        if work.chosen[u] < work.choices[u]:
+            return True
+        work.chosen[u] = 0
+    return False
+
+
+@jit_inner
+def _depart(t: Tables, work: Work) -> int:
+    """Take all that move from their cells and list who arrives; return the bits of `Moves.moved`, or -1."""
+    moved = 0
+    arrivals = 0
+    for v in range(t.base.shape[0]):
+        work.moved_scenes[v] = work.scenes[v]
+    for u in range(work.total[UNITS]):
+        choice = work.choice[u, work.chosen[u]]
+        if choice == STAY:
+            continue
+        v = work.node[u]
+        scene = t.base[v] + work.moved_scenes[v]
+        if choice == ENTER:
+            work.moved_scenes[v] = t.entered[scene, work.slot[u]]
+            moved |= 1 << u
+        elif choice == RENEW:
+            work.moved_scenes[v] = t.removed[scene, work.slot[u]]
+            arrivals = _arrival(work, arrivals, v, work.slot[u], int(t.renewed[v]))
+        else:
+            work.moved_scenes[v] = t.left[scene]
+            moved |= 1 << u
+            to = int(t.lane_node[choice])
+            arrivals = _arrival(work, arrivals, to, int(t.lane_slot[choice]), int(t.newcomer[to]))
+        if work.moved_scenes[v] == IMPOSSIBLE:
+            return -1
+    work.total[ARRIVALS] = arrivals
+    return moved
+
+
+@jit_inner
+def _arrival(work: Work, arrivals: int, node: int, slot: int, who: int) -> int:
+    """Put a car among those who arrive, by node; return how many there are."""
+    place = arrivals
+    while place > 0 and work.to_node[place - 1] > node:
+        work.to_node[place] = work.to_node[place - 1]
+        work.to_slot[place] = work.to_slot[place - 1]
+        work.to_who[place] = work.to_who[place - 1]
+        place -= 1
+    work.to_node[place] = node
+    work.to_slot[place] = slot
+    work.to_who[place] = who
+    return arrivals + 1
+
+
+@jit_inner
+def _arrive(t: Tables, work: Work) -> bool:
+    """Let all arrive in the order of `turn`; false if a lane is taken."""
+    for v in range(t.base.shape[0]):
+        work.arrived_scenes[v] = work.moved_scenes[v]
+    for place in range(work.total[ARRIVALS]):
+        k = work.turn[place]
+        v = work.to_node[k]
+        scene = t.base[v] + work.arrived_scenes[v]
+        work.arrived_scenes[v] = t.arrived[scene, work.to_slot[k], work.to_who[k]]
+        if work.arrived_scenes[v] == IMPOSSIBLE:
+            return False
+    return True
+
+
+@jit_inner
+def _next_turn(work: Work, sorts: Ints) -> bool:
+    """Go on to the next order of arrival, node by node; false after the last.
+
+    Only nodes with an order (`sorts`) have more than one.
+    """
+    high = work.total[ARRIVALS]
+    while high > 0:
+        low = high - 1
+        while low > 0 and work.to_node[low - 1] == work.to_node[high - 1]:
+            low -= 1
+        if sorts[work.to_node[low]] and _permute(work.turn, low, high):
+            return True
+        high = low
+    return False
+
+
+@jit_inner
+def _permute(turn: Ints, low: int, high: int) -> bool:
+    """Make turn[low:high] the next permutation in lexicographic order; after the last, the first, and false."""
+    pivot = high - 2
+    while pivot >= low and turn[pivot] > turn[pivot + 1]:
+        pivot -= 1
+    found = pivot >= low
+    if found:
+        other = high - 1
+        while turn[other] < turn[pivot]:
+            other -= 1
+        turn[pivot], turn[other] = turn[other], turn[pivot]
+    left = pivot + 1
+    right = high - 1
+    while left < right:
+        turn[left], turn[right] = turn[right], turn[left]
+        left += 1
+        right -= 1
+    return found
+
+
+@jit_inner
+def _environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
+    """Write the moves of the environment from `work.scenes`; false if there is no room."""
+    _units(t, work)
+    used = out.used[0]
+    if work.total[RAMMED]:
+        if used >= out.to.shape[0]:
+            return False
+        out.to[used] = positions
+        out.moved[used] = 0
+        used += 1
+    more = True
+    while more:
+        moved = _depart(t, work)
+        turns = moved >= 0
+        for k in range(work.total[ARRIVALS]):
+            work.turn[k] = k
+        while turns:
+            if not _arrive(t, work):
+                break
+            if used >= out.to.shape[0]:
+                return False
+            out.to[used] = rank(t, others, work.arrived_scenes)
+            out.moved[used] = moved
+            used += 1
+            turns = _next_turn(work, t.sorts)
+        more = _next_choice(work)
+    out.used[0] = used
+    return True
+
+
+@jit_inner
+def _owe(t: Tables, work: Work, out: Moves) -> bool:
+    """Write what the environment owes in `work.scenes`; false if there is no room."""
+    used = out.used[2]
+    if used + 2 * MOST_OTHERS + t.goal_nodes.shape[0] > out.owed.shape[0]:
+        return False
+    for v in range(t.base.shape[0]):
+        scene = t.base[v] + work.scenes[v]
+        for slot in range(SLOTS):
+            if t.owing[scene] >> slot & 1:
+                out.owed[used] = t.base.shape[0] + t.inbound[v, slot]
+                out.owed_mask[used] = _bits(work, v)
+                used += 1
+        if t.inside[scene] == 1 and t.switches[1]:
+            for k in range(t.exit_at[v], t.exit_at[v + 1]):
+                lane = t.exits[k]
+                end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
+                if (t.taken[end] >> t.lane_slot[lane] & 1) == 0:
+                    out.owed[used] = v
+                    out.owed_mask[used] = _bits(work, v)
+                    used += 1
+                    break
+    if t.switches[2]:
+        for goal in range(t.goal_nodes.shape[0]):
+            for v in range(t.base.shape[0]):
+                if t.goal[v] == goal and t.inside[t.base[v] + work.scenes[v]] == 1:
+                    out.owed[used] = t.switches[3] + goal
+                    out.owed_mask[used] = _bits(work, v) if t.goal_nodes[goal] == 1 else 0
+                    used += 1
+                    break
+    out.used[2] = used
+    return True
+
+
+@jit_inner
+def _bits(work: Work, node: int) -> int:
+    """Return the bits of the e-agents that may move at a node."""
+    bits = 0
+    for u in range(work.total[UNITS]):
+        if work.node[u] == node:
+            bits |= 1 << u
+    return bits
+
+
+@jit_inner
+def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
+    """Write the moves of the ego from `work.scenes`; return its cell, or -1 if there is no room."""
+    used = out.used[1]
+    if used + MOST_CHOICES > out.ego_to.shape[0]:
+        return -1
+    out.ego_to[used] = position
+    used += 1
+    cell = -1
+    for v in range(t.base.shape[0]):
+        scene = t.base[v] + work.scenes[v]
+        if t.egos[scene] == 0:
+            continue
+        old = work.scenes[v]
+        if t.inside[scene] == EGO + 1:
+            cell = v
+            work.scenes[v] = t.left[scene]
+            for k in range(t.exit_at[v], t.exit_at[v + 1]):
+                to = t.lane_node[t.exits[k]]
+                before = work.scenes[to]
+                after = t.arrived[t.base[to] + before, t.lane_slot[t.exits[k]], EGO]
+                if after != IMPOSSIBLE:
+                    work.scenes[to] = after
+                    out.ego_to[used] = rank(t, others, work.scenes)
+                    used += 1
+                    work.scenes[to] = before
+        else:
+            own = t.taken[scene] & ~t.others_slots[scene]
+            for slot in range(SLOTS):
+                if own >> slot & 1:
+                    cell = t.base.shape[0] + t.inbound[v, slot]
+            if t.ego_entered[scene] != IMPOSSIBLE:
+                work.scenes[v] = t.ego_entered[scene]
+                out.ego_to[used] = rank(t, others, work.scenes)
+                used += 1
+        work.scenes[v] = old
+        break
+    out.used[1] = used
+    return cell
+
+
+@jit
+def expand(
+    t: Tables, others: int, positions: int, first: int, last: int, work: Work, out: Moves, begun: int
+) -> int:
+    """Write the moves of the positions from `first` to before `last`; return the first that found no room.
+
+    Parameters
+    ----------
+    t : Tables
+        The board.
+    others, positions : int
+        E-agents, and number of positions; that number stands for a position in which the ego has been rammed.
+    first, last : int
+        The positions.
+    work : Work
+        Room.
+    out : Moves
+        Filled from `out.used` on, and from row `first - begun` on.
+    begun : int
+        The position of row 0.
+    """
+    for position in range(first, last):
+        row = position - begun
+        before, ego_before, owed_before = out.used[0], out.used[1], out.used[2]
+        unrank(t, others, position, work.scenes)
+        room = _environment(t, others, positions, work, out)
+        room = room and _owe(t, work, out)
+        cell = -1
+        if room:
+            cell = _ego(t, others, position, work, out)
+        if cell < 0:
+            out.used[0], out.used[1], out.used[2] = before, ego_before, owed_before
+            return position
+        out.ego_cell[row] = cell
+        out.many[row] = out.used[0] - before
+        out.ego_many[row] = out.used[1] - ego_before
+        out.owed_many[row] = out.used[2] - owed_before
+    return last
+
+
+@jit
+def list_moves(t: Tables, others: int, positions: int, position: int, work: Work, out: Moves) -> None:
+    """Write the moves of both sides from one position, the one as if the environment were to move, the other the ego.
+
+    Parameters
+    ----------
+    t, others, positions, work
+        As for `expand`.
+    position : int
+        The position.
+    out : Moves
+        Its rows 0 are set; it must have room enough (`game.room`).
+    """
+    out.used[0] = 0
+    out.used[1] = 0
+    out.used[2] = 0
+    expand(t, others, positions, position, position + 1, work, out, position)

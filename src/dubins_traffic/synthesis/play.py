@@ -1,0 +1,254 @@
+"""Playing a strategy against environments that keep the assumption, compiled: turn by turn, with the tables alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.random import below
+from dubins_traffic.synthesis.arrays import Numbers
+from dubins_traffic.synthesis.board import Tables
+from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
+from dubins_traffic.synthesis.moves import Moves, Work, list_moves
+from dubins_traffic.synthesis.strategy import Strategy
+
+DRAW: Final = 300
+"""The first of the random draws of this room (`kernels.random`)."""
+POSITION, GOAL, TURN, ASTRAY = range(4)
+"""Places in `Table.now`."""
+
+
+class Environment(IntEnum):
+    """How the environment plays."""
+
+    RANDOM = 0
+    """Any of its moves, each as likely."""
+    GREEDY = 1
+    """What leaves the ego at the highest rank; what it has owed for `PATIENCE` turns it pays."""
+
+
+PATIENCE: Final = 24
+
+
+class Table(NamedTuple):
+    """A play: where it is, and what has been seen.
+
+    Attributes
+    ----------
+    now : (4,) int64
+        Position (the environment is to move), goal of the ego, turns played, how often the ego found no ranked move.
+    age : (D,) int64
+        For how many turns each debt has been owed.
+    visited, visits, gap : (G,) int64
+        Turn of the last visit of each goal, number of visits, longest time without one.
+    """
+
+    now: Ints
+    age: Ints
+    visited: Ints
+    visits: Ints
+    gap: Ints
+
+
+class Room(NamedTuple):
+    """Room for the moves of the environment from one position, and of the ego from the next."""
+
+    others: Moves
+    ego: Moves
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What came of a play.
+
+    Attributes
+    ----------
+    turns : int
+        How many were played.
+    astray : int
+        How often the ego found no ranked move, which ends the play: 0 if the strategy is right.
+    visits : tuple of int
+        How often each goal was visited.
+    gaps : tuple of int
+        The most turns between two visits of each goal.
+    """
+
+    turns: int
+    astray: int
+    visits: tuple[int, ...]
+    gaps: tuple[int, ...]
+
+
+def play(
+    strategy: Strategy, turns: int, environment: Environment, *, seed: int = 0, position: int | None = None
+) -> Played:
+    """Return what comes of playing a strategy.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        The ego's.
+    turns : int
+        Of each side.
+    environment : Environment
+        How the others play.
+    seed : int
+        Of what they draw.
+    position : int, optional
+        Where to begin; the first that the strategy wins, if not given.
+
+    Raises
+    ------
+    InputError
+        If the strategy does not win from `position`, or from anywhere.
+    """
+    board = strategy.board
+    first = strategy.first() if position is None else position
+    if not strategy.wins(first):
+        raise InputError("the strategy does not win from there", field="position", value=first)
+    goals = len(board.arena.goals)
+    table = Table(
+        np.array([first, 0, 0, 0], dtype=np.int64),
+        np.zeros(board.arena.cells + goals, dtype=np.int64),
+        *(np.zeros(goals, dtype=np.int64) for _ in range(3)),
+    )
+    moves = Room(room(1, LARGEST_CHOICE), room(1, LARGEST_CHOICE))
+    ranks = np.stack([own.rank for own in strategy.ranks])
+    play_turns(
+        board.tables,
+        (board.others, board.positions),
+        ranks,
+        int(environment),
+        np.uint64(seed),
+        turns,
+        Work.of(board.tables),
+        moves,
+        table,
+    )
+    return Played(
+        int(table.now[TURN]), int(table.now[ASTRAY]), tuple(table.visits.tolist()), tuple(table.gap.tolist())
+    )
+
+
+@jit_inner
+def _visited(ranks: Numbers, position: int, turn: int, table: Table) -> int:
+    """Note that the ego is at its goal, if it is; return the goal to seek now."""
+    goal = table.now[GOAL]
+    if ranks[goal, position] == 0:
+        table.gap[goal] = max(table.gap[goal], turn - table.visited[goal])
+        table.visited[goal] = turn
+        table.visits[goal] += 1
+        goal = goal + 1 if goal + 1 < ranks.shape[0] else 0
+        table.now[GOAL] = goal
+    return goal
+
+
+@jit_inner
+def _grow(out: Moves, table: Table) -> int:
+    """Note for how long each debt has been owed; return which of `out.owed` is the oldest, or -1."""
+    for kind in range(table.age.shape[0]):
+        table.age[kind] = -table.age[kind]
+    oldest = -1
+    for o in range(out.used[2]):
+        kind = out.owed[o]
+        if table.age[kind] <= 0:
+            table.age[kind] = 1 - table.age[kind]
+        if out.owed_mask[o] and (oldest < 0 or table.age[kind] > table.age[out.owed[oldest]]):
+            oldest = o
+    for kind in range(table.age.shape[0]):
+        table.age[kind] = max(table.age[kind], 0)
+    return oldest
+
+
+@jit_inner
+def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
+    """Return which of the ego's moves leads to the lowest rank, or -1 if none has a rank."""
+    best = -1
+    for k in range(out.used[1]):
+        rank = ranks[goal, out.ego_to[k]]
+        if rank >= 0 and (best < 0 or rank < ranks[goal, out.ego_to[best]]):
+            best = k
+    return best
+
+
+@jit_inner
+def _worst(
+    t: Tables, size: tuple[int, int], ranks: Numbers, goal: int, must: int, work: Work, room: Room, first: int
+) -> int:
+    """Return the move of the environment that leaves the ego the highest rank.
+
+    Of equals the first from `first` on; only moves in which a car of the bits `must` goes, if any.
+    """
+    out = room.others
+    count = out.used[0]
+    picked = first
+    highest = -1
+    for k in range(count):
+        e = first + k if first + k < count else first + k - count
+        if must and (out.moved[e] & must) == 0:
+            continue
+        list_moves(t, size[0], size[1], out.to[e], work, room.ego)
+        best = _answer(ranks, goal, room.ego)
+        rank = ranks[goal, room.ego.ego_to[best]] if best >= 0 else size[1]
+        if rank > highest:
+            highest = rank
+            picked = e
+    return picked
+
+
+@jit
+def play_turns(
+    t: Tables,
+    size: tuple[int, int],
+    ranks: Numbers,
+    environment: int,
+    seed: Any,
+    turns: int,
+    work: Work,
+    room: Room,
+    table: Table,
+) -> None:
+    """Play turns; stop where a position has no rank.
+
+    Parameters
+    ----------
+    t, size
+        The board, and its numbers of e-agents and positions.
+    ranks : (G, N) int32
+        The strategy.
+    environment : int
+        `Environment`.
+    seed : uint64
+        Of what it draws.
+    turns : int
+        How many.
+    work, room
+        Room for the moves of a position.
+    table : Table
+        Updated.
+    """
+    for _ in range(turns):
+        position = table.now[POSITION]
+        turn = table.now[TURN]
+        list_moves(t, size[0], size[1], position, work, room.others)
+        goal = _visited(ranks, position, turn, table)
+        oldest = _grow(room.others, table)
+        picked = below(seed, 0, 0, turn, DRAW, room.others.used[0])
+        if environment == 1:
+            must = 0
+            if oldest >= 0 and table.age[room.others.owed[oldest]] > PATIENCE:
+                must = room.others.owed_mask[oldest]
+            picked = _worst(t, size, ranks, goal, must, work, room, picked)
+        list_moves(t, size[0], size[1], room.others.to[picked], work, room.ego)
+        best = _answer(ranks, goal, room.ego)
+        if best < 0:
+            table.now[ASTRAY] += 1
+            return
+        table.now[POSITION] = room.ego.ego_to[best]
+        table.now[TURN] += 1

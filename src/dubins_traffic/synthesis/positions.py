@@ -1,0 +1,141 @@
+"""Room for the moves of positions, and the numbers of positions, compiled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.synthesis.arrays import Bytes, Cells, Numbers
+from dubins_traffic.synthesis.board import MOST_OTHERS, Tables
+from dubins_traffic.synthesis.queues import SLOTS
+
+MOST_CHOICES = SLOTS + 1
+"""Of one car: to stay, or to leave by one of four lanes."""
+UNITS, ARRIVALS, RAMMED = 0, 1, 2
+"""Places in `Work.total`."""
+
+
+class Work(NamedTuple):
+    """Room for the kernels.
+
+    Attributes
+    ----------
+    scenes, moved_scenes, arrived_scenes : (V,) int64
+        Of the position, after departures, after arrivals.
+    node, slot, choices, chosen : (8,) int64
+        The e-agents that may move: where they are, how many choices they have, which is taken.
+    choice : (8, 5) int64
+        STAY, RENEW, ENTER or a lane.
+    to_node, to_slot, to_who, turn : (8,) int64
+        Those who arrive, by node; `turn` is the order in which they do.
+    total : (3,) int64
+        How many may move, how many arrive, whether the ego may be rammed.
+    """
+
+    scenes: Ints
+    moved_scenes: Ints
+    arrived_scenes: Ints
+    node: Ints
+    slot: Ints
+    choices: Ints
+    chosen: Ints
+    choice: Ints
+    to_node: Ints
+    to_slot: Ints
+    to_who: Ints
+    turn: Ints
+    total: Ints
+
+    @classmethod
+    def of(cls, tables: Tables) -> Work:
+        """Return room for positions of these tables."""
+        nodes, cars = tables.base.shape[0], MOST_OTHERS
+        shapes = dict.fromkeys(("scenes", "moved_scenes", "arrived_scenes"), (nodes,))
+        shapes |= {"choice": (cars, MOST_CHOICES), "total": (3,)}
+        return cls(**{name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in cls._fields})
+
+
+class Moves(NamedTuple):
+    """Where a block of positions writes its moves; `used` says how much of each array is filled.
+
+    Attributes
+    ----------
+    to : (E,) int32
+        Positions after a turn of the environment.
+    moved : (E,) uint8
+        Which of the e-agents that may move entered or left a node, as bits.
+    ego_to : (F,) int32
+        Positions after a turn of the ego.
+    owed : (O,) int16
+        What the environment owes in a position: cells (an e-agent in it is to go on), or cells + goal (to be freed).
+    owed_mask : (O,) uint8
+        The bits of `moved` that end it.
+    ego_cell : (N,) int16
+        Cell of the ego.
+    many, ego_many, owed_many : (N,) int32
+        Entries of each position in the arrays above.
+    used : (3,) int64
+        Entries used of `to`, `ego_to` and `owed`.
+    """
+
+    to: Numbers
+    moved: Bytes
+    ego_to: Numbers
+    owed: Cells
+    owed_mask: Bytes
+    ego_cell: Cells
+    many: Numbers
+    ego_many: Numbers
+    owed_many: Numbers
+    used: Ints
+
+
+@jit
+def unrank(t: Tables, others: int, position: int, scenes: Ints) -> None:
+    """Set the scene of every node in a position."""
+    left = others
+    ego = 1
+    rest = position
+    for v in range(t.base.shape[0]):
+        count = t.scene_count[v]
+        row = t.offset_at[v] + (left * 2 + ego) * count
+        low = 0
+        if rest >= t.offset[row + 1]:
+            high = count
+            while high - low > 1:
+                middle = (low + high) >> 1
+                if t.offset[row + middle] <= rest:
+                    low = middle
+                else:
+                    high = middle
+        rest -= t.offset[row + low]
+        scenes[v] = low
+        left -= t.others[t.base[v] + low]
+        ego -= t.egos[t.base[v] + low]
+
+
+@jit
+def rank(t: Tables, others: int, scenes: Ints) -> int:
+    """Return the number of a position."""
+    left = others
+    ego = 1
+    total = 0
+    for v in range(t.base.shape[0]):
+        scene = scenes[v]
+        if scene != 0:
+            total += int(t.offset[t.offset_at[v] + (left * 2 + ego) * t.scene_count[v] + scene])
+            left -= t.others[t.base[v] + scene]
+            ego -= t.egos[t.base[v] + scene]
+    return total
+
+
+@jit
+def list_scenes(t: Tables, others: int, scenes: Ints, found: Numbers) -> None:
+    """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
+    for position in range(found.shape[0]):
+        unrank(t, others, position, scenes)
+        for v in range(scenes.shape[0]):
+            found[position, v] = scenes[v]

@@ -1,0 +1,72 @@
+"""How many e-agents an ego on fixed routes provably wins against, without solving a game.
+
+The ego keeps to shortest routes and moves whenever it may. Suppose that it waits in a cell for ever, for the next cell
+of its route. Under E1 to E5 then everything that can be reached from that next cell without passing the ego is held for
+ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has cells can't stop it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+
+
+def route_bound(arena: Arena, assumption: Assumption) -> int:
+    """Return the most e-agents against which an ego on shortest routes is proved to win from everywhere.
+
+    Parameters
+    ----------
+    arena : Arena
+        The cells.
+    assumption : Assumption
+        The proof needs E1 to E5, that forfeits are bounded, and crossings wherever three roads meet; it does not need
+        E6. Without these the bound is 0.
+    """
+    kept = [assumption.yields, assumption.enters, assumption.leaves, assumption.arrives]
+    kept += [node.crossing or len(node.inbound) == 1 for node in arena.nodes]
+    if assumption.order is not Order.KEPT or assumption.forfeits is Forfeits.ALWAYS or not all(kept):
+        return 0
+    regions = (len(region(arena, ahead, cell)) for cell, ahead in waits(arena))
+    return min(regions, default=arena.cells) - 1
+
+
+def waits(arena: Arena) -> set[tuple[int, int]]:
+    """Return where an ego on shortest routes may have to wait, and for which cell."""
+    found: set[tuple[int, int]] = set()
+    for nodes in arena.goal_nodes:
+        far = distances(arena, nodes)
+        for cell, own in far.items():
+            found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == own - 1}
+    return found
+
+
+def distances(arena: Arena, targets: Iterable[int]) -> dict[int, int]:
+    """Return how many moves each cell is from the nearest target; without those from which none can be reached."""
+    before: dict[int, list[int]] = {}
+    for cell in range(arena.cells):
+        for ahead in arena.following(cell):
+            before.setdefault(ahead, []).append(cell)
+    far = dict.fromkeys(targets, 0)
+    waiting = deque(far)
+    while waiting:
+        cell = waiting.popleft()
+        for earlier in before.get(cell, ()):
+            if earlier not in far:
+                far[earlier] = far[cell] + 1
+                waiting.append(earlier)
+    return far
+
+
+def region(arena: Arena, first: int, without: int) -> set[int]:
+    """Return the cells that can be reached from `first`, itself included, without passing the cell `without`."""
+    found = {first}
+    waiting = [first]
+    while waiting:
+        for ahead in arena.following(waiting.pop()):
+            if ahead != without and ahead not in found:
+                found.add(ahead)
+                waiting.append(ahead)
+    return found

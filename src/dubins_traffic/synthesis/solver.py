@@ -1,0 +1,218 @@
+"""Solving a game: where the ego wins, by which ranks, and where only because the environment can't keep its assumption.
+
+The game is GR(1): if each debt is paid infinitely often, the ego is at each goal infinitely often. It wins in
+nu Z . AND_j mu Y . (goal_j and Cpre(Z)) or Cpre(Y) or OR_i nu X . (Cpre(Y or X) and debt_i), after Piterman, Pnueli
+and Sa'ar (VMCAI 2006), the goals computed side by side.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from dubins_traffic.synthesis.arrays import Cells, Flags, Numbers
+from dubins_traffic.synthesis.fixpoint import forced, reach
+from dubins_traffic.synthesis.game import WORKERS, Game, Progress
+from dubins_traffic.synthesis.search import (
+    NEXT_RANK,
+    RANKED,
+    STOPPED,
+    UNFRIENDLY,
+    UNRANKED,
+    Graph,
+    Search,
+    own,
+    reverse,
+)
+
+LOOK: Final = 0.1
+"""Seconds between two looks at how far a search has come."""
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """How to get to one goal: move to the position of lowest rank, and wait while the environment owes.
+
+    Attributes
+    ----------
+    rank : (N,) int32
+        0 at the goal, -1 where the ego does not get there.
+    start : (R,) int32
+        First rank of the layer of each rank. In a layer the ego waits; otherwise it gets to lower ranks in each turn.
+    debt : (R,) int16
+        What the environment owes in a layer (`game.Game.owed`), or -1 where it can't keep the ego in the layer.
+    """
+
+    rank: Numbers
+    start: Numbers
+    debt: Cells
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Positions that are lost for one goal, once those lost before are avoided.
+
+    Attributes
+    ----------
+    goal : int
+        The goal that the environment can keep from the ego.
+    target : (N,) bool
+        Where the goal would have counted as reached.
+    lost : (N,) bool
+        The positions.
+    """
+
+    goal: int
+    target: Flags
+    lost: Flags
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Who wins a game.
+
+    Attributes
+    ----------
+    game : Game
+        The game.
+    winning : (N,) bool
+        Where the ego wins.
+    vacuous : (N,) bool
+        Where it wins, but only by bringing the environment to where it can't keep its assumption.
+    ranks : tuple of Ranks
+        The strategy, one table a goal, for all winning positions that are not vacuous; it never does so.
+    losses : tuple of Loss
+        Why the others are lost, in order; none is lost twice.
+    """
+
+    game: Game
+    winning: Flags
+    vacuous: Flags
+    ranks: tuple[Ranks, ...]
+    losses: tuple[Loss, ...] = field(repr=False)
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether the ego wins from every position."""
+        return bool(self.winning.all())
+
+
+def graph(game: Game) -> Graph:
+    """Return what the kernels are given of a game."""
+    count = game.positions
+    back_at = np.zeros(count + 1, dtype=np.int64)
+    back = np.empty(game.ego_to.shape[0], dtype=np.int32)
+    reverse(game.ego_at, game.ego_to, back_at, back)
+    owner = np.empty(game.owed.shape[0], dtype=np.int32)
+    own(game.owed_at, owner)
+    return Graph(
+        game.to_at,
+        game.to,
+        game.moved,
+        game.ego_at,
+        game.ego_to,
+        back_at,
+        back,
+        game.owed_at,
+        game.owed,
+        game.owed_mask,
+        owner,
+    )
+
+
+def solve(game: Game, *, progress: Progress | None = None, workers: int = WORKERS) -> Solution:
+    """Return who wins a game, and how.
+
+    Parameters
+    ----------
+    game : Game
+        The game.
+    progress : callable, optional
+        Told about it now and then.
+    workers : int
+        Threads; no more than there are goals are used.
+    """
+    solver = _Solver(game, progress, workers)
+    friendly, ranks, losses, spoiled = solver.winning(friendly=True)
+    winning = friendly
+    if spoiled:
+        winning, _, losses, _ = solver.winning(friendly=False)
+    return Solution(game, winning, winning & ~friendly, ranks, losses)
+
+
+class _Solver:
+    """The outer fixpoint of one game."""
+
+    def __init__(self, game: Game, progress: Progress | None, workers: int) -> None:
+        self._game = game
+        self._graph = graph(game)
+        self._progress = progress
+        self._workers = workers
+
+    def winning(self, *, friendly: bool) -> tuple[Flags, tuple[Ranks, ...], tuple[Loss, ...], bool]:
+        """Return the winning positions, the ranks, the losses, and whether being friendly has cost any position."""
+        count = self._game.positions
+        goals = range(len(self._game.board.arena.goals))
+        won = np.ones(count, dtype=np.bool_)
+        ways = [won] * len(goals)
+        losses: list[Loss] = []
+        spoiled = False
+        while True:
+            targets = self._targets(won)
+            searches = self._side_by_side(targets, friendly)
+            spoiled = spoiled or any(bool(search.control[UNFRIENDLY]) for search in searches)
+            ways = [search.rank != UNRANKED for search in searches]
+            before = won
+            for goal in goals:
+                lost = won & ~ways[goal]
+                if lost.any():
+                    losses.append(Loss(goal, targets[goal], lost))
+                won = won & ways[goal]
+            if won.sum() in (before.sum(), 0):
+                return won, tuple(_ranks(search, won) for search in searches), tuple(losses), spoiled
+
+    def _targets(self, won: Flags) -> list[Flags]:
+        """Return, for each goal, where it has been reached and the ego stays where it has won."""
+        targets = [self._game.at_goal(goal) for goal in range(len(self._game.board.arena.goals))]
+        if won.all():
+            return targets
+        kept = np.empty(won.shape, dtype=np.bool_)
+        ready = np.empty(len(won) + 1, dtype=np.uint8)
+        forced(self._graph, won, ready, kept)
+        return [target & kept for target in targets]
+
+    def _side_by_side(self, targets: list[Flags], friendly: bool) -> list[Search]:
+        """Return the searches for all goals; interrupted by Ctrl-C."""
+        game = self._game
+        searches = [Search.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
+        with ThreadPoolExecutor(self._workers) as pool:
+            try:
+                cells = game.board.arena.cells
+                running = {
+                    pool.submit(reach, self._graph, target, cells, friendly, search)
+                    for target, search in zip(targets, searches, strict=True)
+                }
+                while running:
+                    done, running = wait(running, timeout=LOOK)
+                    self._tell(searches)
+                    for future in done:
+                        future.result()
+            except BaseException:
+                for search in searches:
+                    search.control[STOPPED] = 1
+                raise
+        return searches
+
+    def _tell(self, searches: list[Search]) -> None:
+        if self._progress:
+            ranked = sum(int(search.control[RANKED]) for search in searches)
+            self._progress("solve", ranked / (len(searches) * self._game.positions))
+
+
+def _ranks(search: Search, won: Flags) -> Ranks:
+    used = int(search.control[NEXT_RANK])
+    rank = np.where(won, search.rank, np.int32(UNRANKED)).astype(np.int32, copy=False)
+    return Ranks(rank, search.start[:used].copy(), search.debt[:used].copy())

@@ -1,0 +1,67 @@
+"""The smallest strengthening of an assumption under which the ego wins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations, product
+
+from dubins_traffic.synthesis.assumption import WORDS, Assumption, part_of
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import Progress, build
+from dubins_traffic.synthesis.solver import Solution, solve
+
+STEPS = {"E3": ("E3:one-forfeit", "E3")}
+"""Words of a part from weak to strong, where more than one can be added."""
+
+
+def strengthenings(assumption: Assumption, count: int) -> Iterator[Iterator[Assumption]]:
+    """Yield the assumptions in which `count` more parts are assumed, or assumed in full.
+
+    Those with the same parts come together, the weak ones first.
+    """
+    words = dict.fromkeys(part_of(word) for word in WORDS)
+    own = {part_of(word): word for word in assumption.words()}
+    weak = [part for part in words if own.get(part) != part]
+    for parts in combinations(weak, count):
+        ladders = [[step for step in STEPS.get(part, (part,)) if step != own.get(part)] for part in parts]
+        yield (
+            Assumption.parse((own | dict(zip(parts, steps, strict=True))).values())
+            for steps in product(*ladders)
+        )
+
+
+def smallest(
+    board: Board,
+    wanted: Callable[[Solution], bool],
+    *,
+    limit: int | None = None,
+    progress: Progress | None = None,
+) -> list[Assumption]:
+    """Return the assumptions with the fewest parts more under which the ego wins; none if it never does.
+
+    Parameters
+    ----------
+    board : Board
+        The game as it is lost.
+    wanted : callable
+        Says whether a solution is one in which the ego wins.
+    limit, progress
+        As for `game.build`.
+
+    Raises
+    ------
+    InputError
+        As `game.build`.
+    """
+
+    def wins(assumption: Assumption) -> bool:
+        game = build(Board(board.arena, assumption, board.others), limit=limit, progress=progress)
+        return wanted(solve(game, progress=progress))
+
+    parts = len({part_of(word) for word in WORDS})
+    for count in range(1, parts + 1):
+        tried = (next(filter(wins, steps), None) for steps in strengthenings(board.assumption, count))
+        found = [assumption for assumption in tried if assumption is not None]
+        if found:
+            return found
+    return []

@@ -1,0 +1,161 @@
+"""The message packages that Debian lacks, made by Debian's generators from the definitions beside this file."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from platformdirs import user_cache_path
+
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.transports.ros1.debian import MissingRosError, add_generated, ros
+
+DEFINITIONS = Path(__file__).parent / "definitions"
+SHARE = Path("/usr/share")
+"""Where Debian keeps the definitions of its own messages."""
+NEEDED = ("geometry_msgs", "std_msgs")
+GENCPP = Path("/usr/lib/gencpp/gen_cpp.py")
+
+MD5: Mapping[str, str] = {
+    "gazebo_msgs/ModelStates": "48c080191eb15c41858319b4d8a609c2",
+    "gazebo_msgs/ModelState": "9330fd35f2fcd82d457e54bd54e10593",
+    "integrator_chains_msgs/ProblemInstanceJSON": "b54d5cdbf1a54655f656ec2388ee6dbf",
+    "dubins_traffic_msgs/LabelStamped": "4f776b85a85eab24a9e56d49901c91b9",
+    "dubins_traffic_msgs/RoadNetworkJSON": "1883c937699fd766d0fdabe4f94ae976",
+    "dubins_traffic_msgs/MMode": "99642e43b6218c95c7eccdcbb2800824",
+}
+"""Sums by which ROS tells whether two programs mean the same message; those of 2016."""
+
+
+def packages() -> list[str]:
+    """Return the names of the packages that are made here."""
+    return sorted(folder.name for folder in DEFINITIONS.iterdir() if folder.is_dir())
+
+
+def definitions() -> list[Path]:
+    """Return the files of all definitions, messages before services."""
+    return sorted(DEFINITIONS.glob("*/msg/*.msg")) + sorted(DEFINITIONS.glob("*/srv/*.srv"))
+
+
+@cache
+def load() -> Any:
+    """Return the classes of all messages used here, as attributes: Twist, Odometry, ModelStates, ...
+
+    Those that Debian lacks are made on first use, into the user's cache.
+
+    Raises
+    ------
+    MissingRosError
+        If Debian's generators or messages are not installed.
+    DubinsTrafficError
+        If a package of the same name is installed whose messages are not those of 2016.
+    """
+    add_generated(str(_generated()), packages())
+    found = SimpleNamespace()
+    for module, names in _USED.items():
+        source = ros(module)
+        for name in names.split():
+            setattr(found, name, getattr(source, name))
+    for kind, expected in MD5.items():
+        name = kind.partition("/")[2]
+        if getattr(found, name)._md5sum != expected:
+            raise DubinsTrafficError(
+                f"the installed {kind} is not that of 2016: its md5 sum is not {expected}"
+            )
+    return found
+
+
+_USED = {
+    "geometry_msgs.msg": "Pose Point Quaternion PoseStamped Transform TransformStamped Twist Vector3",
+    "nav_msgs.msg": "Odometry",
+    "rosgraph_msgs.msg": "Clock",
+    "sensor_msgs.msg": "LaserScan",
+    "std_msgs.msg": "Header",
+    "std_srvs.srv": "Empty EmptyResponse",
+    "tf2_msgs.msg": "TFMessage",
+    "gazebo_msgs.msg": "ModelStates ModelState",
+    "integrator_chains_msgs.msg": "ProblemInstanceJSON",
+    "dubins_traffic_msgs.msg": "LabelStamped RoadNetworkJSON",
+    "dubins_traffic_msgs.srv": "MMode MModeResponse",
+}
+
+
+def _generated() -> Path:
+    """Return the folder with the Python packages of our messages, made unless it is there."""
+    genpy = ros("genpy")
+    key = hashlib.sha256(str(genpy.__file__).encode() + str(getattr(genpy, "__version__", "")).encode())
+    for file in definitions():
+        key.update(file.name.encode() + file.read_bytes())
+    folder = user_cache_path("dubins-traffic") / "ros1" / key.hexdigest()[:16]
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
+            write_python(Path(made) / "new")
+            with contextlib.suppress(OSError):  # another process was first, with the same content
+                (Path(made) / "new").rename(folder)
+    return folder
+
+
+def write_python(folder: Path) -> None:
+    """Write our messages as Python packages below `folder`.
+
+    Raises
+    ------
+    MissingRosError
+        If Debian's generator or the definitions that ours use are not installed.
+    """
+    generator, write_modules = ros("genpy.generator"), ros("genpy.generate_initpy").write_modules
+    search = _search_path()
+    for package in packages():
+        for kind, make in (("msg", generator.MsgGenerator), ("srv", generator.SrvGenerator)):
+            files = sorted(map(str, (DEFINITIONS / package / kind).glob("*." + kind)))
+            if not files:
+                continue
+            target = folder / package / kind
+            target.mkdir(parents=True, exist_ok=True)
+            if make().generate_messages(package, files, str(target), search):
+                raise DubinsTrafficError(f"genpy could not generate {package}")
+            write_modules(str(target))
+        (folder / package / "__init__.py").touch()
+
+
+def write_cpp(folder: Path) -> None:
+    """Write our messages as C++ headers below `folder`, for a compiler's -I.
+
+    Raises
+    ------
+    MissingRosError
+        If Debian's generator for C++ is not installed.
+    """
+    if not GENCPP.is_file():
+        raise MissingRosError("python3-gencpp")
+    include = [f"-I{name}:{path}" for name, paths in _search_path().items() for path in paths]
+    for file in definitions():
+        package = file.parent.parent.name
+        target = folder / package
+        target.mkdir(parents=True, exist_ok=True)
+        command = ["/usr/bin/python3", str(GENCPP), str(file), "-p", package, "-o", str(target), *include]
+        _run([*command, "-e", str(SHARE / "gencpp")])
+
+
+def _run(command: Sequence[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise DubinsTrafficError(f"{Path(command[1]).name} failed: {done.stderr.strip()[-500:]}")
+
+
+def _search_path() -> dict[str, list[str]]:
+    found = {name: [str(DEFINITIONS / name / "msg")] for name in packages()}
+    for name in NEEDED:
+        folder = SHARE / name / "msg"
+        if not folder.is_dir():
+            raise MissingRosError(f"ros-{name.replace('_', '-')}")
+        found[name] = [str(folder)]
+    return found

@@ -1,0 +1,114 @@
+"""A node of the ROS graph, which a process is once: joining, watching the master, leaving."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from threading import Event, Thread
+from time import sleep
+from typing import Any
+
+from dubins_traffic.errors import TransportError
+from dubins_traffic.transports.ros1.debian import ros
+from dubins_traffic.transports.ros1.master import answers
+
+NAME = "dubins_traffic_maestro"
+LOOK = 0.1
+"""Seconds between two looks at who is connected."""
+PING = 10
+"""Looks between two calls of the master."""
+GRACE = 0.5
+MISSED = 2
+"""Calls of the master in a row that may go unanswered, and one more."""
+
+
+def join(uri: str) -> Any:
+    """Make this process a node at the master `uri` and return rospy; once in the life of a process.
+
+    Raises
+    ------
+    TransportError
+        If nobody answers at `uri`, a maestro is there already, or this process is a node elsewhere.
+    MissingRosError
+        If rospy is not installed.
+    """
+    rospy = ros("rospy")
+    if rospy.core.is_initialized():
+        if rospy.is_shutdown() or os.environ.get("ROS_MASTER_URI") != uri:
+            raise TransportError("this process has been a ROS node before; rospy allows one in its life")
+        return rospy
+    if not answers(uri):
+        raise TransportError(
+            f"no ROS master answers at {uri}: start roscore, set ROS_MASTER_URI, or say --master"
+        )
+    os.environ["ROS_MASTER_URI"] = uri
+    taken = _node_at(uri)
+    if taken is not None and answers(taken):
+        raise TransportError(f"the ROS master at {uri} has a maestro already: /{NAME} at {taken}")
+    rospy.init_node(NAME, argv=[], disable_signals=True, disable_rosout=True)
+    return rospy
+
+
+def leave() -> None:
+    """Take this process out of the graph, if it is a node; it can't join again."""
+    rospy = sys.modules.get("rospy")
+    if rospy is not None and rospy.core.is_initialized():
+        rospy.signal_shutdown("the session is over")
+
+
+def abandon(rospy: Any, detail: str) -> None:
+    """Leave a graph whose master has gone.
+
+    A registration that is under way waits for the master until rospy is shut down, and the shutdown waits for it; so
+    it is let go first.
+    """
+    rospy.core._shutdown_flag = True
+    sleep(GRACE)
+    rospy.core._shutdown_flag = False
+    rospy.signal_shutdown(detail)
+
+
+def _node_at(uri: str) -> str | None:
+    rosgraph = ros("rosgraph")
+    try:
+        return str(rosgraph.Master(f"/{NAME}", master_uri=uri).lookupNode(f"/{NAME}"))
+    except rosgraph.MasterError:
+        return None
+
+
+class Watch:
+    """A thread that looks ten times a second at who is connected, and once a second whether the master lives.
+
+    Parameters
+    ----------
+    uri : str
+        The master's.
+    look : callable
+        Called at every look.
+    lost : callable
+        Called once, with a line of detail, when the master has gone.
+    """
+
+    def __init__(self, uri: str, look: Callable[[], None], lost: Callable[[str], None]) -> None:
+        self._uri, self._look, self._lost = uri, look, lost
+        self._over = Event()
+        self._thread = Thread(target=self._run, name="ros1", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._over.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        looks = missed = 0
+        while not self._over.wait(LOOK):
+            self._look()
+            looks += 1
+            if looks % PING:
+                continue
+            missed = 0 if answers(self._uri) else missed + 1
+            if missed >= MISSED:
+                self._lost(f"the ROS master at {self._uri} has gone")
+                return

@@ -1,0 +1,168 @@
+"""The interface of 2016 over ROS 1 as a `protocols.Transport`."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from time import time
+from typing import TYPE_CHECKING, Any
+from xmlrpc.client import Error as XmlRpcError
+
+from dubins_traffic.protocols import End, Ending, Mailbox, View
+from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.ros1.desk import Desk, Told
+from dubins_traffic.transports.ros1.messages import load
+from dubins_traffic.transports.ros1.node import Watch, abandon, join
+from dubins_traffic.transports.ros1.world import Topics, World
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+COMMANDS = "/{}/mobile_base/commands/velocity"
+
+
+class Ros1:
+    """Simulator, maestro and monitor of 2016 in this process.
+
+    Twists carry no tick: in lockstep a peer shall publish exactly one for each `/gazebo/model_states`, which is the
+    last message of a frame.
+
+    Parameters
+    ----------
+    uri : str
+        The ROS master's.
+    maestro : Maestro, optional
+        Who grants modes; without one trials start by themselves.
+    told : Told
+        The session, for parameters.
+    clock : bool
+        Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
+    rate : float
+        How many model states a second are published in real time, at least.
+    """
+
+    name = "ros1"
+    tagged = False
+
+    def __init__(
+        self,
+        uri: str,
+        *,
+        maestro: Maestro | None = None,
+        told: Told | None = None,
+        clock: bool = False,
+        rate: float = 120.0,
+    ) -> None:
+        self.interval = 1.0 / rate
+        self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
+        self._world: World | None = None
+        self._subscribers: dict[str, Any] = {}
+        self._there: set[str] = set()
+        self._open = self._lost = False
+        self._simulated = 0.0
+        self._shown = 0.0
+
+    def open(self, mailbox: Mailbox) -> None:
+        """Join the graph; TransportError or MissingRosError if that can't be."""
+        self._rospy = join(self._uri)
+        self._mailbox = mailbox
+        self._topics = Topics(self._rospy)
+        self._desk = Desk(self._rospy, mailbox, self._maestro, self._told)
+        self._watch = Watch(self._uri, self._look, self._lose)
+        self._open = True
+
+    def begin(self, instance: Instance, remote: Sequence[str]) -> None:
+        """Put up the topics of the instance's cars, and listen to those that are remote."""
+        with self._guarded():
+            self._topics.retain(instance.names)
+            self._world = World(self._topics, instance, clock=self._clock)
+            self._desk.describe(instance)
+            self._listen(remote)
+        self._simulated += self._shown
+        self._shown = 0.0
+
+    def announce(self, instance: Instance) -> None:
+        """Publish the problem instance."""
+        with self._guarded():
+            self._desk.announce(instance, self._stamp())
+
+    def frame(self, view: View) -> None:
+        """Publish a frame."""
+        self._publish(view, frame=True)
+
+    def stream(self, view: View) -> None:
+        """Publish what lies between two frames, or a world that stands still."""
+        self._publish(view, frame=False)
+
+    def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
+        """Publish the empty instance that ends a trial."""
+        with self._guarded():
+            self._desk.end(self._stamp())
+
+    def close(self) -> None:
+        """Take back what this session has put into the graph; the node itself stays until the process ends."""
+        if not self._open:
+            return
+        self._open = False
+        self._watch.close()
+        with self._guarded():
+            self._topics.close()
+            self._listen(())
+            self._desk.close()
+
+    def _listen(self, remote: Sequence[str]) -> None:
+        """Subscribe to the commands of the cars `remote`, and to no others."""
+        for car in [car for car in self._subscribers if car not in remote]:
+            self._subscribers.pop(car).unregister()
+            self._there.discard(car)
+        for car in remote:
+            if car not in self._subscribers:
+                self._subscribers[car] = self._rospy.Subscriber(
+                    COMMANDS.format(car), load().Twist, partial(self._heard, car), tcp_nodelay=True
+                )
+
+    @contextmanager
+    def _guarded(self) -> Generator[None]:
+        """Take failures of the graph for its loss."""
+        try:
+            yield
+        except (self._rospy.ROSException, XmlRpcError, OSError) as error:
+            if not self._lost:
+                self._lose(f"the ROS graph failed: {error}")
+
+    def _lose(self, detail: str) -> None:
+        """End all that is under way."""
+        self._lost = True
+        self._mailbox.stop(End.TRANSPORT_LOST, detail)
+        abandon(self._rospy, detail)
+
+    def _publish(self, view: View, *, frame: bool) -> None:
+        """Publish; simulated time goes on over all trials, and while the world is only shown."""
+        if view.running and view.time > 0.0:
+            self._shown = max(self._shown, view.time)
+        else:
+            self._simulated += self.interval
+        if self._world is not None and not self._lost:
+            with self._guarded():
+                self._world.publish(view, self._stamp(), frame=frame)
+
+    def _stamp(self) -> float:
+        return self._simulated + self._shown if self._clock else time()
+
+    def _heard(self, car: str, message: Any) -> None:
+        self._mailbox.command(car, message.linear.x, message.angular.z)
+
+    def _look(self) -> None:
+        """See who has come and who has gone. rospy keeps a lost connection, without a socket, to try again."""
+        for car, subscriber in list(self._subscribers.items()):
+            implementation = subscriber.impl
+            if implementation is None:
+                continue
+            there = any(connection.socket is not None for connection in implementation.connections)
+            if there and car not in self._there:
+                self._there.add(car)
+                self._mailbox.joined(car)
+            elif not there and car in self._there:
+                self._there.discard(car)
+                self._mailbox.left(car)

@@ -1,0 +1,15 @@
+from dubins_traffic.simulators.gazebo.simulator import Gazebo
+from tests.conformance.simulator import SimulatorConformance
+from tests.gazebo import installation
+
+
+class TestGazebo(SimulatorConformance):
+    """The bounds are those of docs/gazebo.md: wheels take a moment to reach a speed, contacts give way a little."""
+
+    position = 0.03
+    heading = 0.035
+    touch = 0.006
+
+    def make(self) -> Gazebo:
+        installation()
+        return Gazebo()

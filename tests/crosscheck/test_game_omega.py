@@ -1,0 +1,89 @@
+"""The winners of games of cells, as omega finds them with dd's BDDs, from formulas written apart from ours."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from math import factorial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks.synthesis import request
+
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.queues import EGO, OTHER, Scene
+from dubins_traffic.synthesis.solver import solve
+from tests.games import ALL, board
+from tests.tools import interpreter_with
+
+SCRIPT = Path(__file__).with_name("omega_game.py")
+KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
+PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
+
+
+def pan(others: int, assumed: str, goals: tuple[int, ...]) -> Board:
+    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
+    return Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)
+
+
+def asked(some: Board) -> Any:
+    ran = subprocess.run(
+        [interpreter_with("omega"), str(SCRIPT)],
+        input=json.dumps(request(some, lost=True)),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert ran.returncode == 0, ran.stderr[-2000:]
+    return json.loads(ran.stdout.strip().splitlines()[-1])
+
+
+def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
+    """Return the position of labelled cars, of which some are before others in one crossing."""
+    count = len(some.arena.nodes)
+    scenes: list[Scene] = []
+    for n, node in enumerate(some.arena.nodes):
+        inside = (OTHER if cells.index(n) else EGO) if n in cells else None
+        lanes = [count + lane for lane in node.inbound]
+        waiting = [car for car, cell in enumerate(cells) if cell in lanes]
+        if some.scenery(n).kind.ordered:
+            waiting = sorted(waiting, key=lambda car: sum((other, car) in before for other in waiting))
+        queue = [(lanes.index(cells[car]), OTHER if car else EGO) for car in waiting]
+        scenes.append(Scene(inside, tuple(queue if some.scenery(n).kind.ordered else sorted(queue))))
+    return some.number(scenes)
+
+
+@pytest.mark.parametrize(
+    "some",
+    [
+        board(2, 2, 1),
+        board(2, 2, 1, "E1,E2,E3,E5,E6"),
+        board(2, 2, 2),
+        board(2, 2, 2, KEEP_MOVING),
+        board(2, 2, 2, "E1,E2,E4,E5,E6"),
+        board(2, 2, 2, ALL, 3),
+        board(3, 4, 1),
+        board(3, 4, 1, "E1,E2,E4,E5,E6", 3),
+        pan(1, "E1,E2,E3,E5,E6", (0, 4)),
+        pan(1, "E1,E2,E3,E5,E6", (0, 3)),
+        pan(2, "E1,E2,E3,E5,E6", (0, 4)),
+        pan(2, "E1,E2,E3,E5", (0, 2)),
+        pan(2, ALL, (4,)),
+    ],
+    ids=lambda some: f"{some.arena.cells} cells, {some.others} cars, {some.assumption}",
+)
+def test_winners_are_those_of_omega(some: Board) -> None:
+    solution = solve(build(some))
+    found = asked(some)
+    labels = factorial(some.others)
+    assert found["valid"] == labels * some.positions
+    assert found["winning"] == labels * int(solution.winning.sum())
+    lost = {number(some, cells, {(i, j) for i, j in before}) for cells, before in found["lost"]}
+    assert lost == set(np.flatnonzero(~solution.winning).tolist())

@@ -1,0 +1,27 @@
+"""Games on grids, solved, for several tests."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.solver import Solution, solve
+
+ALL = "E1,E2,E3,E4,E5,E6"
+
+
+def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Board:
+    """Return the positions on a grid with goals at two opposite corners."""
+    network = RoadNetwork.grid(rows, columns)
+    arena = Arena.of(network, [0, len(network.intersections) - 1], order_degree)
+    return Board(arena, Assumption.parse(word for word in assumed.split(",") if word), others)
+
+
+@cache
+def solved(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Solution:
+    """Return who wins."""
+    return solve(build(board(rows, columns, others, assumed, order_degree)))

@@ -1,0 +1,84 @@
+"""A campaign on a real Ray cluster of several nodes: what is killed is run again, and nothing is counted twice."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from pyarrow import parquet
+
+from tests import ray_cluster
+from tests.campaigns import campaign, command, logged, run, succeed, written
+
+pytest.importorskip("ray")
+
+DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=24)
+TRIALS = 2 * 4 * 24
+BOUND = 60.0
+"""Seconds within which a cluster must have begun, and one that is lost must have been told."""
+
+
+def wait_for(folder: Path, trials: int, process: subprocess.Popen[str]) -> None:
+    """Wait until `Slow` has begun so many trials."""
+    begun = time.monotonic()
+    while logged(folder) < trials:
+        assert time.monotonic() - begun < BOUND
+        assert process.poll() is None
+        time.sleep(0.02)
+
+
+def test_workers_nodes_and_the_head_are_killed(tmp_path: Path) -> None:
+    plain, many, lost = (tmp_path / name for name in ("plain", "many", "lost"))
+    for folder in (plain, many, lost):
+        folder.mkdir()
+    table = succeed(written(plain, DOCUMENT), plain / "out")
+    with ray_cluster.running() as cluster:
+        ray = ("--ray", cluster.address)
+        file = written(many, DOCUMENT)
+        with subprocess.Popen(command(file, many / "out", *ray), text=True) as process:
+            wait_for(many, 10, process)
+            os.kill(int((many / "log").read_text().split()[-1]), signal.SIGKILL)
+            wait_for(many, 30, process)
+            cluster.kill_node()
+            assert process.wait(timeout=120) == 0
+        assert (many / "out" / "results.parquet").read_bytes() == table
+        assert len(set((many / "log").read_text().split())) >= ray_cluster.NODES
+
+        file = written(lost, DOCUMENT)
+        with subprocess.Popen(
+            command(file, lost / "out", *ray), stderr=subprocess.PIPE, text=True
+        ) as process:
+            wait_for(lost, 20, process)
+            cluster.kill_head()
+            killed = time.monotonic()
+            _, told = process.communicate(timeout=120)
+        assert time.monotonic() - killed < BOUND
+        assert process.returncode == 1
+        assert f"the Ray cluster at {cluster.address} is lost" in told
+        assert f"of {TRIALS} trials are kept, --resume goes on" in told
+    kept, begun = finished(lost / "out"), logged(lost)
+    assert kept < TRIALS
+    assert succeed(file, lost / "out", "--resume") == table
+    assert logged(lost) - begun <= TRIALS - kept
+
+
+def finished(out: Path) -> int:
+    return sum(parquet.read_metadata(part).num_rows for part in (out / "parts").glob("[0-9]*.parquet"))
+
+
+def test_a_cluster_of_its_own_ends_with_the_campaign(tmp_path: Path) -> None:
+    small = campaign(
+        controllers=["controllers.py:Faulty", "simple"], trials=5, factors={"duration": [1.0]}, seed=0
+    )
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.mkdir()
+    two.mkdir()
+    first = run(written(one, small), one / "out")
+    second = run(written(two, small), two / "out", "--ray", "local", "--workers", "2")
+    assert first.returncode == second.returncode == 1
+    assert "crashed" in parquet.read_table(one / "out" / "results.parquet")["end"].to_pylist()
+    assert (one / "out" / "results.parquet").read_bytes() == (two / "out" / "results.parquet").read_bytes()

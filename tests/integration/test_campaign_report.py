@@ -1,0 +1,137 @@
+"""The report of a campaign: its numbers, its bytes, and its page in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import statistics
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyarrow import parquet
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+
+from dubins_traffic.campaign.conduct import run_campaign
+from dubins_traffic.campaign.report.write import write_report
+from dubins_traffic.cli.main import main
+from dubins_traffic.errors import InputError
+from tests.campaigns import campaign, written
+from tests.integration.test_replay_page import CHROMIUM, DRIVER, FLAGS
+
+TEN = {
+    "version": 1,
+    "problem_domain": "dubins_traffic",
+    "network": {"grid": {"rows": 2, "columns": 3}},
+    "e-agents": [{"type": "lawful"}],
+    "rules": True,
+    "duration": 10.0,
+}
+DOCUMENT = campaign(
+    name="<b>two & <i>two",
+    controllers=["lanes", "simple"],
+    configurations=[{"name": "ten", "document": TEN}],
+    trials=6,
+    factors={"e_agents": [1, 3]},
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign that has been run, with its report."""
+    place = tmp_path_factory.mktemp("campaign")
+    run_campaign(written(place, DOCUMENT), place / "out", workers=2)
+    write_report(place / "out", worst=1)
+    return place / "out"
+
+
+def rows(folder: Path) -> list[dict[str, Any]]:
+    return parquet.read_table(folder / "results.parquet").to_pylist()
+
+
+def sheet(folder: Path, name: str) -> list[dict[str, str]]:
+    with (folder / "report" / name).open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> None:
+    own = {name: [row for row in rows(folder) if row["controller"] == name] for name in ("lanes", "simple")}
+    for line in sheet(folder, "controllers.csv"):
+        values = [
+            float(row[line["metric"]]) for row in own[line["controller"]] if row[line["metric"]] is not None
+        ]
+        assert int(line["count"]) == len(values)
+        assert float(line["mean"]) == pytest.approx(statistics.fmean(values))
+        assert float(line["median"]) == pytest.approx(statistics.median(values))
+        assert float(line["mean_low"]) <= float(line["mean"]) <= float(line["mean_high"])
+    for line in sheet(folder, "differences.csv"):
+        metric = line["metric"]
+        pairs = [
+            float(one[metric]) - float(other[metric])
+            for one in own["lanes"]
+            for other in own["simple"]
+            if (one["cell"], one["trial"]) == (other["cell"], other["trial"]) and one[metric] is not None
+        ]
+        assert float(line["mean"]) == pytest.approx(statistics.fmean(pairs))
+        assert int(line["first_larger"]) == sum(value > 0 for value in pairs)
+    judged = [line for line in sheet(folder, "shares.csv") if line["of_what"] == "verdict"]
+    for line in judged:
+        verdicts = [row["verdict"] for row in own[line["controller"]]]
+        assert (int(line["count"]), int(line["of"])) == (verdicts.count(line["which"]), 12)
+    assert {line["which"] for line in judged} == {"satisfied", "violated", "excused", "unfinished"}
+
+
+def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    write_report(folder, tmp_path, worst=1)
+    first = {path.relative_to(folder / "report"): path for path in (folder / "report").rglob("*.*")}
+    assert {path.relative_to(tmp_path) for path in tmp_path.rglob("*.*")} == set(first)
+    assert sum(path.parts[0] == "replays" for path in first) == 2
+    for name, path in first.items():
+        assert (tmp_path / name).read_bytes() == path.read_bytes(), name
+
+
+@pytest.mark.skipif(
+    (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true", reason="needs chromium"
+)
+def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
+    browser.get((folder / "report" / "index.html").as_uri())
+    assert browser.title == DOCUMENT["name"]
+    assert browser.find_element(By.TAG_NAME, "h1").text == DOCUMENT["name"]
+    sizes = browser.execute_script("return [...document.images].map(image => image.naturalWidth)")
+    assert len(sizes) > 10
+    assert min(sizes) > 100
+    width = browser.execute_script("return [document.body.scrollWidth, innerWidth]")
+    assert width[0] <= width[1]
+    links = [link.get_attribute("href") for link in browser.find_elements(By.LINK_TEXT, "replay")]
+    assert len(links) == 2
+    browser.get(str(links[0]))
+    assert "Trial" in browser.title
+    assert browser.get_log("browser") == []
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+def test_a_report_in_the_terminal(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "0", "--wall"]) == 0
+    told = capsys.readouterr().out
+    assert "24 of 24 trials" in told
+    assert "time to" in told
+    assert not (tmp_path / "r" / "replays").exists()
+
+
+def test_a_folder_without_a_campaign(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no campaign; expected the folder of a campaign"):
+        write_report(tmp_path)

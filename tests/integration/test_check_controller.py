@@ -1,0 +1,131 @@
+"""`dubins-traffic check-controller` on controllers with one fault each."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dubins_traffic.campaign import checkup
+from dubins_traffic.campaign.checkup import Checkup, check_controller
+from dubins_traffic.campaign.course import course
+from dubins_traffic.cli.main import main
+from dubins_traffic.roads.network import RoadNetwork
+
+ROOT = Path(__file__).resolve().parents[2]
+
+FAULTY = """
+import math, os, time
+
+class Good:
+    def start(self, problem): ...
+    def act(self, observation):
+        return 0.3, 0.1
+
+class Undetermined(Good):
+    def act(self, observation):
+        return 0.3, 0.1 * (hash("word") % 1000) / 1000
+
+class Everything(Good):
+    def start(self, problem):
+        self.goals = len(problem.goals)
+        if len(problem.network.segments) == 1:
+            raise ValueError("no way")
+    def act(self, observation):
+        if self.goals == 1 and observation.tick == 9:
+            return math.nan, 0.0
+        if self.goals == 4:
+            time.sleep(0.04 if observation.tick < 30 else 0.0)
+            return 7.0, 0.0
+        return 0.3, 0.0
+    def close(self):
+        raise OSError("can't close")
+
+class Deadly(Good):
+    def act(self, observation):
+        if observation.tick == 20:
+            os._exit(3)
+        return 0.3, 0.0
+"""
+
+
+@pytest.fixture
+def faulty(tmp_path: Path) -> str:
+    (tmp_path / "mine.py").write_text(FAULTY)
+    return str(tmp_path / "mine.py")
+
+
+def verdicts(found: Checkup) -> dict[str, bool]:
+    return {finding.check: finding.passed for finding in found.findings}
+
+
+def test_the_course_is_odd() -> None:
+    instances = course()
+    networks: list[RoadNetwork] = [instance.problem.network for instance in instances.values()]
+    assert any(network.transform[2] != 0.0 for network in networks)
+    assert any(min(network.degrees) == 1 and len(network.segments) > 1 for network in networks)
+    assert {len(instance.problem.goals) for instance in instances.values()} == {1, 2, 3, 4}
+    assert any(not instance.e_agents for instance in instances.values())
+
+
+def test_a_good_controller_passes(faulty: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-controller", f"{faulty}:Good", "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert found["passed"]
+    assert [check["passed"] for check in found["checks"]] == [True] * 7
+    assert sum(row["answers"] for row in found["histogram"]) == found["latency_s"]["count"] == 7 * 150
+
+
+def test_each_fault_is_named(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Everything")
+    assert verdicts(found) == {
+        "starts": False,
+        "survives odd instances": False,
+        "answers in time": False,
+        "finite commands": False,
+        "commands within bounds": False,
+        "deterministic": True,
+        "ends cleanly": False,
+    }
+    details = " ".join(finding.detail for finding in found.findings)
+    for word in ("no way", "one goal", "tick 9", "7 m/s", "can't close", "30 of"):
+        assert word in details, details
+
+
+def test_what_differs_from_run_to_run_is_found(faulty: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-controller", f"{faulty}:Undetermined"]) == 1
+    out = capsys.readouterr().out
+    assert "FAILED deterministic" in out
+    assert out.count("FAILED") == 1
+
+
+def test_a_controller_that_kills_its_process(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Deadly")
+    assert not verdicts(found)["survives odd instances"]
+    assert any("status 3" in finding.detail for finding in found.findings)
+
+
+def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("lcm")
+    command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
+    assert main(["check-controller", command, "--over", "lcm"]) == 0
+    assert capsys.readouterr().out.count("ok ") == 7
+
+
+def test_over_lcm_a_program_that_ends_at_once() -> None:
+    pytest.importorskip("lcm")
+    found = check_controller("false", "lcm")
+    assert not found.passed
+    assert "ended with status 1" in found.findings[0].detail
+
+
+@pytest.mark.parametrize("arguments", [["nobody"], ["no-such-program-here", "--over", "lcm"]])
+def test_no_such_controller(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-controller", *arguments]) == 2
+    assert arguments[0] in capsys.readouterr().err
+
+
+def test_the_histogram_counts_every_answer_once() -> None:
+    rows = checkup._histogram([0.00005, 0.0001, 0.02, 5.0], (1e-4, 1e-2, 0.033))
+    assert rows == ((1e-4, 2), (1e-2, 0), (0.033, 1), (None, 1))

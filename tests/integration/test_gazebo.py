@@ -1,0 +1,270 @@
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dubins_traffic as dt
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.cars.body import Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
+from dubins_traffic.cars.sensing import scan
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.protocols import End
+from dubins_traffic.record.reader import replay
+from dubins_traffic.scoring.score import Scorer
+from dubins_traffic.simulators.gazebo import prefix
+from dubins_traffic.simulators.gazebo.simulator import Gazebo
+from tests.batches import pose, scene
+from tests.gazebo import installation
+from tests.recordings import make_instance
+
+PROGRAM = [sys.executable, "-m", "dubins_traffic.cli"]
+WANDERERS = {
+    "version": 1,
+    "problem_domain": "dubins_traffic",
+    "network": {"grid": {"rows": 3, "columns": 4}},
+    "e-agents": [{"type": "wander", "name": "agent", "count": 3}],
+    "duration": 60,
+    "number_goals_bounds": [2, 2],
+    "rules": True,
+}
+
+
+@pytest.fixture(autouse=True)
+def installed() -> Iterator[None]:
+    """Gazebo is there, and no server is left when the test is over."""
+    installation()
+    yield
+    assert servers_of(os.getpid()) == []
+
+
+def servers_of(parent: int) -> list[int]:
+    """Return the gzservers that the process `parent` has started, whoever their parent is now."""
+    mark = f"DUBINS_TRAFFIC_GAZEBO_PARENT={parent}\0".encode()
+    found: list[int] = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (folder / "environ").read_bytes() and b"gzserver" in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found
+
+
+def gone_within(seconds: float, parent: int) -> bool:
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        if not servers_of(parent):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def command(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    around = {key: value for key, value in os.environ.items() if key != "DISPLAY"} | environment
+    return subprocess.run(
+        [*PROGRAM, *arguments], capture_output=True, text=True, timeout=120, check=False, env=around
+    )
+
+
+class Meddler:
+    """A controller that drives on and at a tick does something to the server."""
+
+    def __init__(self, simulator: Gazebo, act: Callable[[int], object]) -> None:
+        self.simulator, self.meddle = simulator, act
+
+    def start(self, problem: dt.Problem) -> None:
+        self.problem = problem
+
+    def act(self, observation: dt.Observation) -> tuple[float, float]:
+        assert self.simulator.server is not None
+        if observation.tick == 30:
+            self.meddle(self.simulator.server.process.pid)
+        return 0.3, 0.0
+
+
+def test_a_trial_on_wheels_is_scored_replayed_and_the_same_again(tmp_path: Path) -> None:
+    instance = dt.draw(dt.load_config(WANDERERS), 3, 0)
+    embedded = run_trial(instance)
+    twice = [tmp_path / "one.mcap", tmp_path / "two.mcap"]
+    results = [run_trial(replace(instance, simulator="gazebo"), record=path) for path in twice]
+    assert twice[0].read_bytes() == twice[1].read_bytes()
+    score = results[0].score
+    assert results[0].ending.end is End.DURATION
+    assert abs(score.rounds - embedded.score.rounds) <= 1
+    record = dt.load_record(twice[0])
+    assert record.instance.simulator == "gazebo"
+    again = Scorer()
+    replay(record, [again])
+    assert again.result(controller="lanes", record=twice[0], wall=results[0].wall) == score
+
+
+@pytest.mark.parametrize(
+    ("sign", "why"), [(signal.SIGKILL, "ended by SIGKILL"), (signal.SIGSTOP, "not answered for 1 s")]
+)
+def test_a_server_that_dies_or_hangs_ends_its_trial_by_name(sign: int, why: str) -> None:
+    simulator = Gazebo(patience=1.0)
+    meddler = Meddler(simulator, lambda pid: os.kill(pid, sign))
+    result = run_trial(make_instance(names=("agent0",)), meddler, simulator=simulator)
+    assert result.ending.end is End.WORLD_LOST
+    assert why in result.ending.detail
+    assert 29 <= result.ending.ticks <= 31
+
+
+def test_a_port_in_use_is_named() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port is in use: got {port}"):
+            Gazebo(port=port).reset([scene([pose(0, 0)])])
+
+
+def test_it_listens_on_the_loopback_interface_only() -> None:
+    simulator = Gazebo()
+    simulator.reset([scene([pose(0, 0)])])
+    assert simulator.server is not None
+    folder = Path(f"/proc/{simulator.server.process.pid}")
+    own = {str(file.readlink()) for file in (folder / "fd").iterdir() if file.is_symlink()}
+    rows = [line.split() for line in (folder / "net" / "tcp").read_text().splitlines()[1:]]
+    listening = [row[1] for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own]
+    simulator.close()
+    assert listening
+    assert all(address.startswith("0100007F:") for address in listening)
+
+
+def a_prefix(folder: Path) -> prefix.Installation:
+    """Return another prefix with the same Gazebo."""
+    found = installation()
+    prefix.write_manifest(folder, found.gzserver, own=found.root is None, version="11")
+    if found.root is not None:
+        (folder / "root").symlink_to(found.root)
+    return prefix.Installation(folder, found.gzserver, found.root)
+
+
+def test_a_plugin_that_is_missing_or_broken(tmp_path: Path) -> None:
+    other = a_prefix(tmp_path)
+    with pytest.raises(InputError, match="plugin has gone"):
+        Gazebo(tmp_path)
+    other.plugin.parent.mkdir()
+    other.plugin.write_bytes(b"no library")
+    other.confinement.symlink_to(installation().confinement)
+    with pytest.raises(InputError, match="can't be started"):
+        Gazebo(tmp_path).reset([scene([pose(0, 0)])])
+
+
+def test_half_an_installation(tmp_path: Path) -> None:
+    (tmp_path / "apt").mkdir()
+    done = command("run", "demo", "--simulator", "gazebo", DUBINS_TRAFFIC_GAZEBO=str(tmp_path))
+    assert done.returncode == 2
+    assert "was not finished" in done.stderr
+    assert "gazebo install" in done.stderr
+    doctor = command("gazebo", "doctor", "--prefix", str(tmp_path))
+    assert doctor.returncode == 1
+    assert "BAD  installation" in doctor.stdout
+
+
+def test_no_room_to_write(tmp_path: Path) -> None:
+    run = ["1", *PROGRAM, "run", "demo", "--simulator", "gazebo"]
+    install = ["0", *PROGRAM, "gazebo", "install", "--prefix", str(tmp_path)]
+    for words in (run, install):
+        full = ["bash", "-c", 'ulimit -f "$1" && shift && exec "$@"', "full", *words]
+        done = subprocess.run(full, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 2, done.stderr
+        assert "File too large" in done.stderr
+
+
+def test_no_display() -> None:
+    done = command("run", "demo", "--simulator", "gazebo", "--gui")
+    assert done.returncode == 2
+    assert "no display" in done.stderr
+
+
+def test_a_killed_run_leaves_no_server(tmp_path: Path) -> None:
+    file = tmp_path / "long.json"
+    file.write_text(json.dumps(WANDERERS | {"duration": 3600, "rules": False}))
+    run = subprocess.Popen([*PROGRAM, "run", str(file), "--simulator", "gazebo"], stdout=subprocess.DEVNULL)
+    while not servers_of(run.pid) and run.poll() is None:
+        time.sleep(0.05)
+    run.kill()
+    run.wait()
+    assert gone_within(5.0, run.pid)
+
+
+def test_two_workers_make_the_records_of_one(tmp_path: Path) -> None:
+    file = tmp_path / "short.json"
+    file.write_text(json.dumps(WANDERERS | {"duration": 4, "simulator": "gazebo"}))
+    for jobs in ("1", "2"):
+        done = command("run", str(file), "--trials", "2", "--jobs", jobs, "--records", str(tmp_path / jobs))
+        assert done.returncode == 0, done.stderr
+    for name in ("trial-0000.mcap", "trial-0001.mcap"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+@pytest.mark.parametrize("body", [Disc(), Rectangle(0.5, 0.3)])
+def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> None:
+    wall = PolygonObstacle(((1.5, -1.0), (2.5, -1.0), (2.5, 2.0), (2.0, 0.0), (1.5, 1.0)))
+    starts = [pose(0, 0), pose(1, 3, 1.0), pose(-1, 2, 0.5)]
+    one = scene(starts, Car(body=body), [DiscObstacle(0, -2, 0.5), wall])
+    rays = np.array([sincos(float(angle)) for angle in np.linspace(-3.0, 3.0, 200)])
+    simulator = Gazebo()
+    state = simulator.reset([one])
+    seen = simulator.scan(0, rays, 5.0)
+    expected = np.zeros(200)
+    scan(
+        state,
+        0,
+        0,
+        pack_cars([one.problem.car]),
+        pack_obstacles([one.problem.obstacles]),
+        rays,
+        0,
+        5,
+        expected,
+    )
+    contacts = [
+        contact
+        for _ in range(120)
+        for contact in simulator.step(np.array([[[0.5, 0.0], [0.0, 0.0], [0.0, 0.0]]]))[0]
+    ]
+    simulator.close()
+    assert np.minimum(expected, 5.0) == pytest.approx(seen, abs=0.003)  # a sharp corner is a wall thick
+    (contact,) = contacts
+    assert (contact.car, contact.other) == (0, -2)
+    assert contact.x == pytest.approx(1.5, abs=0.01)
+    assert (contact.nx, contact.ny) == pytest.approx((1.0, 0.0), abs=0.02)
+    assert contact.closing == pytest.approx((0.5, 0.0), abs=0.01)
+    assert contact.moved == (True, False)
+
+
+def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
+    network = tmp_path / "net.json"
+    network.write_text(dt.RoadNetwork.grid(2, 3).to_json())
+    for version in ("1.6", "1.9"):
+        world = tmp_path / f"{version}.sdf"
+        assert command("convert", str(network), "-o", str(world), "--sdf", version).returncode == 0
+        assert world.read_text().count('<visual name="surface">') == 7
+    found = installation()
+    check = [str(found.gzserver.with_name("gz")), "sdf", "-k", str(tmp_path / "1.6.sdf")]
+    old = subprocess.run(
+        check, capture_output=True, text=True, env=os.environ | found.environment(), check=True, timeout=60
+    )
+    assert "Check complete" in old.stdout
+    ask = "import ctypes,sys; ctypes.CDLL('libsdformat12.so.12').cmdCheck(sys.argv[1].encode())"
+    new = subprocess.run(
+        [sys.executable, "-c", ask, str(tmp_path / "1.9.sdf")], capture_output=True, text=True, check=False
+    )
+    if "cannot open shared object" in new.stderr and os.environ.get("CI") != "true":
+        pytest.skip("libsdformat12 is not here: scripts/gazebo.sh installs it")
+    assert new.stdout.strip() == "Valid."
+    assert new.returncode == 0, new.stderr

@@ -1,0 +1,156 @@
+"""`dubins-traffic lcm run` with programs of users: in Python, in C, killed, stopped, flooding."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("lcm")
+
+import lcm as library
+
+import dubins_traffic as dt
+from tests.conformance.test_lcm import free_url
+from tests.conformance.transport import frames
+from tests.tools import program
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
+PYTHON = [sys.executable, str(ROOT / "examples" / "lcm" / "controller.py")]
+
+
+@pytest.fixture(autouse=True)
+def url(monkeypatch: pytest.MonkeyPatch) -> str:
+    made = free_url()
+    monkeypatch.setenv("LCM_DEFAULT_URL", made)
+    return made
+
+
+@contextmanager
+def running(*command: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a program; it is gone afterwards, whatever happens."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGCONT)
+            process.kill()
+        process.communicate(timeout=20)
+
+
+def ended(process: subprocess.Popen[str], seconds: float = 60.0) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=seconds)
+    return process.returncode, out, err
+
+
+def lcm_run(*options: str) -> tuple[str, ...]:
+    return (COMMAND, "lcm", "run", "demo", "--seed", "1", *options)
+
+
+@pytest.fixture(scope="module")
+def in_c(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The example in C, built with the library that the wheel brings."""
+    folder, site = tmp_path_factory.mktemp("c"), Path(library.__file__).parents[1]
+    generate = str(Path(sys.executable).with_name("lcm-gen"))
+    subprocess.run([COMMAND, "lcm", "messages", "-o", "messages.lcm"], cwd=folder, check=True)
+    subprocess.run([generate, "-c", "messages.lcm"], cwd=folder, check=True)
+    sources = [str(ROOT / "examples" / "lcm" / "controller.c"), *map(str, folder.glob("*.c"))]
+    places = [f"-I{folder}", f"-I{site}/include", f"-L{site}/lib", f"-Wl,-rpath,{site}/lib"]
+    compiler = [program("gcc"), "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter"]
+    built = folder / "controller"
+    subprocess.run([*compiler, "-o", built, *sources, *places, "-llcm", "-lm"], check=True)
+    return str(built)
+
+
+def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Path) -> None:
+    made: list[list[bytes]] = []
+    for name, command, options in (
+        ("python", PYTHON, ("--lockstep",)),
+        ("c", [in_c], ("--lockstep", "--wait")),
+    ):
+        folder = tmp_path / name
+        with running(*command) as peer:
+            time.sleep(0.3)
+            with running(*lcm_run(*options, "--trials", "2", "--records", str(folder), "--json")) as session:
+                status, out, _ = ended(session)
+            peer.send_signal(signal.SIGINT)
+            assert ended(peer)[0] == 0
+        assert status == 0
+        assert [score["end"] for score in json.loads(out)["trials"]] == ["duration"] * 2
+        made.append([frames(path) for path in sorted(folder.glob("*.mcap"))])
+        record = dt.load_record(folder / "trial-0000.mcap")
+        assert record.controller == "lcm"
+    assert made[0] == made[1]
+    assert len(made[0]) == 2
+
+
+@pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_controller_killed_or_stopped_ends_its_trial_only(fault: signal.Signals) -> None:
+    with running(*PYTHON) as peer, running(*lcm_run("--silence", "0.7", "--trials", "1", "--json")) as session:
+        wait_for_commands()
+        peer.send_signal(fault)
+        status, out, err = ended(session)
+    assert status == 1
+    assert "peer_silent: no command for 0.7 s" in err
+    assert json.loads(out)["trials"][0]["end"] == "peer_silent"
+
+
+def wait_for_commands() -> None:
+    """Return when the ego is being driven."""
+    ears = library.LCM(os.environ["LCM_DEFAULT_URL"])
+    heard: list[str] = []
+    ears.subscribe("TRAFFIC_COMMAND_ego", lambda channel, _: heard.append(channel))
+    until = time.monotonic() + 30
+    while not heard and time.monotonic() < until:
+        ears.handle_timeout(200)
+    assert heard
+
+
+def test_a_flood_at_ten_kilohertz() -> None:
+    with running(*PYTHON), running(*lcm_run("--trials", "1")) as session:
+        wait_for_commands()
+        mouth, heard = library.LCM(os.environ["LCM_DEFAULT_URL"]), []
+        mouth.subscribe("TRAFFIC_COMMAND_ego", lambda _, data: heard.append(data))
+        while not heard:
+            mouth.handle_timeout(200)
+        until = time.monotonic() + 10
+        while session.poll() is None and time.monotonic() < until:
+            for _ in range(10):
+                mouth.publish("TRAFFIC_COMMAND_ego", heard[0])
+            time.sleep(0.001)
+        status, _, err = ended(session)
+    assert status == 1
+    assert "peer_flood" in err
+
+
+def test_a_second_session_and_an_interrupted_one() -> None:
+    with running(*lcm_run("--wait")) as first:
+        ears, heard = library.LCM(os.environ["LCM_DEFAULT_URL"]), []
+        ears.subscribe("TRAFFIC_WORLD", lambda channel, _: heard.append(channel))
+        while not heard:
+            assert ears.handle_timeout(30_000) > 0
+        with running(*lcm_run("--wait")) as second:
+            status, _, err = ended(second)
+        assert status == 2
+        assert "another session is running" in err
+        first.send_signal(signal.SIGINT)
+        status, _, err = ended(first)
+    assert status == 1
+    assert "interrupted after 0 trials" in err
+
+
+def test_the_messages_can_be_had(tmp_path: Path) -> None:
+    file = tmp_path / "messages.lcm"
+    subprocess.run([COMMAND, "lcm", "messages", "-o", file], check=True)
+    shipped = ROOT / "src/dubins_traffic/transports/lcm/dubins_traffic_lcm.lcm"
+    assert file.read_text() == shipped.read_text()
+    assert shutil.which("lcm-gen", path=str(Path(sys.executable).parent)) is not None

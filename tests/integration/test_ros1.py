@@ -1,0 +1,263 @@
+"""The ROS 1 interface of 2016 with a real roscore, and programs that know names and types alone."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import dubins_traffic as dt
+from dubins_traffic.campaign.sessions import rehearse
+from dubins_traffic.controllers.scripted import Scripted
+from dubins_traffic.record.sink import End
+from dubins_traffic.transports.ros1.master import pid_at
+from dubins_traffic.transports.ros1.messages import MD5, load
+from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Compile beforehand what trials need, so that nobody waits for it in vain."""
+    rehearse(dt.draw(dt.load_config("demo")))
+
+
+@pytest.fixture
+def ros(tmp_path: Path) -> Iterator[Graph]:
+    need_ros()
+    with graph(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def nodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The C++ examples, built with g++ against Debian's roscpp."""
+    need_ros()
+    folder = tmp_path_factory.mktemp("nodes")
+    messages = [
+        sys.executable,
+        "-m",
+        "dubins_traffic.cli",
+        "ros1",
+        "messages",
+        str(folder / "include"),
+        "--cpp",
+    ]
+    subprocess.run(messages, check=True, capture_output=True)
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True
+    )
+    builds = []
+    for name in ("controller", "wander"):
+        source = ROOT / "examples" / "ros1" / f"{name}.cpp"
+        command = [
+            "g++",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-isystem",
+            folder / "include",
+            source,
+            "-o",
+            folder / name,
+        ]
+        builds.append(subprocess.Popen([*command, *flags.stdout.split()]))
+    assert [build.wait(120) for build in builds] == [0, 0]
+    return folder
+
+
+def ends(folder: Path) -> dict[str, End | None]:
+    found = {path.stem: dt.load_record(path).ending for path in sorted(folder.glob("*.mcap"))}
+    return {name: None if ending is None else ending.end for name, ending in found.items()}
+
+
+def test_message_sums_are_those_of_2016() -> None:
+    need_ros()
+    messages = load()
+    assert {kind: getattr(messages, kind.partition("/")[2])._md5sum for kind in MD5} == dict(MD5)
+
+
+def test_a_python_client_goes_through_trials_resets_and_restarts(ros: Graph, tmp_path: Path) -> None:
+    records = tmp_path / "out"
+    config = configuration(tmp_path, duration=1.5)
+    session = ros.session(config, "--records", records, "-f", tmp_path / "data.json")
+    client = ros.client("drive", "reset:10", "restart:10", "drive")
+    status, out, err = finish(client)
+    assert status == 0, err
+    seen = lines(out)
+    status, out, err = finish(session)
+    assert status == 0, err
+    assert [(each["started"], each["again"], each["last"]) for each in seen] == [(True, False, "")] * 4
+    assert not any(each["refused"] for each in seen)
+    assert ends(records) == {
+        "trial-0000": End.DURATION,
+        "trial-0001": End.RESET,
+        "trial-0002": End.RESET,
+        "trial-0002-1": End.DURATION,
+    }
+    assert seen[0]["problem"].keys() == {"version", "goals", "rnd", "intersection_radius"}
+    assert seen[2]["problem"] == seen[3]["problem"] != seen[1]["problem"]
+    assert seen[0]["names"] == ["ego", "agent0", "agent1"]
+    assert sum("_s_" in label for label in seen[0]["labels"]) == 3
+    assert seen[0]["states"] >= 1.5 * 100
+    assert seen[0]["odometry"] >= 1.5 * 25
+    assert seen[0]["scans"] >= 10
+    data = json.loads((tmp_path / "data.json").read_text())
+    assert len(data["instances"]) == 4
+
+
+def test_programs_in_cpp_drive_the_ego_and_an_e_agent(ros: Graph, tmp_path: Path, nodes: Path) -> None:
+    records, roads = tmp_path / "out", tmp_path / "roads.json"
+    config = configuration(tmp_path, duration=3.0)
+    roads.write_text(json.dumps(json.loads(config.read_text())["rnd"]))
+    session = ros.session(config, "--remote", "agent0", "--records", records)
+    ros.start([nodes / "wander", roads, "cmd_vel:=mobile_base/commands/velocity"], ROS_NAMESPACE="agent0")
+    controller = ros.start([nodes / "controller", "__ns:=ego"])
+    status, out, err = finish(session, 60)
+    assert status == 0, err
+    assert finish(controller)[0] == 0
+    assert ends(records) == dict.fromkeys(("trial-0000", "trial-0001", "trial-0002"), End.DURATION)
+    frames = dt.load_record(records / "trial-0000.mcap").frames
+    for car in (0, 1):
+        assert abs(frames.command_speed[:, car]).sum() + abs(frames.command_yaw_rate[:, car]).sum() > 5
+    header = dt.load_record(records / "trial-0000.mcap").instance
+    assert [agent.kind for agent in header.e_agents] == ["remote", "wander"]
+    assert [row["end"] for row in json.loads(out)["trials"]] == ["duration"] * 3
+
+
+def test_lockstep_over_ros_gives_the_frames_of_the_process(ros: Graph, tmp_path: Path) -> None:
+    records = tmp_path / "out"
+    config = configuration(tmp_path, duration=6.0, number_trials=1)
+    session = ros.session(config, "--lockstep", "--records", records)
+    client = ros.client("drive")
+    assert finish(session)[0] == 0
+    assert finish(client)[0] == 0
+    over = dt.load_record(records / "trial-0000.mcap")
+    here = tmp_path / "here.mcap"
+    dt.run_trial(over.instance, f"{ROOT}/tests/smooth.py:Smooth", record=here)
+    frames, expected = over.frames, dt.load_record(here).frames
+    assert len(frames) == len(expected) == 181
+    assert max(abs(frames.x - expected.x).max(), abs(frames.y - expected.y).max()) <= 1e-6
+    assert abs(frames.c * expected.s - frames.s * expected.c).max() <= 1e-6
+    again = tmp_path / "again.mcap"
+    dt.run_trial(over.instance, Scripted.of(over), record=again)
+    replayed = dt.load_record(again).frames
+    for column in ("x", "y", "c", "s", "speed", "yaw_rate", "command_speed", "command_yaw_rate"):
+        assert getattr(replayed, column).tobytes() == getattr(frames, column).tobytes()
+
+
+def test_faulty_clients_end_their_trials_and_the_session_goes_on(ros: Graph, tmp_path: Path) -> None:
+    records = tmp_path / "out"
+    config = configuration(tmp_path, duration=30.0, number_trials=5)
+    session = ros.session(config, "--records", records, "--silence", "1.5")
+    for number, action in enumerate(("die:5", "stop:5", "flood:5", "nan:5")):
+        client = ros.client(action)
+        _wait_for_end(records, number)
+        os.killpg(client.pid, signal.SIGKILL)
+        finish(client)
+    finish(ros.client("reset:5"))
+    status, _, err = finish(session)
+    assert status == 1, err
+    assert list(ends(records).values()) == [
+        End.PEER_LOST,
+        End.PEER_SILENT,
+        End.PEER_FLOOD,
+        End.CONTROLLER_FAULT,
+        End.RESET,
+    ]
+
+
+def _wait_for_end(records: Path, number: int) -> None:
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        path = records / f"trial-{number:04d}.wall.json"
+        if path.exists():
+            return
+        time.sleep(0.05)
+    pytest.fail("the trial does not end")
+
+
+def test_a_master_that_is_killed_ends_the_session(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        records = tmp_path / "out"
+        session = ros.session(configuration(tmp_path, duration=30.0), "--records", records)
+        ros.client("drive")
+        while not list(records.glob("*.mcap")):
+            time.sleep(0.05)
+        master = pid_at(ros.uri)
+        assert master is not None
+        os.kill(master, signal.SIGKILL)
+        status, _, err = finish(session)
+    assert status == 2
+    assert "master" in err
+    assert ends(records) == {"trial-0000": End.TRANSPORT_LOST}
+
+
+def test_own_master_port_in_use_second_maestro_and_interruption(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path, core=False) as ros:
+        config = configuration(tmp_path)
+        status, _, err = finish(ros.session(config))
+        assert status == 2
+        assert "no ROS master answers" in err
+        first = ros.session(config, "--master", "--port", str(ros.port), "__name:=x", "__log:=/dev/null")
+        ros.await_master()
+        assert finish(ros.client("drive"))[0] == 0
+        status, _, err = finish(ros.session(config, "--master", "--port", str(ros.port)))
+        assert (status, "in use" in err) == (2, True)
+        status, _, err = finish(ros.session(config))
+        assert (status, "maestro already" in err) == (2, True)
+        children = Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text().split()
+        assert children
+        os.kill(first.pid, signal.SIGTERM)
+        status, _, err = finish(first)
+        assert status == 1
+        assert "interrupted after 1 trials" in err
+        assert not any(Path(f"/proc/{child}").exists() for child in children)
+
+
+def test_a_launch_file_starts_a_session_with_its_controller(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path, core=False) as ros:
+        config = configuration(tmp_path, number_trials=1, duration=1.5)
+        ros.client_messages()
+        options = [f"config:={config}", f"options:=--records {tmp_path / 'out'}"]
+        roslaunch = [SYSTEM_PYTHON, str(shutil.which("roslaunch")), "-p", str(ros.port)]
+        launch = ros.start(
+            [*roslaunch, "dubins_traffic_nodes", "trials.launch", *options],
+            ROS_PACKAGE_PATH=str(ROOT / "examples" / "ros1"),
+            DUBINS_TRAFFIC=f"{sys.executable} -m dubins_traffic.cli",
+            PYTHONPATH=str(tmp_path / "messages"),
+        )
+        finish(launch)
+        assert ends(tmp_path / "out") == {"trial-0000": End.DURATION}
+
+
+def test_cars_are_placed_before_a_trial_and_time_stands_still_while_paused(
+    ros: Graph, tmp_path: Path
+) -> None:
+    records = tmp_path / "out"
+    session = ros.session(
+        configuration(tmp_path, number_trials=1, duration=1.0), "--clock", "--records", records
+    )
+    status, out, err = finish(ros.client("place", "pause:5"))
+    assert status == 0, err
+    placed, paused = lines(out)
+    assert placed["x"] == pytest.approx(1.25)
+    assert paused["moved"] == 0.0
+    assert paused["states_while_paused"] >= 40
+    assert finish(session)[0] == 0
+    record = dt.load_record(records / "trial-0000.mcap")
+    assert record.instance.starts[0].x == pytest.approx(1.25)
+    assert record.ending is not None
+    assert record.ending.end is End.DURATION

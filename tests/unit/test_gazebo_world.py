@@ -1,0 +1,91 @@
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from shapely.affinity import rotate, translate
+from shapely.geometry import Polygon, box
+
+from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.simulators import registry
+from dubins_traffic.simulators.gazebo import packages, prefix
+from dubins_traffic.simulators.gazebo.export import Version, to_sdf
+from dubins_traffic.simulators.gazebo.roads import MARKER
+from dubins_traffic.simulators.gazebo.vehicle import TRACK, WHEEL_RADIUS, Drive
+from dubins_traffic.simulators.gazebo.world import WALL, walls, world
+from tests.batches import pose
+
+CORNERS = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 0.3), (0.0, 1.0))
+
+
+@pytest.mark.parametrize("corners", [CORNERS, CORNERS[::-1]])
+def test_walls_stand_within_their_polygon(corners: tuple[tuple[float, float], ...]) -> None:
+    whole = Polygon(corners)
+    found = walls(PolygonObstacle(corners))
+    assert len(found) == len(corners)
+    covered = Polygon()
+    for x, y, yaw, length in found:
+        wall = box(-0.5 * length, -0.5 * WALL, 0.5 * length, 0.5 * WALL)
+        wall = translate(rotate(wall, yaw, (0, 0), use_radians=True), x, y)
+        assert wall.difference(whole).area <= WALL * WALL
+        covered = covered.union(wall.buffer(1e-9))
+    assert covered.covers(whole.exterior)
+
+
+def test_wheels_turn_as_the_car_is_asked_to() -> None:
+    drive = Drive.below(Disc())
+    assert drive.track == TRACK
+    left, right = drive.wheels(np.array([0.5, 0.0]), np.array([0.0, 0.9]))
+    assert left[0] == right[0] == 0.5 / WHEEL_RADIUS
+    assert (right[1] - left[1]) * WHEEL_RADIUS / drive.track == pytest.approx(0.9)
+    assert Drive.below(Rectangle(0.5, 0.2)).track < 0.2
+
+
+def test_a_world_holds_every_body() -> None:
+    obstacles = (DiscObstacle(3, 0, 0.5), PolygonObstacle(CORNERS))
+    text = world([pose(0, 0), pose(5, 5, 1.0)], Disc(), obstacles, 0.005, "plugin<&>.so")
+    root = ElementTree.fromstring(text)
+    models = [model.get("name") for model in root.iter("model")]
+    assert models == ["ground", "obstacle_0", "obstacle_1", "ego", "car_1"]
+    (plugin,) = root.iter("plugin")
+    assert plugin.get("filename") == "plugin<&>.so"
+    assert [each.text for each in plugin.iter("car")] == ["ego", "car_1"]
+    assert len(plugin.findall("obstacle")) == 2
+
+
+@pytest.mark.parametrize("version", list(Version))
+def test_roads_are_those_of_2016(version: Version) -> None:
+    network = RoadNetwork.grid(2, 2, length=3.0)
+    root = ElementTree.fromstring(to_sdf(network, version))
+    assert root.get("version") == version.value
+    sizes = [[float(part) for part in (size.text or "").split()] for size in root.iter("size")]
+    assert sum(size[:2] == [4.2, 1.2] for size in sizes) == 4
+    assert sum(size[:2] == [3.0, MARKER] for size in sizes) == 4
+
+
+def test_what_is_not_installed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"not installed.*gazebo install --prefix"):
+        prefix.find(tmp_path / "nothing")
+    monkeypatch.setenv(prefix.VARIABLE, str(tmp_path / "elsewhere"))
+    with pytest.raises(InputError, match=r"elsewhere.*not installed"):
+        registry.load("gazebo")
+    (tmp_path / "elsewhere").mkdir()
+    prefix.write_manifest(tmp_path / "elsewhere", tmp_path / "gzserver", own=False, version="11")
+    with pytest.raises(InputError, match="gzserver has gone"):
+        registry.load("gazebo")
+
+
+def test_only_gazebo_has_a_window() -> None:
+    with pytest.raises(InputError, match="shows nothing"):
+        registry.load("embedded", show=True)
+
+
+def test_mirrors_are_those_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    if shutil.which("apt-get") is not None:
+        assert all("://" in mirror and "/dists" not in mirror for mirror in packages.mirrors())
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(InputError, match="no apt-get"):
+        packages.mirrors()

@@ -1,0 +1,99 @@
+"""By how much the ego keeps the rules: margins that can be worked out by hand, and their signs on trials."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.cli.main import main
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.reader import read
+from dubins_traffic.scoring.margins import Margins
+from dubins_traffic.scoring.score import score
+from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
+from tests.recordings import blocks
+from tests.rules_scripts import Frame, label, on_lane
+
+BOX = Car(body=Rectangle(0.5, 0.26))
+
+
+def margins(instance: Instance, script: Sequence[Frame], size: int = 7) -> dict[str, float | None]:
+    """Return the robustness of a script, fed in blocks with the lane states and flags of its cars."""
+    found = label([instance], [script])
+    lane, bits = (np.array([getattr(one, name)[0] for one in found]) for name in ("lane", "bits"))
+    return of(instance, replace(frames_of(script, instance.problem.rate), lane=lane, bits=bits), size)
+
+
+def of(instance: Instance, frames: Frames, size: int) -> dict[str, float | None]:
+    sink = Margins()
+    sink.begin(instance)
+    for block in blocks(frames, size):
+        sink.frames(block)
+    return sink.result()
+
+
+@pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)
+@pytest.mark.parametrize(("car", "half"), [(Car(), RHO), (BOX, 0.13)], ids=["disc", "rectangle"])
+def test_of_a_car_that_drifts_to_the_right(roads, car: Car, half: float) -> None:
+    """Nothing is near. It drifts from 0.3 to 0.41 m right of the centre line, on a road 0.6 m wide on each side."""
+    made = case(roads, 1)
+    made = replace(made, problem=replace(made.problem, car=car))
+    lane = lanes_in(roads)[0]
+    found = margins(made, [[on_lane(roads, lane, 2.0 + 0.02 * k, -0.3 - 0.01 * k)] for k in range(12)])
+    assert found["1.collision"] is None
+    assert found["1.road"] == pytest.approx(0.6 - 0.41)
+    assert found["2.left"] == pytest.approx(0.05 + 0.3 - half)
+    assert found["2.return"] == pytest.approx(0.05 + 0.41 - half)
+
+
+@pytest.mark.parametrize(("frames", "margin"), [(5, -RHO), (12, -RHO), (13, 0.35 - RHO)])
+def test_of_one_that_comes_back(frames: int, margin: float) -> None:
+    """On the centre line in frames 1 to 11, which is over a second, then back; a second is allowed."""
+    made = case(GRID, 1, left_time=1.0)
+    lane = lanes_in(GRID)[0]
+    script = [[on_lane(GRID, lane, 2.0, 0.0 if 0 < k < 12 else -0.3)] for k in range(frames)]
+    found = margins(made, script)
+    assert found["2.left"] == pytest.approx(-RHO)
+    assert found["2.return"] == pytest.approx(-RHO)
+    short = margins(case(GRID, 1, left_time=2.0), script)["2.return"]
+    assert short == pytest.approx(margin)
+
+
+def test_of_what_is_near() -> None:
+    made = case(GRID, 2)
+    lane = lanes_in(GRID)[0]
+    x, y, _, _ = on_lane(GRID, lane, 2.0, -0.9)
+    made = replace(made, problem=replace(made.problem, obstacles=(DiscObstacle(x, y, 0.1),)))
+    far = on_lane(GRID, lanes_in(GRID)[1], 2.0, -0.3)
+    script = [[on_lane(GRID, lane, 1.8 + 0.02 * k, -0.3), far] for k in range(20)]
+    assert margins(made, script)["1.collision"] == pytest.approx(0.6 - 0.1 - RHO)
+
+
+@pytest.mark.parametrize("controller", ["rules", "lanes", "simple"])
+def test_signs_agree_with_the_verdict_on_records(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], controller: str
+) -> None:
+    for number in range(3):
+        file = tmp_path / "a.mcap"
+        run_trial(draw(load_config("town"), 5, number), controller, record=file, overwrite=True)
+        kept = read(str(file))
+        verdict = score(kept).verdict
+        assert verdict is not None
+        assert list(verdict.robustness) == ["1.collision", "1.road", "2.left", "2.return"]
+        for rule, value in verdict.robustness.items():
+            assert value is None or (value > 0.0) == (verdict.formulas[rule] == "presumably true"), rule
+        assert of(kept.instance, kept.frames, 100) == verdict.robustness
+    assert main(["score", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["trials"][0]["verdict"]["robustness"] == verdict.robustness
+    assert main(["check", str(file)]) == 0
+    assert f"  robustness: 1.collision {verdict.robustness['1.collision']:.3f} m" in capsys.readouterr().out

@@ -1,0 +1,228 @@
+"""The game, its solver and its strategies: the known results, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.checker import StrategyError, check
+from dubins_traffic.synthesis.game import build, estimate
+from dubins_traffic.synthesis.play import Environment, play
+from dubins_traffic.synthesis.solver import Solution, solve
+from dubins_traffic.synthesis.strategy import Strategy
+from tests.games import ALL, board, solved
+
+KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
+
+
+def figures(solution: Solution) -> tuple[int, int, int]:
+    return solution.game.positions, int(solution.winning.sum()), int(solution.vacuous.sum())
+
+
+def test_fairness_alone_wins_nowhere() -> None:
+    for assumed in ("E6", "E1,E2,E6", "E1:any-order,E2,E6"):
+        assert figures(solved(3, 4, 1, assumed))[1:] == (0, 0), assumed
+
+
+def test_keep_moving_unless_blocked_is_won_with_two_cars_and_lost_with_three() -> None:
+    assert figures(solved(2, 2, 2, KEEP_MOVING)) == (660, 660, 0)
+    assert figures(solved(3, 4, 2, KEEP_MOVING)) == (45_540, 45_540, 0)
+    assert figures(solved(2, 2, 3, KEEP_MOVING)) == (1_980, 0, 0)
+    assert figures(solved(3, 4, 3, KEEP_MOVING)) == (652_740, 0, 0)
+
+
+def test_with_the_assumption_every_position_is_won() -> None:
+    assert figures(solved(2, 2, 3)) == (2_724, 2_724, 0)
+    assert figures(solved(2, 2, 4)) == (6_600, 6_600, 0)
+    assert figures(solved(3, 4, 3)) == (788_336, 788_336, 0)
+
+
+def test_so_it_is_where_opposing_cars_pass_each_other_in_bends() -> None:
+    assert figures(solved(2, 2, 3, ALL, 3)) == (7_280, 7_280, 0)
+    assert figures(solved(3, 4, 2, ALL, 3)) == (63_204, 63_204, 0)
+
+
+def test_one_forfeit_a_wait_does_no_harm_and_any_number_does() -> None:
+    assert board(3, 4, 3, "E1,E2,E3:one-forfeit,E4,E5,E6").positions == 4_298_028
+    assert figures(solved(3, 4, 2, "E1,E2,E3:one-forfeit,E4,E5,E6")) == (154_200, 154_200, 0)
+    assert figures(solved(2, 2, 3, "E1,E2,E3:forfeits,E4,E5,E6"))[1] == 0
+    assert figures(solved(3, 4, 3, "E1,E2,E3:forfeits,E4,E5,E6")) == (788_336, 0, 0)
+
+
+def test_each_part_of_the_assumption_is_needed_but_the_last() -> None:
+    for left_out, lost in (
+        ("E1", True),
+        ("E2", True),
+        ("E3", True),
+        ("E4", True),
+        ("E5", True),
+        ("E6", False),
+    ):
+        assumed = ",".join(part for part in ALL.split(",") if part != left_out)
+        assert (not solved(2, 2, 3, assumed).winning.any()) is lost, left_out
+
+
+@pytest.mark.parametrize(("rows", "columns", "degree"), [(2, 2, 1), (2, 2, 3), (3, 4, 1), (2, 3, 3)])
+def test_strategies_are_right_and_every_goal_recurs(rows: int, columns: int, degree: int) -> None:
+    solution = solved(rows, columns, 3, ALL, degree)
+    check(solution.game, solution.ranks)
+    strategy = Strategy.of(solution)
+    for environment in Environment:
+        played = play(strategy, 20_000, environment, seed=7)
+        assert (played.turns, played.astray) == (20_000, 0)
+        assert min(played.visits) > 10
+        assert max(played.gaps) < 1_500
+
+
+def test_the_check_finds_a_rank_that_is_wrong() -> None:
+    solution = solved(2, 2, 3)
+    first = solution.ranks[0]
+    found = 0
+    for place in range(0, solution.game.positions, 97):
+        if first.rank[place] > 1:
+            ranks = first.rank.copy()
+            ranks[place] = 1
+            with pytest.raises(StrategyError, match="on the way to"):
+                check(solution.game, (replace(first, rank=ranks), *solution.ranks[1:]))
+            found += 1
+    assert found > 10
+    idle = replace(first, debt=np.full_like(first.debt, -1))
+    with pytest.raises(StrategyError, match="nothing is owed"):
+        check(solution.game, (idle, *solution.ranks[1:]))
+
+
+def test_a_strategy_comes_back_from_its_file(tmp_path: Path) -> None:
+    strategy = Strategy.of(solved(2, 2, 2, ALL, 3))
+    strategy.save(tmp_path / "first.npz")
+    again = Strategy.load(tmp_path / "first.npz")
+    assert again.board == strategy.board
+    for old, new in zip(strategy.ranks, again.ranks, strict=True):
+        assert (old.rank == new.rank).all()
+        assert (old.debt == new.debt).all()
+    again.save(tmp_path / "second.npz")
+    assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
+
+
+def test_the_ego_chooses_the_lowest_rank() -> None:
+    solution = solved(2, 2, 2)
+    strategy, game = Strategy.of(solution), solution.game
+    for position in range(0, game.positions, 41):
+        options = game.ego_to[game.ego_at[position] : game.ego_at[position + 1]].tolist()
+        chosen = strategy.choose(position, 1)
+        assert chosen in options
+        assert strategy.ranks[1].rank[chosen] == min(strategy.ranks[1].rank[option] for option in options)
+
+
+def test_files_that_are_no_strategies_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "some.npz"
+    with pytest.raises(InputError, match="no such file"):
+        Strategy.load(path)
+    path.write_text("nonsense")
+    with pytest.raises(InputError, match="can't be read as a strategy"):
+        Strategy.load(path)
+    np.savez(path, rank_0=np.zeros(3))
+    with pytest.raises(InputError, match="header"):
+        Strategy.load(path)
+    header = {"format": "dubins-traffic strategy", "version": 99}
+    np.savez(path, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8))
+    with pytest.raises(InputError, match=r"unknown version: got 99; expected 1"):
+        Strategy.load(path)
+    Strategy.of(solved(2, 2, 1)).save(path)
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(InputError, match="can't be read as a strategy"):
+        Strategy.load(path)
+
+
+def test_too_large_a_game_is_refused_before_it_is_built() -> None:
+    with pytest.raises(InputError, match=r"too large a game: got '2951656 positions, about \d+ MiB"):
+        build(board(4, 4, 3), limit=100 << 20)
+    with pytest.raises(InputError, match="less than 2147483647"):
+        build(board(3, 4, 8))
+    with pytest.raises(InputError, match=r"--cars: .* got 9; expected 1 to 8"):
+        estimate(board(2, 2, 9))
+
+
+def test_the_estimate_is_close() -> None:
+    game = solved(3, 4, 3).game
+    expected = estimate(game.board)
+    assert expected.positions == game.positions
+    assert 0.9 < expected.moves / game.to.shape[0] < 1.1
+    assert game.bytes < expected.bytes < 500 << 20
+
+
+def test_assumptions_by_name() -> None:
+    assert Assumption.parse(ALL.split(",")) == Assumption()
+    assert str(Assumption()) == ALL
+    weaker = Assumption.parse(["e1:any-order", "E3:one-forfeit"])
+    assert (weaker.order, weaker.forfeits, weaker.leaves) == (Order.NONE, Forfeits.ONCE, False)
+    assert Assumption.parse(weaker.words()) == weaker
+    for words in (["E7"], ["E1", "E1:any-order"]):
+        with pytest.raises(InputError, match="--assume"):
+            Assumption.parse(words)
+
+
+def test_positions_and_their_numbers() -> None:
+    for some in (board(2, 3, 3), board(2, 2, 2, "E1,E2,E3:one-forfeit,E4,E6", 3)):
+        for position in range(0, some.positions, 1 + some.positions // 500):
+            assert some.number(some.scenes(position)) == position
+
+
+def test_progress_goes_up_to_the_whole() -> None:
+    told: list[tuple[str, float]] = []
+    game = build(board(3, 4, 2), progress=lambda what, share: told.append((what, share)))
+    solve(game, progress=lambda what, share: told.append((what, share)))
+    assert told[0][0].startswith("build 50,112 positions, about 1")
+    assert [share for what, share in told if what.startswith("build")][-1] == 1.0
+    assert [share for what, share in told if what == "solve"][-1] == 1.0
+
+
+def test_ctrl_c_ends_a_search_soon() -> None:
+    game = build(board(3, 4, 3))
+
+    def interrupt(what: str, _: float) -> None:
+        raise KeyboardInterrupt(what)
+
+    begun = perf_counter()
+    with pytest.raises(KeyboardInterrupt, match="build"):
+        build(board(3, 4, 3), progress=interrupt)
+    with pytest.raises(KeyboardInterrupt, match="solve"):
+        solve(game, progress=interrupt)
+    assert perf_counter() - begun < 5.0
+
+
+PLAIN = """
+import numpy as np
+from tests.games import solved
+from dubins_traffic.synthesis.play import Environment, play
+from dubins_traffic.synthesis.strategy import Strategy
+solution = solved(2, 2, 1)
+game = solution.game
+print(game.to.tolist(), game.moved.tolist(), game.ego_to.tolist(), game.owed.tolist())
+print([own.rank.tolist() for own in solution.ranks])
+print(play(Strategy.of(solution), 60, Environment.RANDOM, seed=3))
+"""
+
+
+def test_compiled_and_interpreted_are_equal() -> None:
+    texts = {
+        subprocess.run(
+            [sys.executable, "-c", PLAIN],
+            env={**os.environ, "NUMBA_DISABLE_JIT": plain},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for plain in ("0", "1")
+    }
+    assert len(texts) == 1
+    assert "Played(turns=60, astray=0" in texts.pop()

@@ -1,0 +1,236 @@
+"""Bounds without a search, counterstrategies and their stories, strengthenings, and the command `synth`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from dubins_traffic.cli.main import main
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.answer import answer
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.checker import check
+from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.instance import arena_of, cell_of, start_positions
+from dubins_traffic.synthesis.routes import route_bound
+from dubins_traffic.synthesis.solver import Solution, solve
+from dubins_traffic.synthesis.story import told
+from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.strengthening import smallest
+from tests.games import ALL, board, solved
+
+KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
+PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
+"""A square with a handle."""
+
+
+def pan(others: int, goals: list[int], assumed: str = ALL) -> Solution:
+    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
+    return solve(build(Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)))
+
+
+def test_bounds_of_an_ego_on_shortest_routes() -> None:
+    bounds = {
+        (rows, columns, degree): route_bound(board(rows, columns, 1, ALL, degree).arena, Assumption())
+        for rows, columns, degree in ((2, 2, 1), (3, 4, 1), (2, 2, 3), (3, 4, 3))
+    }
+    assert bounds == {(2, 2, 1): 9, (3, 4, 1): 41, (2, 2, 3): 6, (3, 4, 3): 42}
+    for left_out in ("E1", "E2", "E3", "E4", "E5"):
+        parts = [part for part in ALL.split(",") if part != left_out]
+        assert route_bound(board(2, 2, 1).arena, Assumption.parse(parts)) == 0
+    assert route_bound(board(3, 4, 1, ALL, 4).arena, Assumption()) == 0
+
+
+def test_a_goal_in_a_dead_end_bears_two() -> None:
+    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
+    dead_end = network.vertex((2, 1))
+    assert route_bound(Arena.of(network, [0, dead_end]), Assumption()) == 2
+    assert route_bound(Arena.of(network, [0, 3]), Assumption()) > 2
+
+
+def test_the_bound_holds_where_games_can_be_solved() -> None:
+    for others in (5, 6):
+        assert solved(2, 2, others).everywhere
+    for others in (1, 2):
+        assert pan(others, [0, 4], "E1,E2,E3,E4,E5").everywhere
+    assert not pan(3, [0, 4], "E1,E2,E3,E4,E5").everywhere
+
+
+def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
+    """Three e-agents fill a dead end; the ego before it keeps them there, so that the goal is never free again."""
+    for others, goals, vacuous in ((2, [0, 4], 0), (3, [0, 3], 0), (3, [0, 4], 7_476)):
+        found = pan(others, goals)
+        assert found.everywhere
+        assert int(found.vacuous.sum()) == vacuous
+    found = pan(3, [4])
+    check(found.game, found.ranks)
+    assert found.everywhere
+    assert ((found.ranks[0].rank >= 0) == ~found.vacuous).all()
+    assert 0 < int(found.vacuous.sum()) < found.game.positions
+    assert not found.vacuous[found.game.at_goal(0)].any()
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "others", "assumed"),
+    [
+        (2, 2, 3, KEEP_MOVING),
+        (3, 4, 1, "E6"),
+        (2, 2, 2, "E1,E2,E3,E4,E6"),
+        (2, 2, 3, "E2,E3,E4,E5,E6"),
+        (2, 2, 2, "E1,E2,E3:forfeits,E4,E5,E6"),
+    ],
+)
+def test_the_counterstrategy_keeps_a_goal_from_the_ego_and_pays_its_debts(
+    rows: int, columns: int, others: int, assumed: str
+) -> None:
+    solution = solved(rows, columns, others, assumed)
+    counter, game, random = Counterstrategy(solution), solution.game, Random(3)
+    lost = np.flatnonzero(~solution.winning)
+    for start in (lost[0], lost[len(lost) // 2], lost[-1]):
+        position = int(start)
+        debt, level, streaks, at_goal = 0, counter.level(position), dict[int, int](), 0
+        for _ in range(250):
+            after, debt = counter.choose(position, debt)
+            assert after in game.to[game.to_at[position] : game.to_at[position + 1]]
+            position = random.choice(game.ego_to[game.ego_at[after] : game.ego_at[after + 1]].tolist())
+            before, level = level, counter.level(position)
+            assert level <= before
+            streaks = {owed: streaks.get(owed, 0) + 1 for owed in counter.debts(position)}
+            assert level < before or max(streaks.values(), default=0) < 60
+            sought = solution.losses[level].goal
+            at_goal = at_goal + int(game.at_goal(sought)[position]) if level == before else 0
+        assert at_goal == 0
+
+
+def test_the_story_of_the_gatekeeper_and_the_relay() -> None:
+    solution = solved(2, 2, 3, KEEP_MOVING)
+    lines = told(Counterstrategy(solution), 1_000)
+    text = "\n".join(lines)
+    assert "the ego can be kept from goal [0, 0] for ever" in lines[0]
+    assert "turns this repeats every" in text
+    kept = re.search(
+        r"e-agent (\d) holds \S+ \d\] > \[0, 0\]: again and again e-agent (\d) is in \[0, 0\]", text
+    )
+    assert kept is not None
+    assert re.search(rf"e-agent {kept[2]} goes by .*\[0, 0\], ", text)
+
+
+def test_the_story_of_a_parked_car_and_of_one_that_rams() -> None:
+    parked = solved(2, 2, 2, "E1,E2,E3,E4,E6")
+    text = "\n".join(told(Counterstrategy(parked), 0))
+    assert "E5 is not assumed, so it need not come to the end of the lane" in text
+    rams = solved(2, 2, 2, "E1,E3,E4,E5,E6")
+    text = "\n".join(told(Counterstrategy(rams), int(np.argmax(~rams.winning))))
+    assert "an e-agent drives into the ego: E2 is not assumed" in text
+
+
+def test_the_smallest_strengthening() -> None:
+    def everywhere(solution: Solution) -> bool:
+        return solution.everywhere
+
+    for assumed, better in (
+        ("E1,E2,E4,E5,E6", ["E1,E2,E3:one-forfeit,E4,E5,E6"]),
+        (KEEP_MOVING, [ALL]),
+        ("E2,E4,E5", ["E1,E2,E3:one-forfeit,E4,E5"]),
+    ):
+        found = smallest(board(2, 2, 3, assumed), everywhere)
+        assert [str(assumption) for assumption in found] == better
+
+
+def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
+    for trial in range(6):
+        instance = draw(load_config("demo"), 3, trial)
+        arena = arena_of(instance.problem)
+        some = Board(arena, Assumption(), len(instance.e_agents))
+        cells = [cell_of(arena, instance.problem, pose) for pose in instance.starts]
+        starts = start_positions(some, instance)
+        assert bool(starts) is (len(set(cells)) == len(cells))
+        for position in starts:
+            scenes = some.scenes(position)
+            lanes = {
+                len(arena.nodes) + arena.nodes[n].inbound[slot]
+                for n, scene in enumerate(scenes)
+                for slot, _ in scene.queue
+            }
+            assert lanes | {n for n, scene in enumerate(scenes) if scene.inside is not None} == set(cells)
+
+
+def test_the_command_answers_in_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "won.npz"
+    assert main(["synth", "demo", "--cars", "2", "--order-degree", "1", "--json", "-o", str(path)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found.pop("seconds") > 0.0
+    expected = {"states": 50_112, "winning": 50_112, "vacuous": 0, "realizable": True, "route_bound": 41}
+    assert found == expected
+    assert Strategy.load(path).board.positions == 50_112
+
+
+def test_the_game_as_a_graph_says_what_its_numbers_mean(tmp_path: Path) -> None:
+    path = tmp_path / "game.npz"
+    assert main(["synth", "demo", "--cars", "1", "--graph", str(path), "--json"]) == 0
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    header = json.loads(arrays["header"].tobytes())
+    assert (header["format"], header["version"], header["cars"]) == ("dubins-traffic game", 1, 1)
+    for position in range(0, len(arrays["ego_cell"]), 37):
+        ego: list[int] = []
+        others: list[int] = []
+        for n, node in enumerate(header["nodes"]):
+            scene = header["kinds"][node["kind"]][arrays["scene"][position, n]]
+            cars = [(node["inbound"][slot], who) for slot, who in scene["queue"]]
+            cars += [(n, scene["inside"])] if scene["inside"] else []
+            for cell, who in cars:
+                (ego if who == "ego" else others).append(cell)
+        assert ego == [arrays["ego_cell"][position]]
+        assert len(others) == 1
+        reached = arrays["ego_to"][arrays["ego_at"][position] : arrays["ego_at"][position + 1]]
+        near = {ego[0], *(cell for node in header["nodes"] for cell in node["exits"])}
+        near |= {n for n, node in enumerate(header["nodes"]) if ego[0] in node["inbound"]}
+        assert {int(cell) for cell in arrays["ego_cell"][reached]} <= near
+
+
+def test_the_command_explains(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synth", "demo", "--assume", "E1,E2,E4,E5,E6", "--explain"]) == 0
+    text = capsys.readouterr().out
+    assert "but not where the instance starts" in text
+    assert "E3 is not assumed, so it need not enter" in text
+    assert "The ego would win if this were assumed: E1,E2,E3:one-forfeit,E4,E5,E6." in text
+    assert main(["synth", "demo", "--explain"]) == 0
+    text = capsys.readouterr().out
+    assert "The ego wins everywhere." in text
+    assert "waits until one leaves (E4) in" in text
+
+
+def test_the_command_refuses_what_is_wrong(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for arguments, message in (
+        (["--assume", "E9"], "--assume: not an assumption: got 'E9'; expected some of E1,"),
+        (["--cars", "9"], "proved to win against up to 42 e-agents"),
+        (["--cars", "4", "--memory", "100"], "MiB'; expected at most 100 MiB (--memory)"),
+        (["--assume", "nothing", "-o", str(tmp_path / "none.npz")], "a strategy that wins from nowhere"),
+    ):
+        assert main(["synth", "demo", *arguments]) == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "none.npz").exists()
+
+
+def test_instances_without_goals_are_refused() -> None:
+    network = RoadNetwork.grid(2, 2)
+    with pytest.raises(InputError, match="no goals"):
+        Arena.of(network, [])
+
+
+def test_what_is_said_of_an_instance() -> None:
+    found = answer(draw(load_config("demo"), 0, 0), cars=1)
+    assert (found.outcome, found.realizable, found.starts) == ("everywhere", True, [])
+    assert found.lines()[-1] == "On shortest routes it is proved to win against up to 42 e-agents."
