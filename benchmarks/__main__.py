@@ -1,7 +1,7 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single`, `startup`, `judging`, `monitors`, `lcm`: about a minute; `ros1`: three; `lanes` runs 400 trials and
-`rules` 1,400, which takes some minutes each; `synthesis` solves its games in about two minutes;
+`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`: about a minute; `ros1`:
+three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each; `synthesis` solves its games in about two minutes;
 `campaign` runs 42,000 short trials in about as many.
 """
 
@@ -17,6 +17,9 @@ NAMES = (
     "single",
     "startup",
     "judging",
+    "batch",
+    "world",
+    "scale",
     "monitors",
     "lanes",
     "rules",

@@ -158,13 +158,23 @@ def _margins(instance: Instance, b: int, tally: Tally, ticks: int) -> dict[str, 
     """Return what `scoring.margins` finds in the ego's frames, and the smallest gap that has been counted."""
     poses: Floats = tally.pose[b, : ticks + 1, :, None]
     marks: Ints = tally.mark[b, : ticks + 1, :, None]
-    nothing, none = np.zeros_like(poses[:, 0]), np.full_like(marks[:, 0], NONE)
+    nothing: Floats = np.zeros_like(poses[:, 0])
+    none: Ints = np.full_like(marks[:, 0], NONE)
+    x, y, c, s = (poses[:, k] for k in range(4))
     frames = Frames(
-        0,
-        instance.problem.rate,
-        *(poses[:, k] for k in range(4)),
-        *[nothing] * 4,
-        *[none] * 3,
+        first=0,
+        rate=instance.problem.rate,
+        x=x,
+        y=y,
+        c=c,
+        s=s,
+        speed=nothing,
+        yaw_rate=nothing,
+        command_speed=nothing,
+        command_yaw_rate=nothing,
+        segment=none,
+        at=none,
+        crosses=none,
         lane=marks[:, 1],
         bits=marks[:, 0].astype(np.uint32),
     )

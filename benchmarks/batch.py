@@ -1,0 +1,103 @@
+"""Full trials in batches, against the motion of the same trials alone, in one run.
+
+A trial: 60 s, 6 `lawful` e-agents, the `rules` ego, a grid of 4 x 5 intersections, all rules judged, scores, no
+records.
+Times are of this process's processor time on one thread, and of the clock on two.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+
+from benchmarks.table import Row
+from dubins_traffic.campaign.batch import outcomes
+from dubins_traffic.campaign.group import Group
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.simulators.embedded import Embedded
+
+TRIALS, DURATION, ROUNDS = 128, 60, 3
+BATCH = 32
+
+
+def configuration(agents: int = 6, duration: int = DURATION) -> dict[str, Any]:
+    """Return the configuration of the trials."""
+    return {
+        "version": 1,
+        "problem_domain": "dubins_traffic",
+        "network": {"grid": {"rows": 4, "columns": 5, "length": 4.0}},
+        "rules": {},
+        "e-agents": [{"type": "lawful", "name": "agent", "count": agents}],
+        "number_trials": TRIALS,
+        "duration": duration,
+        "number_goals_bounds": [2, 2],
+    }
+
+
+def measure() -> list[Row]:
+    """Return the rows of this benchmark; the best of some rounds counts."""
+    config = load_config(configuration())
+    began = process_time()
+    instances = [draw(config, 1, trial) for trial in range(TRIALS)]
+    drawing = process_time() - began
+    list(outcomes(instances[:2]))
+    steps = TRIALS * len(instances[0].starts) * instances[0].ticks
+    motion = min(_motion(instances) for _ in range(ROUNDS))
+    kernel = min(_kernel(instances) for _ in range(ROUNDS))
+    whole = min(_whole(instances) for _ in range(ROUNDS))
+    one, two = (min(_clock(instances, threads) for _ in range(ROUNDS)) for threads in (1, 2))
+    return [
+        Row("motion alone, same trials", f"{steps / motion:.2e} car-steps/s", "", True),
+        Row(
+            "drivers, motion, labels, referee, metrics: the compiled pass",
+            f"{steps / kernel:.2e} car-steps/s = {motion / kernel:.2f} of motion alone",
+            ">= 8e6, >= 1/6",
+            steps / kernel >= 8e6 and motion / kernel >= 1.0 / 6.0,
+        ),
+        Row(
+            "with tables, rounds, scores and verdicts of each trial",
+            f"{steps / whole:.2e} car-steps/s = {TRIALS / whole:.0f} trials/s, {motion / whole:.2f} of motion",
+            ">= 600 trials/s",
+            TRIALS / whole >= 600,
+        ),
+        Row("drawing an instance with its network", f"{drawing / TRIALS * 1e3:.1f} ms a trial", "", True),
+        Row("two threads, by the clock", f"{one / two:.2f} times one", ">= 1.7", one / two >= 1.7),
+    ]
+
+
+def _motion(instances: list[Instance]) -> float:
+    simulator = Embedded()
+    state = simulator.reset(instances)
+    commands = np.zeros((*state.x.shape, 2))
+    commands[:, :, 0] = 0.4
+    commands[:, :, 1] = np.random.default_rng(1).uniform(-1.0, 1.0, state.x.shape)
+    began = process_time()
+    for _ in range(300):
+        simulator.step(commands)
+    return (process_time() - began) * instances[0].ticks / 300
+
+
+def _kernel(instances: list[Instance]) -> float:
+    spent = 0.0
+    for first in range(0, TRIALS, BATCH):
+        group = Group(instances[first : first + BATCH], keeps_rules=True)
+        began = process_time()
+        group.finish()
+        spent += process_time() - began
+    return spent
+
+
+def _whole(instances: list[Instance]) -> float:
+    began = process_time()
+    list(outcomes(instances, batch=BATCH))
+    return process_time() - began
+
+
+def _clock(instances: list[Instance], threads: int) -> float:
+    began = perf_counter()
+    list(outcomes(instances, batch=BATCH // 2, threads=threads))
+    return perf_counter() - began
