@@ -1,8 +1,8 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
-`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`: about a minute; `ros1`:
-three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each; `synthesis` solves its games in about two minutes;
-`campaign` runs 42,000 short trials in about as many.
+`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`: about a minute;
+`ros1`: three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each; `synthesis` solves its
+games in about two minutes; `campaign` runs 42,000 short trials in about as many.
 """
 
 from __future__ import annotations
