@@ -19,6 +19,7 @@ from dubins_traffic.cars.sensing import scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
 from dubins_traffic.scoring.score import Scorer
@@ -248,12 +249,15 @@ def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> 
 
 
 def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
-    network = tmp_path / "net.json"
-    network.write_text(dt.RoadNetwork.grid(2, 3).to_json())
+    instance = dt.draw(
+        dt.load_config(WANDERERS | {"obstacles": [{"disc": {"x": -3, "y": 0, "radius": 1}}]}), 0, 0
+    )
+    network = tmp_path / "instance.json"
+    network.write_text(json.dumps(instance_to_document(instance)))
     for version in ("1.6", "1.9"):
         world = tmp_path / f"{version}.sdf"
         assert command("convert", str(network), "-o", str(world), "--sdf", version).returncode == 0
-        assert world.read_text().count('<visual name="surface">') == 7
+        assert world.read_text().count('<visual name="surface">') == 17
     found = installation()
     check = [str(found.gzserver.with_name("gz")), "sdf", "-k", str(tmp_path / "1.6.sdf")]
     old = subprocess.run(
