@@ -28,7 +28,8 @@ def drive(pipe: Connection, address: str, workers: int, around: Surroundings) ->
     """Join the cluster at `address` and run chunks until the pipe is closed at the other end."""
     end_with_parent()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # Ray's own words stand in its logs; ours go through the pipe
+    # Ray's own words stand in its logs; ours go through the pipe.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     ray: Any = import_module("ray")
     send = _Sender(pipe)
     over = threading.Event()
