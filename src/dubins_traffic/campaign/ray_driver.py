@@ -52,6 +52,9 @@ def drive(pipe: Connection, address: str, workers: int, around: Surroundings) ->
 def _join(ray: Any, address: str, workers: int) -> None:
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
     if address == "local":
+        os.environ.setdefault(
+            "RAY_worker_niceness", "0"
+        )  # as processes of the pool; 15 is meant for shared machines
         ray.init(address="local", num_cpus=workers, include_dashboard=False, **quiet)
     else:
         ray.init(address=address, **quiet)
