@@ -1,12 +1,12 @@
 #!/bin/sh
-# Install the system packages that the tests need: Chromium and its driver, for the test of the replay page; ROS 1 and
-# a compiler, for the tests over ROS. Does nothing where they are, and says in one line what it can't install; the
-# status is 0 either way.
+# Install the system packages that the tests need: Chromium and its driver, for the test of the replay page; ROS 1, a
+# compiler and Fast DDS, for the tests over ROS 1 and 2. Does nothing where they are, and says in one line what it can't
+# install; the status is 0 either way.
 set -eu
 
 ros="python3-rospy python3-rosmaster python3-roslaunch python3-genpy python3-gencpp python3-nav-msgs"
 ros="$ros python3-sensor-msgs python3-geometry-msgs python3-std-srvs python3-tf2-msgs ros-geometry-msgs ros-std-msgs"
-ros="$ros libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev g++ pkg-config"
+ros="$ros libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev g++ pkg-config libfastrtps-dev"
 
 has() {
     for command in "$@"; do command -v "$command" >/dev/null 2>&1 || return 1; done

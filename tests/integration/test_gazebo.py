@@ -19,11 +19,14 @@ from dubins_traffic.cars.sensing import scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
 from dubins_traffic.scoring.score import Scorer
 from dubins_traffic.simulators.gazebo import prefix
+from dubins_traffic.simulators.gazebo.link import Kind, LostError
 from dubins_traffic.simulators.gazebo.simulator import Gazebo
+from dubins_traffic.simulators.gazebo.vehicle import WHEEL_RADIUS
 from tests.batches import pose, scene
 from tests.gazebo import installation
 from tests.recordings import make_instance
@@ -143,6 +146,23 @@ def test_it_listens_on_the_loopback_interface_only() -> None:
     assert all(address.startswith("0100007F:") for address in listening)
 
 
+def test_cars_can_be_placed_and_nonsense_is_refused() -> None:
+    simulator = Gazebo()
+    simulator.reset([scene([pose(0, 0), pose(2, 0)])])
+    assert simulator.server is not None
+    places = np.array([pose(1, 2, 0.5), pose(-3, 4, -2.5)])
+    placed = simulator.server.ask(Kind.PLACE, places.ravel()).reshape(2, 7)
+    assert placed[:, :4] == pytest.approx(places, abs=1e-9)
+    assert not placed[:, 4:].any()
+    rate = 0.5 / WHEEL_RADIUS
+    moved = simulator.server.ask(Kind.STEP, np.array([210, rate, rate, 0.0, 0.0])).reshape(2, 7)
+    assert moved[0, :2] == pytest.approx(places[0, :2] + 0.5 * places[0, 2:], abs=0.01)
+    assert moved[1, :4] == pytest.approx(places[1], abs=1e-4)
+    with pytest.raises(LostError, match="refused STEP"):
+        simulator.server.ask(Kind.STEP, np.zeros(2))
+    simulator.close()
+
+
 def a_prefix(folder: Path) -> prefix.Installation:
     """Return another prefix with the same Gazebo."""
     found = installation()
@@ -248,12 +268,15 @@ def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> 
 
 
 def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
-    network = tmp_path / "net.json"
-    network.write_text(dt.RoadNetwork.grid(2, 3).to_json())
+    instance = dt.draw(
+        dt.load_config(WANDERERS | {"obstacles": [{"disc": {"x": -3, "y": 0, "radius": 1}}]}), 0, 0
+    )
+    network = tmp_path / "instance.json"
+    network.write_text(json.dumps(instance_to_document(instance)))
     for version in ("1.6", "1.9"):
         world = tmp_path / f"{version}.sdf"
         assert command("convert", str(network), "-o", str(world), "--sdf", version).returncode == 0
-        assert world.read_text().count('<visual name="surface">') == 7
+        assert world.read_text().count('<visual name="surface">') == 17
     found = installation()
     check = [str(found.gzserver.with_name("gz")), "sdf", "-k", str(tmp_path / "1.6.sdf")]
     old = subprocess.run(

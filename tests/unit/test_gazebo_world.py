@@ -17,6 +17,7 @@ from dubins_traffic.simulators.gazebo.roads import MARKER
 from dubins_traffic.simulators.gazebo.vehicle import TRACK, WHEEL_RADIUS, Drive
 from dubins_traffic.simulators.gazebo.world import WALL, walls, world
 from tests.batches import pose
+from tests.recordings import make_instance
 
 CORNERS = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 0.3), (0.0, 1.0))
 
@@ -64,6 +65,13 @@ def test_roads_are_those_of_2016(version: Version) -> None:
     sizes = [[float(part) for part in (size.text or "").split()] for size in root.iter("size")]
     assert sum(size[:2] == [4.2, 1.2] for size in sizes) == 4
     assert sum(size[:2] == [3.0, MARKER] for size in sizes) == 4
+
+
+def test_an_instance_is_shown_with_its_bodies() -> None:
+    instance = make_instance(obstacles=[DiscObstacle(3, 3, 0.5)])
+    root = ElementTree.fromstring(to_sdf(instance))
+    names = [model.get("name") for model in root.iter("model")]
+    assert names == ["ground", *(f"road_{k}" for k in range(17)), "obstacle_0", "ego", "car_1", "car_2"]
 
 
 def test_what_is_not_installed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,8 +27,12 @@ from dubins_traffic.simulators import registry as simulators
 CAR_STEPS = 2_000_000
 """Car-steps of a chunk whose size the file does not give."""
 MOST_IN_CHUNK = 2_000
+LEAST_CAR_STEPS = 200_000
+"""Car-steps below which a chunk does not hide what it costs to hand out and to keep."""
+TRIAL = 2_000
+"""What it costs to begin and to score a trial, in car-steps."""
 CHUNKS = 64
-"""At least so many chunks are made, if there are as many trials."""
+"""At least so many chunks are made, if they are not too small for that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,8 +192,9 @@ class Campaign:
     def _size(self, cell: Cell) -> int:
         settings = cell.settled.settings
         seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
-        steps = seconds * settings.rate * (1 + len(cell.settled.agents))
-        return max(1, min(int(CAR_STEPS / steps), MOST_IN_CHUNK, -(-self.total // CHUNKS)))
+        cost = TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents))
+        least = int(LEAST_CAR_STEPS / cost)
+        return max(1, least, min(int(CAR_STEPS / cost), MOST_IN_CHUNK, -(-self.total // CHUNKS)))
 
 
 def load_campaign(path: str | os.PathLike[str]) -> Campaign:

@@ -7,7 +7,7 @@ import shlex
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from threading import Event, Thread
@@ -15,6 +15,7 @@ from threading import Event, Thread
 from dubins_traffic.campaign.course import course
 from dubins_traffic.campaign.course_run import DEADLINE, ERRORS, FAREWELL, PATIENCE, Drive, Pass, driven
 from dubins_traffic.campaign.remote import Session, run_remote
+from dubins_traffic.campaign.ros2 import make_transport
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.protocols import End, Transport
 from dubins_traffic.transports.clocks import Lockstep
@@ -152,7 +153,7 @@ def _dismiss(program: subprocess.Popen[bytes]) -> str:
 
 
 @contextmanager
-def _over_lcm(maestro: Maestro) -> Iterator[Meeting]:
+def _over_lcm(maestro: Maestro) -> Generator[Meeting]:
     from dubins_traffic.transports.lcm.connection import DEFAULT_GROUP
     from dubins_traffic.transports.lcm.transport import Lcm
 
@@ -167,7 +168,7 @@ def _over_lcm(maestro: Maestro) -> Iterator[Meeting]:
 
 
 @contextmanager
-def _over_ros1(maestro: Maestro) -> Iterator[Meeting]:
+def _over_ros1(maestro: Maestro) -> Generator[Meeting]:
     from dubins_traffic.transports.ros1.master import Master
     from dubins_traffic.transports.ros1.node import leave
     from dubins_traffic.transports.ros1.transport import Ros1
@@ -182,4 +183,14 @@ def _over_ros1(maestro: Maestro) -> Iterator[Meeting]:
         yield Meeting(transport, {"ROS_MASTER_URI": master.uri, "ROS_IP": "127.0.0.1"})
 
 
-_MEETINGS = {"lcm": _over_lcm, "ros1": _over_ros1}
+@contextmanager
+def _over_ros2(maestro: Maestro) -> Generator[Meeting]:
+    domain = 100 + os.getpid() % 100
+    transport = make_transport(domain, maestro)
+    try:
+        yield Meeting(transport, {"ROS_DOMAIN_ID": str(domain), "ROS_LOCALHOST_ONLY": "1"})
+    finally:
+        transport.close()
+
+
+_MEETINGS = {"lcm": _over_lcm, "ros1": _over_ros1, "ros2": _over_ros2}

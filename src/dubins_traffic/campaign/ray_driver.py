@@ -28,9 +28,8 @@ def drive(pipe: Connection, address: str, workers: int, around: Surroundings) ->
     """Join the cluster at `address` and run chunks until the pipe is closed at the other end."""
     end_with_parent()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    os.dup2(
-        os.open(os.devnull, os.O_WRONLY), 2
-    )  # Ray's own words stand in its logs; ours go through the pipe
+    # Ray's own words stand in its logs; ours go through the pipe.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     ray: Any = import_module("ray")
     send = _Sender(pipe)
     over = threading.Event()
@@ -53,6 +52,9 @@ def drive(pipe: Connection, address: str, workers: int, around: Surroundings) ->
 def _join(ray: Any, address: str, workers: int) -> None:
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
     if address == "local":
+        os.environ.setdefault(
+            "RAY_worker_niceness", "0"
+        )  # as processes of the pool; 15 is meant for shared machines
         ray.init(address="local", num_cpus=workers, include_dashboard=False, **quiet)
     else:
         ray.init(address=address, **quiet)

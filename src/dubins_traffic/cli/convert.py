@@ -45,12 +45,13 @@ def convert(
 ) -> None:
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
-    A road network becomes a world for Gazebo too (`.sdf`).
+    A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
     A ROS 1 bag becomes a record (`.mcap`); beside a bag stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.campaign.bag_reader import bag_to_record, is_bag
     from dubins_traffic.campaign.bags import write_bag
     from dubins_traffic.campaign.sources import load
+    from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.network import RoadNetwork
@@ -64,15 +65,14 @@ def convert(
         bag_to_record(file, output, overwrite=True)
         return
     found = load(file)
-    if isinstance(found, Record) and Path(output).suffix.lower() == ".bag":
+    suffix = Path(output).suffix.lower()
+    if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
+        write_sdf(found.instance if isinstance(found, Record) else found, output, Version(sdf.value))
+    elif isinstance(found, Record) and suffix == ".bag":
         options.tell(str(write_bag(found, output)))
     elif isinstance(found, Record):
         export(found, output)
     elif isinstance(found, RoadNetwork):
-        suffix = Path(output).suffix.lower()
-        if suffix == WORLD:
-            write_sdf(found, output, Version(sdf.value))
-            return
         if suffix not in CONTAINERS:
             expected = f"a suffix of {', '.join((*CONTAINERS, WORLD))}"
             raise InputError(

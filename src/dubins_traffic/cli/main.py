@@ -23,6 +23,7 @@ from dubins_traffic.cli import (
     plot,
     replay,
     ros1,
+    ros2,
     run,
     score,
     spec,
@@ -76,6 +77,7 @@ app.add_typer(campaign.campaign, name="campaign")
 app.add_typer(ros1.app, name="ros1")
 app.add_typer(gazebo.app, name="gazebo")
 app.add_typer(lcm.app, name="lcm")
+app.add_typer(ros2.app, name="ros2")
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

@@ -58,7 +58,7 @@ def synth(
     ] = None,
     strategy: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="STRATEGY", help="Write the strategy, `*.npz`."),
+        typer.Option("--output", "-o", metavar="STRATEGY", help="Check the strategy and write it, `*.npz`."),
     ] = None,
     graph: Annotated[
         str | None,
@@ -82,6 +82,7 @@ def synth(
     """Say whether the ego can win at all: solve the game of cells behind a problem."""
     from dubins_traffic.synthesis.answer import answer
     from dubins_traffic.synthesis.assumption import Assumption
+    from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
     from dubins_traffic.synthesis.strategy import Strategy
 
@@ -102,6 +103,7 @@ def synth(
     if strategy is not None:
         won = Strategy.of(found.solution)
         won.first()
+        check(found.solution.game, won.ranks)
         won.save(strategy)
     if json:
         extra = {"explanation": reasons} if explain else {}

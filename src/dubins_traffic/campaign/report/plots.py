@@ -139,7 +139,8 @@ def _show_zero(axes: Any, levels: Sequence[Level]) -> None:
     means = {level.estimate.mean for level in levels}
     if len(means) == 1 and None not in means:
         value = float(means.pop() or 0.0)
-        axes.set_ylim(min(0.0, 1.1 * value), max(1.0 if value == 0.0 else 0.0, 1.1 * value))
+        low, high = min(0.0, 1.1 * value), max(1.0 if value == 0.0 else 0.0, 1.1 * value)
+        axes.set_ylim(low - 0.05 * (high - low), high)
 
 
 def _bars(

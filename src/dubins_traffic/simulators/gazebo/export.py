@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Final
 from xml.etree.ElementTree import Element
 
 from dubins_traffic.files import write_text
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.simulators.gazebo.roads import roads
 from dubins_traffic.simulators.gazebo.sdf import numbers, pose, tag, text, visual
-from dubins_traffic.simulators.gazebo.world import ground
+from dubins_traffic.simulators.gazebo.world import bodies, ground
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -27,24 +28,32 @@ class Version(StrEnum):
     NEW = "1.9"
 
 
-def to_sdf(network: RoadNetwork, version: Version = Version.CLASSIC) -> str:
-    """Return a world with the ground, light, and a road with its marker for each segment.
+def to_sdf(what: RoadNetwork | Instance, version: Version = Version.CLASSIC) -> str:
+    """Return a world with ground, light, and a road with its marker for each segment.
 
     Parameters
     ----------
-    network : RoadNetwork
-        Of which the roads are made.
+    what : RoadNetwork or Instance
+        Whose roads are made; of an instance also its obstacles, and its cars where they start.
     version : Version
         Of SDF.
     """
+    if isinstance(what, Instance):
+        problem = what.problem
+        models = [*roads(problem.network), *bodies(what.starts, problem.car.body, problem.obstacles)]
+    else:
+        models = roads(what)
+    world = tag("world", numbers("gravity", 0.0, 0.0, -9.81), _sun(), _grass(), *models, name="roads")
+    return text(tag("sdf", world, version=version.value))
+
+
+def _grass() -> Element:
     plane = tag("geometry", tag("plane", numbers("normal", 0, 0, 1), numbers("size", 1000, 1000)))
-    grass = visual("grass", pose(0.0, 0.0, 0.0), plane, GRASS)
     earth = ground()
     link = earth.find("link")
     assert link is not None
-    link.append(grass)
-    world = tag("world", numbers("gravity", 0.0, 0.0, -9.81), _sun(), earth, *roads(network), name="roads")
-    return text(tag("sdf", world, version=version.value))
+    link.append(visual("grass", pose(0.0, 0.0, 0.0), plane, GRASS))
+    return earth
 
 
 def outlook(network: RoadNetwork) -> list[Element]:
@@ -56,9 +65,11 @@ def outlook(network: RoadNetwork) -> list[Element]:
     return [tag("gui", camera), _sun(), *roads(network)]
 
 
-def write_sdf(network: RoadNetwork, path: str | PathLike[str], version: Version = Version.CLASSIC) -> None:
+def write_sdf(
+    what: RoadNetwork | Instance, path: str | PathLike[str], version: Version = Version.CLASSIC
+) -> None:
     """Write `to_sdf` to a file, whole or not at all; InputError if it can't be written."""
-    write_text(Path(path), to_sdf(network, version))
+    write_text(Path(path), to_sdf(what, version))
 
 
 def _sun() -> Element:

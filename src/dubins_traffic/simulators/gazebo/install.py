@@ -32,7 +32,7 @@ OWN: Final = "This machine's own Gazebo is used: {server}\n  only its plugin is 
 
 def announcement(folder: Path) -> str:
     """Return what people should know before `install` begins: how much, how long, under which licences."""
-    server = prefix.own_server()
+    server = own_server()
     return ANNOUNCEMENT.format(folder=folder) if server is None else OWN.format(server=server, folder=folder)
 
 
@@ -62,7 +62,7 @@ def install(folder: Path, progress: Progress) -> None:
 
 
 def _install(folder: Path, progress: Progress) -> None:
-    server = prefix.own_server()
+    server = own_server()
     root = None if server is not None else folder / "root"
     if root is not None:
         server = root / "usr" / "bin" / "gzserver"
@@ -116,6 +116,15 @@ def check_machine() -> None:
     if library != "glibc" or numbers < OLDEST_LIBC:
         raise InputError("too old a C library", value=f"{library} {version}", expected="glibc 2.31 or newer")
     build.compiler()
+
+
+def own_server() -> Path | None:
+    """Return the machine's own gzserver if there is one on the path that runs and is of version 11."""
+    found = shutil.which("gzserver")
+    try:
+        return None if found is None or not server_version(Path(found), None) else Path(found)
+    except InputError:
+        return None
 
 
 def server_version(server: Path, root: Path | None) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,12 +82,6 @@ def place(prefix: str | os.PathLike[str] | None = None) -> Path:
     """Return the folder of the installation: the one given, else the environment's, else one in the user's cache."""
     chosen = prefix or os.environ.get(VARIABLE)
     return Path(chosen).expanduser().absolute() if chosen else user_cache_path("dubins-traffic") / "gazebo"
-
-
-def own_server() -> Path | None:
-    """Return the machine's own gzserver if there is one on the path."""
-    found = shutil.which("gzserver")
-    return None if found is None else Path(found)
 
 
 def find(prefix: str | os.PathLike[str] | None = None) -> Installation:

@@ -128,7 +128,7 @@ def _hull(body: Body) -> Element:
 
 def _visual(body: Body, colour: tuple[float, float, float]) -> Element:
     shape = cylinder(body.radius, HEIGHT) if isinstance(body, Disc) else box(body.length, body.width, HEIGHT)
-    return visual("hull", pose(0.0, 0.0, CLEARANCE + 0.5 * HEIGHT), shape, colour)
+    return visual("shell", pose(0.0, 0.0, CLEARANCE + 0.5 * HEIGHT), shape, colour)
 
 
 def _caster(place: str, x: float) -> Element:

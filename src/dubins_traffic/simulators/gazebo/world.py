@@ -46,19 +46,22 @@ def world(
     scenery : sequence of Element
         Further models that are only seen, such as roads.
     """
-    names = [car_name(n) for n in range(len(starts))]
-    cars = [
-        vehicle.model(name, start, body, ego=n == 0)
-        for n, (name, start) in enumerate(zip(names, starts, strict=True))
-    ]
-    solids = [obstacle(f"obstacle_{k}", shape) for k, shape in enumerate(obstacles)]
+    models = bodies(starts, body, obstacles)
+    solids, cars = models[: len(obstacles)], models[len(obstacles) :]
     listed = [
-        *(tag("car", name) for name in names),
+        *(tag("car", car.get("name", "")) for car in cars),
         *(tag("obstacle", solid.get("name", "")) for solid in solids),
     ]
     steps = tag("plugin", tag("torque", vehicle.TORQUE), *listed, name="dubins_traffic", filename=plugin)
-    contents = [physics(step), numbers("gravity", 0.0, 0.0, -9.81), ground(), *scenery, *solids, *cars, steps]
+    contents = [physics(step), numbers("gravity", 0.0, 0.0, -9.81), ground(), *scenery, *models, steps]
     return text(tag("sdf", tag("world", *contents, name="dubins_traffic"), version=VERSION))
+
+
+def bodies(starts: Sequence[Pose], body: Body, obstacles: Sequence[Obstacle]) -> list[Element]:
+    """Return a model of each obstacle, then one of each car at its start."""
+    solids = [obstacle(f"obstacle_{k}", shape) for k, shape in enumerate(obstacles)]
+    cars = [vehicle.model(car_name(n), start, body, ego=n == 0) for n, start in enumerate(starts)]
+    return [*solids, *cars]
 
 
 def car_name(n: int) -> str:
@@ -87,7 +90,7 @@ def obstacle(name: str, shape: Obstacle) -> Element:
         middle = pose(shape.x, shape.y, vehicle.BUMPER)
         parts = [_solid("disc", middle, sphere(shape.radius))]
         standing = pose(shape.x, shape.y, 0.5 * OBSTACLE_HEIGHT)
-        parts.append(visual("disc", standing, cylinder(shape.radius, OBSTACLE_HEIGHT), GREY))
+        parts.append(visual("disc_seen", standing, cylinder(shape.radius, OBSTACLE_HEIGHT), GREY))
     else:
         parts = [part for k, wall in enumerate(walls(shape)) for part in _wall(f"wall_{k}", *wall)]
     return tag("model", tag("static", "true"), tag("link", *parts, name="body"), name=name)
@@ -110,7 +113,7 @@ def walls(polygon: PolygonObstacle) -> list[tuple[float, float, float, float]]:
 def _wall(name: str, x: float, y: float, yaw: float, length: float) -> tuple[Element, Element]:
     solid = _solid(name, pose(x, y, vehicle.BUMPER, yaw=yaw), box(length, WALL, OBSTACLE_HEIGHT))
     standing = pose(x, y, 0.5 * OBSTACLE_HEIGHT, yaw=yaw)
-    return solid, visual(name, standing, box(length, WALL, OBSTACLE_HEIGHT), GREY)
+    return solid, visual(f"{name}_seen", standing, box(length, WALL, OBSTACLE_HEIGHT), GREY)
 
 
 def _solid(name: str, where: Element, geometry: Element) -> Element:

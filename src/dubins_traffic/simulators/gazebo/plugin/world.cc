@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
-#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -30,13 +29,13 @@
 
 namespace dubins_traffic {
 
-using gazebo::physics::Collision;
 using Vector = ignition::math::Vector3d;
 
 enum Kind : std::uint32_t { HELLO = 1, STEP = 2, STATE = 3, PLACE = 4, SCAN = 5, QUIT = 6, REFUSED = 0xffffffff };
 
 const char *const SOCKET = "DUBINS_TRAFFIC_GAZEBO_SOCKET";
 const std::chrono::microseconds LINGER(60);
+const int MOST = 4;                       // points of contact of two hulls
 const std::uint32_t LONGEST = 1u << 20;  // numbers in a message
 
 // Numbers over a socket: kind, count, count doubles, all in this machine's byte order.
@@ -96,6 +95,12 @@ struct Car {
   gazebo::physics::JointPtr wheels[2];
 };
 
+struct Hull {
+  dGeomID shape;
+  int body;  // of a car its number, of obstacle k -1 - k
+  dReal box[6];
+};
+
 class World : public gazebo::WorldPlugin {
  public:
   void Load(gazebo::physics::WorldPtr world, sdf::ElementPtr sdf) override {
@@ -111,8 +116,6 @@ class World : public gazebo::WorldPlugin {
     if (sdf->HasElement("obstacle"))
       for (auto each = sdf->GetElement("obstacle"); each; each = each->GetNextElement("obstacle"))
         AddObstacle(each->Get<std::string>());
-    // The engine writes down the contacts of what is in a filter, and drops those of wheels on the ground.
-    world_->Physics()->GetContactManager()->CreateFilter("dubins_traffic", hulls_);
     begin_ = gazebo::event::Events::ConnectWorldUpdateBegin(std::bind(&World::Begin, this));
     before_ = gazebo::event::Events::ConnectBeforePhysicsUpdate(std::bind(&World::Collided, this));
     end_ = gazebo::event::Events::ConnectWorldUpdateEnd(std::bind(&World::End, this));
@@ -126,16 +129,18 @@ class World : public gazebo::WorldPlugin {
     car.wheels[0] = car.model->GetJoint("left_wheel_joint");
     car.wheels[1] = car.model->GetJoint("right_wheel_joint");
     for (auto &wheel : car.wheels) wheel->SetParam("fmax", 0, torque_);
-    const auto hull = car.base->GetCollision("hull");
-    bodies_[hull.get()] = static_cast<int>(cars_.size());
-    hulls_[hull->GetScopedName()] = hull;
+    AddHull(car.base->GetCollision("hull"), static_cast<int>(cars_.size()));
     cars_.push_back(car);
   }
 
   void AddObstacle(const std::string &name) {
     --obstacle_;
     for (const auto &link : Model(name)->GetLinks())
-      for (const auto &collision : link->GetCollisions()) bodies_[collision.get()] = obstacle_;
+      for (const auto &collision : link->GetCollisions()) AddHull(collision, obstacle_);
+  }
+
+  void AddHull(const gazebo::physics::CollisionPtr &collision, int body) {
+    hulls_.push_back({boost::dynamic_pointer_cast<gazebo::physics::ODECollision>(collision)->GetCollisionId(), body, {}});
   }
 
   gazebo::physics::ModelPtr Model(const std::string &name) {
@@ -201,31 +206,35 @@ class World : public gazebo::WorldPlugin {
   }
 
   // Called between the search for collisions and the solution of the step: velocities are still those before impact.
+  // The engine is asked about the hulls that are near each other; to have it write down all contacts takes longer.
   void Collided() {
     if (left_ == 0) return;
-    const auto *manager = world_->Physics()->GetContactManager();
-    const auto &all = manager->GetContacts();
-    for (unsigned int k = 0; k < manager->GetContactCount(); ++k) Note(*all[k]);
+    for (auto &hull : hulls_) dGeomGetAABB(hull.shape, hull.box);
+    for (std::size_t i = 0; i < cars_.size(); ++i)
+      for (std::size_t j = i + 1; j < hulls_.size(); ++j)
+        if (Near(hulls_[i].box, hulls_[j].box)) Note(hulls_[i], hulls_[j]);
   }
 
-  void Note(const gazebo::physics::Contact &contact) {
-    const auto one = bodies_.find(contact.collision1), two = bodies_.find(contact.collision2);
-    if (one == bodies_.end() || two == bodies_.end() || contact.count == 0) return;
-    int car = one->second, other = two->second;
-    if (car < 0 && other < 0) return;
-    const bool swap = car < 0 || (other >= 0 && other < car);
-    if (swap) std::swap(car, other);
-    if (!met_.insert({car, other}).second) return;
-    Vector point, normal;  // the engine's normal points from the second body to the first
-    for (int k = 0; k < contact.count; ++k) {
-      point += contact.positions[k] / contact.count;
-      normal += (swap ? 1.0 : -1.0) * contact.normals[k];
+  static bool Near(const dReal *one, const dReal *two) {
+    return one[0] <= two[1] && two[0] <= one[1] && one[2] <= two[3] && two[2] <= one[3];
+  }
+
+  void Note(const Hull &one, const Hull &two) {
+    dContactGeom found[MOST];
+    const int count = dCollide(one.shape, two.shape, MOST, found, sizeof(dContactGeom));
+    if (count < 1 || !met_.insert({one.body, two.body}).second) return;
+    double x = 0, y = 0, nx = 0, ny = 0;  // the engine's normal points into the first body
+    for (int k = 0; k < count; ++k) {
+      x += found[k].pos[0] / count;
+      y += found[k].pos[1] / count;
+      nx -= found[k].normal[0];
+      ny -= found[k].normal[1];
     }
-    const double length = std::hypot(normal.X(), normal.Y());
-    contacts_.insert(contacts_.end(), {static_cast<double>(step_), static_cast<double>(car), static_cast<double>(other),
-                                       point.X(), point.Y(), normal.X() / length, normal.Y() / length});
-    AddPose(contacts_, car);
-    AddPose(contacts_, other);
+    const double length = std::hypot(nx, ny);
+    contacts_.insert(contacts_.end(), {static_cast<double>(step_), static_cast<double>(one.body),
+                                       static_cast<double>(two.body), x, y, nx / length, ny / length});
+    AddPose(contacts_, one.body);
+    AddPose(contacts_, two.body);
   }
 
   void End() {
@@ -298,8 +307,7 @@ class World : public gazebo::WorldPlugin {
   gazebo::event::ConnectionPtr begin_, before_, end_;
   std::unique_ptr<Line> line_;
   std::vector<Car> cars_;
-  std::map<const Collision *, int> bodies_;  // of a car its number, of obstacle k -1 - k
-  std::map<std::string, gazebo::physics::CollisionPtr> hulls_;
+  std::vector<Hull> hulls_;  // those of the cars, in their order, then those of obstacles
   std::set<std::pair<int, int>> met_;        // in the steps that are running
   std::vector<double> in_, out_, contacts_;
   std::uint32_t kind_ = 0;
