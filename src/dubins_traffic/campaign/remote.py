@@ -11,7 +11,7 @@ from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError, PeerError, TransportError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Controller, End
+from dubins_traffic.protocols import Controller, End, Simulator
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro, Next, Phase
 
@@ -34,6 +34,8 @@ class Session:
         Drives the ego if the link does not.
     remote : tuple of str
         Names of e-agents that are driven elsewhere whatever their type says.
+    simulator : Simulator, optional
+        Instead of the one that instances name.
     records : Path, optional
         Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
     """
@@ -45,6 +47,7 @@ class Session:
     controller: str | Controller = "lanes"
     remote: tuple[str, ...] = ()
     records: Path | None = None
+    simulator: Simulator | None = None
 
 
 def run_remote(session: Session) -> Iterator[Result]:
@@ -74,6 +77,7 @@ def run_remote(session: Session) -> Iterator[Result]:
             record=_record(session.records, number, repetition),
             overwrite=True,
             link=session.link,
+            simulator=session.simulator,
         )
         lost = session.link.inbox.stopped
         if lost is not None and lost[0] is End.TRANSPORT_LOST:
@@ -116,7 +120,7 @@ def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
     inbox.placed()
     try:
         while True:
-            with Trial(instance, link=link):
+            with Trial(instance, simulator=session.simulator, link=link):
                 if maestro.phase is Phase.PREPARING:
                     maestro.enter(Phase.READY)
                 link.idle(lambda: maestro.next is not None or inbox.news)

@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dubins_traffic.campaign.sessions import Programme, rehearse
 from dubins_traffic.campaign.single import Result
+from dubins_traffic.errors import InputError
 from dubins_traffic.protocols import Clock
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.link import Link, Patience
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.desk import Told
+from dubins_traffic.transports.ros1.external import NAME as WORLD
+from dubins_traffic.transports.ros1.external import ExternalWorld
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
@@ -39,6 +42,10 @@ class Terms:
         How long peers are waited for otherwise.
     clock : bool
         Whether `/clock` is published.
+    world : bool
+        Whether the cars are not simulated here but somewhere in the graph, in real time.
+    poses : str, optional
+        Of such a world: the topic of each car's pose, ``{}`` in place of its name.
     """
 
     master: int | None = None
@@ -47,6 +54,8 @@ class Terms:
     deadline: float = 5.0
     patience: Patience = field(default_factory=Patience)
     clock: bool = False
+    world: bool = False
+    poses: str | None = None
 
 
 def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
@@ -61,6 +70,9 @@ def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
     InputError
         If an instance can't be drawn.
     """
+    if terms.world and (terms.lockstep or terms.clock or terms.factor != 1.0):
+        expected = "neither --lockstep nor --clock nor --factor"
+        raise InputError("a world outside has its own time", file="--simulator", expected=expected)
     clock: Clock = Lockstep(terms.deadline) if terms.lockstep else RealTime(terms.factor)
     maestro = Maestro() if programme.controller is None else None
     rehearse(programme.supply(0))
@@ -73,10 +85,18 @@ def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
         else:
             uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         stack.callback(leave)
-        transport = Ros1(uri, maestro=maestro, told=_told(programme), clock=terms.clock)
+        transport = Ros1(
+            uri, maestro=maestro, told=_told(programme), clock=terms.clock, simulated=not terms.world
+        )
         stack.callback(transport.close)
         link = Link(transport, clock, ego=programme.controller is None, patience=terms.patience)
-        yield from programme.run(link, maestro)
+        simulator = None
+        if terms.world:
+            ego = programme.controller is None
+            simulator = ExternalWorld(transport.rospy, ego=ego, poses=terms.poses)
+            supply = programme.supply
+            programme = replace(programme, supply=lambda n: replace(supply(n), simulator=WORLD))
+        yield from programme.run(link, maestro, simulator)
 
 
 def _told(programme: Programme) -> Told:

@@ -22,6 +22,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.protocols import Simulator
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
@@ -48,7 +49,9 @@ class Programme:
     data: Path | None
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
-    def run(self, link: Link, maestro: Maestro | None) -> Iterator[Result]:
+    def run(
+        self, link: Link, maestro: Maestro | None, simulator: Simulator | None = None
+    ) -> Iterator[Result]:
         """Run it over `link`; see `remote.run_remote`."""
         return run_remote(
             Session(
@@ -59,6 +62,7 @@ class Programme:
                 self.controller or "",
                 self.remote,
                 self.records,
+                simulator,
             )
         )
 

@@ -16,7 +16,7 @@ from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
-from dubins_traffic.transports.drivers import RemoteAgents, RemoteController
+from dubins_traffic.transports.drivers import LocalController, RemoteAgents, RemoteController
 from dubins_traffic.transports.link import Link
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
@@ -140,6 +140,7 @@ def run_trial(
     else:
         name = controller if isinstance(controller, str) else type(controller).__name__
         driver = controllers.load(controller) if isinstance(controller, str) else controller
+        driver = driver if link is None else LocalController(link, driver)
     scorer = Scorer()
     writer = None
     if record is not None:

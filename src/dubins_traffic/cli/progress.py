@@ -7,10 +7,11 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(trials: int | None = None) -> Generator[Callable[[int, int], object]]:
+def progress(trials: int | None = None, *, hidden: bool = False) -> Generator[Callable[[int, int], object]]:
     """Show how many of the trials are done, on standard error and only to people.
 
     Yields what is to be told (trials done, trials in all); `trials` is how many there are, if that is known before.
+    `hidden`: nothing is shown, since someone else draws there.
     """
     from rich.console import Console
     from rich.progress import (
@@ -31,6 +32,8 @@ def progress(trials: int | None = None) -> Generator[Callable[[int, int], object
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+    with Progress(
+        *columns, console=console, transient=True, disable=hidden or not console.is_terminal
+    ) as shown:
         task = shown.add_task("trials", total=trials)
         yield lambda done, total: shown.update(task, completed=done, total=total)

@@ -81,6 +81,18 @@ def run(
     clock: Annotated[
         bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
     ] = False,
+    simulator: Annotated[
+        str | None,
+        typer.Option(
+            "--simulator", metavar="S", help="ros1-world: the cars are in a world that is not ours."
+        ),
+    ] = None,
+    poses: Annotated[
+        str | None,
+        typer.Option(
+            "--poses", metavar="TOPIC", help="Of that world: PoseStamped of each car, {} for its name."
+        ),
+    ] = None,
     seed: options.Seed = 0,
     rnd: Annotated[
         str | None,
@@ -112,9 +124,9 @@ def run(
         source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
         data=data or data_over, overwrite_data=data is None, records=records,
     )  # fmt: skip
-    terms = Terms(
-        port if master else None, lockstep, factor, deadline, Patience(begin=begin, silence=silence), clock
-    )
+    world = _is_world(simulator, poses)
+    patience = Patience(begin=begin, silence=silence)
+    terms = Terms(port if master else None, lockstep, factor, deadline, patience, clock, world, poses)
     results: list[Result] = []
     signal.signal(signal.SIGTERM, _interrupt)
     try:
@@ -145,6 +157,19 @@ def messages(
 
     (write_cpp if cpp else write_python)(folder)
     options.tell(str(folder))
+
+
+def _is_world(simulator: str | None, poses: str | None) -> bool:
+    """Tell whether the cars are in another world."""
+    if simulator not in (None, "embedded", "ros1-world"):
+        raise InputError(
+            "not a simulator over ROS 1", file="--simulator", value=simulator, expected="ros1-world"
+        )
+    if poses is not None and simulator != "ros1-world":
+        raise InputError(
+            "is of another world", file="--poses", value=poses, expected="--simulator ros1-world"
+        )
+    return simulator == "ros1-world"
 
 
 def _check_remappings(arguments: list[str]) -> None:

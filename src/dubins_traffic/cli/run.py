@@ -122,7 +122,7 @@ def run(
     )
     results: list[Result] = []
     try:
-        with progress(len(todo.jobs)) as tell:
+        with progress(len(todo.jobs), hidden=controller == "keyboard") as tell:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 tell(len(results), len(todo.jobs))

@@ -41,8 +41,6 @@ PROGRESS = 0.3
 """Metres that the car must get on for its waits to be forgotten."""
 TURN_SHARE = 0.1
 """Seconds of standing that a radian of turning in place counts."""
-VERGE = 0.02
-"""What the car's centre keeps from the edge of the road whatever happens, metres."""
 HELD_UP = 0.4
 """Seconds without leave to move after which the car looks for another way."""
 BARRED = -1.0

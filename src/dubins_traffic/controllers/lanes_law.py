@@ -44,7 +44,6 @@ from dubins_traffic.controllers.lanes_desk import (
     TURN_SHARE,
     TURNS,
     UNTIL,
-    VERGE,
     WAITED,
     YAW_MOST,
     Desk,
@@ -72,11 +71,9 @@ from dubins_traffic.driving.gaps import (
     sample_path,
 )
 from dubins_traffic.driving.paths import HIGH, LENGTH, LOW, NO_STOP, PIVOT, WAITING_GAP
-from dubins_traffic.driving.safety import motion_is_safe
+from dubins_traffic.driving.safety import VERGE, leaves_road, motion_is_safe
 from dubins_traffic.driving.tracking import AHEAD, ahead_on, locate, place_on, steer
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.trig import advance
-from dubins_traffic.roads.lookup import nearest_segment
 from dubins_traffic.roads.table import RoadTable
 
 
@@ -291,24 +288,13 @@ def _last_look(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: flo
 
 
 @jit
-def _stays_on_road(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
-    x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
-    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, desk.car[b, PERIOD])
-    edge = roads.half_width[desk.net[b]] - VERGE
-    _, d2 = nearest_segment(roads, desk.net[b], nx, ny)
-    if d2 <= edge * edge:
-        return True
-    _, before = nearest_segment(roads, desk.net[b], x, y)
-    return d2 < before
-
-
-@jit
 def _is_safe(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
-    if speed != 0.0 and not _stays_on_road(desk, roads, b, speed, yaw_rate):
-        return False
     car = desk.car[b]
     period = car[PERIOD]
     x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
+    edge = float(roads.half_width[desk.net[b]]) - VERGE
+    if speed != 0.0 and leaves_road(x, y, c, s, speed, yaw_rate, period, edge, roads, desk.net[b]):
+        return False
     a, h, r, reach = car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING], car[REACH]
     travel = max(car[FASTEST], -car[SLOWEST]) * period
     if a + h > 0.0:

@@ -15,11 +15,13 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.protocols import Controller
 
 _BUILT_IN = {
+    "keyboard": ("dubins_traffic.controllers.keyboard", "Keyboard"),
     "lanes": ("dubins_traffic.controllers.lanes", "Lanes"),
     "rules": ("dubins_traffic.controllers.rules", "Rules"),
     "simple": ("dubins_traffic.controllers.simple", "Simple"),
 }
 _DESCRIPTIONS = {
+    "keyboard": "you, with the arrow keys, in real time; the map is drawn in the terminal",
     "lanes": "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
     "rules": "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
     "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",

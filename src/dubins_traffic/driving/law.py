@@ -49,13 +49,12 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, stays_right
-from dubins_traffic.driving.safety import motion_is_safe
+from dubins_traffic.driving.safety import VERGE, leaves_road, motion_is_safe
 from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to_go
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
-from dubins_traffic.kernels.trig import advance
-from dubins_traffic.roads.lookup import lane_end, lane_start, nearest_segment
+from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED, LEFT
 
@@ -72,8 +71,6 @@ SLANT, STEEP = 0.7, 0.9
 """Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
-VERGE = 0.02
-"""What the ego's centre keeps from the edge of the road whatever happens, metres."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
@@ -190,8 +187,10 @@ def drive(
         b, n, speed, left, offset, px, py, part, outside, way, near if close else 0, trusted, state, labels,
         obstacles, drivers, desk,
     )  # fmt: skip
-    if speed != 0.0 and ints[KIND] == ROUND and leaves_road(x, y, c, s, speed, yaw_rate, net, roads, build):
-        speed = 0.0
+    if speed != 0.0 and ints[KIND] == ROUND:
+        edge = float(roads.half_width[net]) - VERGE
+        if leaves_road(x, y, c, s, speed, yaw_rate, build[PERIOD], edge, roads, net):
+            speed = 0.0
     return speed, yaw_rate
 
 
@@ -356,28 +355,6 @@ def steer(
         if dot < 0.0:
             yaw_rate = limit if cross >= 0.0 else -limit
     return speed, min(max(yaw_rate, -limit), limit)
-
-
-@jit
-def leaves_road(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    speed: float,
-    yaw_rate: float,
-    net: int,
-    roads: RoadTable,
-    build: Any,
-) -> bool:
-    """Tell whether a command takes the centre over the edge of the road, or farther beyond it."""
-    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
-    edge = roads.half_width[net] - VERGE
-    _, after = nearest_segment(roads, net, nx, ny)
-    if after <= edge * edge:
-        return False
-    _, before = nearest_segment(roads, net, x, y)
-    return after >= before
 
 
 @jit

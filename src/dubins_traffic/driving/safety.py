@@ -1,13 +1,39 @@
-"""The last look before a tick: no motion that could bring about a contact."""
+"""The last look before a tick: no motion that could bring about a contact, or leads off the road."""
 
 from __future__ import annotations
 
 from dubins_traffic.kernels.boxes import separation
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.trig import advance
+from dubins_traffic.roads.lookup import nearest_segment
+from dubins_traffic.roads.table import RoadTable
 
 GUARD = 0.01
 """What is kept free beyond the other's worst motion, metres."""
+VERGE = 0.02
+"""What an ego's centre keeps from the edge of the road whatever happens, metres."""
+
+
+@jit
+def leaves_road(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    speed: float,
+    yaw_rate: float,
+    period: float,
+    edge: float,
+    roads: RoadTable,
+    net: int,
+) -> bool:
+    """Whether a motion for one tick takes the centre farther than `edge` from all roads, or farther beyond it."""
+    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, period)
+    _, after = nearest_segment(roads, net, nx, ny)
+    if after <= edge * edge:
+        return False
+    _, before = nearest_segment(roads, net, x, y)
+    return after >= before
 
 
 @jit

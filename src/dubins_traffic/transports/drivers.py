@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import Command, Labels, Observation, State
 from dubins_traffic.errors import PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import End
+from dubins_traffic.protocols import Closes, Controller, End
 from dubins_traffic.transports.link import EGO_NAME, Link
 
 if TYPE_CHECKING:
@@ -29,6 +29,24 @@ class RemoteController:
     def act(self, observation: Observation) -> Command:
         """Return the command that answers the frame just shown."""
         return Command(*self._link.command(EGO_NAME, observation.tick))
+
+
+class LocalController:
+    """A controller in this process of a trial that others see or drive in: its link learns when the trial begins."""
+
+    def __init__(self, link: Link, controller: Controller) -> None:
+        self._link, self._controller = link, controller
+        self.act = controller.act
+
+    def start(self, problem: Problem) -> None:
+        """Start the controller, then the trial."""
+        self._controller.start(problem)
+        self._link.announce()
+
+    def close(self) -> None:
+        """Close the controller if it wants to be closed."""
+        if isinstance(self._controller, Closes):
+            self._controller.close()
 
 
 class RemoteAgents:

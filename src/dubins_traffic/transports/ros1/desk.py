@@ -48,22 +48,31 @@ class Desk:
         Who answers mode requests; without one there is no mode service.
     told : Told
         The session, for parameters.
+    simulated : bool
+        Whether the cars are simulated here, so that pausing and placing them is served.
     """
 
-    def __init__(self, rospy: Any, mailbox: Mailbox, maestro: Maestro | None, told: Told) -> None:
+    def __init__(
+        self, rospy: Any, mailbox: Mailbox, maestro: Maestro | None, told: Told, *, simulated: bool = True
+    ) -> None:
         m = load()
         self._rospy, self._m, self._mailbox, self._maestro = rospy, m, mailbox, maestro
         self._set: list[str] = []
         self._problem = rospy.Publisher(
             f"/{NAME}/probleminstance_JSON", m.ProblemInstanceJSON, queue_size=1, latch=True, tcp_nodelay=True
         )
-        self._services = [
-            rospy.Service("/gazebo/pause_physics", m.Empty, partial(self._pause, True)),
-            rospy.Service("/gazebo/unpause_physics", m.Empty, partial(self._pause, False)),
-        ]
+        self._services: list[Any] = []
+        self._placing: Any = None
+        if simulated:
+            self._services += [
+                rospy.Service("/gazebo/pause_physics", m.Empty, partial(self._pause, True)),
+                rospy.Service("/gazebo/unpause_physics", m.Empty, partial(self._pause, False)),
+            ]
+            self._placing = rospy.Subscriber(
+                "/gazebo/set_model_state", m.ModelState, self._place, queue_size=10
+            )
         if maestro is not None:
             self._services.append(rospy.Service(f"/{NAME}/mode", m.MMode, self._mode))
-        self._placing = rospy.Subscriber("/gazebo/set_model_state", m.ModelState, self._place, queue_size=10)
         self._put("/number_trials", told.number_trials)
         self._put("/dubins_traffic/results_file", told.results_file)
         for name, bounds in (("duration", told.duration_bounds), ("number_goals", told.number_goals_bounds)):
@@ -88,7 +97,8 @@ class Desk:
         """Take everything back."""
         for service in self._services:
             service.shutdown("the session is over")
-        self._placing.unregister()
+        if self._placing is not None:
+            self._placing.unregister()
         self._problem.unregister()
         for name in self._set:
             if self._rospy.has_param(name):

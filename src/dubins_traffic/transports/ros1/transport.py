@@ -38,6 +38,8 @@ class Ros1:
         The session, for parameters.
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
+    simulated : bool
+        Whether the cars are simulated here; else only labels are published, and what is the maestro's.
     rate : float
         How many model states a second are published in real time, at least.
     """
@@ -52,10 +54,12 @@ class Ros1:
         maestro: Maestro | None = None,
         told: Told | None = None,
         clock: bool = False,
+        simulated: bool = True,
         rate: float = 120.0,
     ) -> None:
         self.interval = 1.0 / rate
         self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
+        self._simulated_here = simulated
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: set[str] = set()
@@ -63,12 +67,17 @@ class Ros1:
         self._simulated = 0.0
         self._shown = 0.0
 
+    @property
+    def rospy(self) -> Any:
+        """The module, with this process a node once the transport is open."""
+        return self._rospy
+
     def open(self, mailbox: Mailbox) -> None:
         """Join the graph; TransportError or MissingRosError if that can't be."""
         self._rospy = join(self._uri)
         self._mailbox = mailbox
         self._topics = Topics(self._rospy)
-        self._desk = Desk(self._rospy, mailbox, self._maestro, self._told)
+        self._desk = Desk(self._rospy, mailbox, self._maestro, self._told, simulated=self._simulated_here)
         self._watch = Watch(self._uri, self._look, self._lose)
         self._open = True
 
@@ -76,7 +85,7 @@ class Ros1:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
         with self._guarded():
             self._topics.retain(instance.names)
-            self._world = World(self._topics, instance, clock=self._clock)
+            self._world = World(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
             self._desk.describe(instance)
             self._listen(remote)
         self._simulated += self._shown

@@ -79,28 +79,36 @@ class World:
         Whose cars.
     clock : bool
         Whether `/clock` is published.
+    simulated : bool
+        Whether the cars are simulated here; else only labels are published.
     """
 
-    def __init__(self, topics: Topics, instance: Instance, *, clock: bool) -> None:
+    def __init__(self, topics: Topics, instance: Instance, *, clock: bool, simulated: bool = True) -> None:
         self._m = load()
         self._rospy = topics.rospy
         self._publisher = topics.publisher
         self._names = instance.names
         self._network = instance.problem.network
         self._rate = instance.problem.rate
-        self._models = self._publisher("/gazebo/model_states", self._m.ModelStates)
+        self._label_message = self._m.LabelStamped()
+        self._label_message.header.frame_id = "map"
         self._labels = self._publisher("/loutput", self._m.LabelStamped, latch=True)
+        self._simulated = simulated
+        if not simulated:
+            return
+        self._models = self._publisher("/gazebo/model_states", self._m.ModelStates)
         self._transforms = self._publisher("/tf", self._m.TFMessage)
         self._clock = self._publisher("/clock", self._m.Clock) if clock else None
         self._states = self._model_states()
         self._cars = [self._car(instance, n, name) for n, name in enumerate(instance.names)]
-        self._label_message = self._m.LabelStamped()
-        self._label_message.header.frame_id = "map"
         self._odometry_at = -1.0
 
     def publish(self, view: View, stamp: float, *, frame: bool) -> None:
         """Publish `view`, stamped so (seconds); poses last. `frame`: it is a frame, and everything is sent."""
         time = self._rospy.Time.from_sec(stamp)
+        if not self._simulated:
+            self._put_labels(view, time)
+            return
         if self._clock is not None:
             self._clock.publish(time)
         self._put_labels(view, time)

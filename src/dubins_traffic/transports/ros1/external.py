@@ -1,0 +1,238 @@
+"""A world that is not ours: poses come over ROS 1, commands go to the cars, and only the referee is here."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from threading import Lock
+from time import monotonic, sleep
+from typing import TYPE_CHECKING, Any
+
+from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.state import EGO, Contact, Pose, State
+from dubins_traffic.errors import ControllerError, InputError, TransportError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import Capabilities, End
+from dubins_traffic.transports.ros1.messages import load
+from dubins_traffic.transports.ros1.transport import COMMANDS
+from dubins_traffic.transports.ros1.world import heading
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+NAME = "ros1-world"
+APPEAR = 10.0
+"""Seconds within which every car must have been seen."""
+LATE = 0.5
+"""Age of a pose above which it is late, seconds."""
+FROZEN = 2.0
+"""Seconds for which a car that is told to drive may have the very same pose."""
+CREEP = 0.05
+"""Speed, m/s, above which a command counts as telling a car to drive."""
+LEAP, SHARE = 0.25, 1.5
+"""A car jumps if it moves by more than its top speed allows times SHARE, and LEAP metres."""
+APART = 0.01
+"""Metres of gap after which two cars that touched may touch anew."""
+STANDING = 0.02
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What is known of a car: its latest pose, when it came, and since when it has been the same."""
+
+    pose: Pose
+    came: float
+    same_since: float
+
+
+class ExternalWorld:
+    """A `protocols.Simulator` that moves nothing itself: one trial at a time, in real time, round cars.
+
+    Parameters
+    ----------
+    rospy : module
+        With this process a node.
+    ego : bool
+        Whether the ego's node sends its commands to the car itself. E-agents of kind `remote` do.
+    poses : str, optional
+        A topic of geometry_msgs/PoseStamped for each car, ``{}`` in place of its name, as trackers publish; by default
+        all cars are in `/gazebo/model_states`.
+    """
+
+    capabilities = Capabilities(batched=False, deterministic=False, lockstep=False)
+
+    def __init__(self, rospy: Any, *, ego: bool, poses: str | None = None) -> None:
+        if poses is not None and "{}" not in poses:
+            raise InputError(
+                "not a topic for every car", file="--poses", value=poses, expected="such as /{}/pose"
+            )
+        self._rospy, self._ego, self._poses = rospy, ego, poses
+        self._lock = Lock()
+        self._seen: dict[str, _Seen] = {}
+        self._subscribers: list[Any] = []
+        self._publishers: dict[str, Any] = {}
+
+    def reset(self, instances: Sequence[Instance]) -> State:
+        """Begin a trial where the cars stand; TransportError if one of them is not seen."""
+        if len(instances) != 1:
+            raise InputError(
+                "a world outside has no batch", field="trials", value=len(instances), expected="1"
+            )
+        (self._instance,) = instances
+        body = self._instance.problem.car.body
+        if not isinstance(body, Disc):
+            raise InputError("round cars only", field="car.body", value=body, expected="a disc")
+        self._gap = 2.0 * body.radius
+        self._touching: set[tuple[int, int]] = set()
+        self._tick = 0
+        self._listen()
+        self._await()
+        self._state = State.zeros(1, len(self._instance.names))
+        self._look(None)
+        return self._state
+
+    def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
+        """Send the commands of the cars that are driven here, and take the poses that are in force now.
+
+        Raises
+        ------
+        ControllerError
+            `world_lost`, if poses are late, frozen or jump.
+        """
+        bounds = self._instance.problem.car.bounds
+        speed, yaw_rate = commands[0, :, 0], commands[0, :, 1]
+        speed.clip(bounds.speed_low, bounds.speed, out=speed)
+        limit = bounds.yaw_rate
+        for n, name in enumerate(self._instance.names):
+            turn = min(limit, abs(speed[n]) / bounds.turning_radius) if bounds.turning_radius else limit
+            yaw_rate[n] = min(max(yaw_rate[n], -turn), turn)
+            if name in self._publishers:
+                self._send(name, float(speed[n]), float(yaw_rate[n]))
+        self._tick += 1
+        self._look(speed)
+        return [self._contacts()]
+
+    def close(self) -> None:
+        """Stop the cars that are driven here."""
+        for name in self._publishers:
+            self._send(name, 0.0, 0.0)
+
+    def _send(self, name: str, speed: float, yaw_rate: float) -> None:
+        twist = load().Twist()
+        twist.linear.x, twist.angular.z = speed, yaw_rate
+        self._publishers[name].publish(twist)
+
+    def _listen(self) -> None:
+        """Subscribe to poses and advertise commands, once in a session."""
+        m, names = load(), self._instance.names
+        remote = {agent.name for agent in self._instance.e_agents if agent.kind == REMOTE}
+        if self._ego:
+            remote.add(names[EGO])
+        for name in names:
+            if name not in remote and name not in self._publishers:
+                topic = COMMANDS.format(name)
+                self._publishers[name] = self._rospy.Publisher(topic, m.Twist, queue_size=1, tcp_nodelay=True)
+        if self._subscribers:
+            return
+        if self._poses is None:
+            states = self._rospy.Subscriber(
+                "/gazebo/model_states", m.ModelStates, self._take, tcp_nodelay=True
+            )
+            self._subscribers.append(states)
+            return
+        for name in names:
+            take, topic = partial(self._take_pose, name), self._poses.format(name)
+            self._subscribers.append(self._rospy.Subscriber(topic, m.PoseStamped, take, tcp_nodelay=True))
+
+    def _take(self, message: Any) -> None:
+        for name, pose in zip(message.name, message.pose, strict=True):
+            self._note(name, pose)
+
+    def _take_pose(self, name: str, message: Any) -> None:
+        self._note(name, message.pose)
+
+    def _note(self, name: str, pose: Any) -> None:
+        z, w = pose.orientation.z, pose.orientation.w
+        numbers = (pose.position.x, pose.position.y, z, w)
+        if not all(map(math.isfinite, numbers)) or z == w == 0.0:
+            return
+        now, new = monotonic(), Pose(*numbers[:2], *heading(z, w))
+        with self._lock:
+            old = self._seen.get(name)
+            same = old.same_since if old is not None and old.pose == new else now
+            self._seen[name] = _Seen(new, now, same)
+
+    def _await(self) -> None:
+        until = monotonic() + APPEAR
+        while missing := [name for name in self._instance.names if name not in self._seen]:
+            if monotonic() > until:
+                where = self._poses or "/gazebo/model_states"
+                raise TransportError(f"no pose of {missing[0]} on {where} within {APPEAR:g} s")
+            sleep(0.02)
+
+    def _look(self, speed: Floats | None) -> None:
+        """Take the latest poses into the state; `speed` are the commands, None at the beginning."""
+        state, period, now = self._state, self._instance.problem.period, monotonic()
+        reach = SHARE * self._instance.problem.car.bounds.speed * (period + LATE) + LEAP
+        for n, name in enumerate(self._instance.names):
+            with self._lock:
+                seen = self._seen[name]
+            x, y, c, s = seen.pose
+            if now - seen.came > LATE:
+                raise _lost(f"no pose of {name} for {now - seen.came:.1f} s")
+            if speed is not None:
+                moved = math.hypot(x - state.x[0, n], y - state.y[0, n])
+                if moved > reach:
+                    raise _lost(f"{name} jumped by {moved:.2f} m")
+                if abs(speed[n]) > CREEP and now - max(seen.same_since, self._began) > FROZEN:
+                    raise _lost(f"the pose of {name} is frozen although it is told to drive")
+                turned = math.atan2(
+                    s * state.c[0, n] - c * state.s[0, n], c * state.c[0, n] + s * state.s[0, n]
+                )
+                ahead = (x - state.x[0, n]) * c + (y - state.y[0, n]) * s
+                state.speed[0, n], state.yaw_rate[0, n] = (
+                    math.copysign(moved, ahead) / period,
+                    turned / period,
+                )
+            else:
+                self._began = now
+            state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = x, y, c, s
+
+    def _contacts(self) -> tuple[Contact, ...]:
+        """Return the pairs that touch now and did not before, as the poses tell."""
+        state, found = self._state, list[Contact]()
+        x, y = state.x[0].tolist(), state.y[0].tolist()
+        for a, b in itertools.combinations(range(len(x)), 2):
+            dx, dy = x[b] - x[a], y[b] - y[a]
+            distance = math.hypot(dx, dy)
+            if distance > self._gap + APART:
+                self._touching.discard((a, b))
+            elif distance <= self._gap and (a, b) not in self._touching and distance > 0.0:
+                self._touching.add((a, b))
+                found.append(self._contact(a, b, dx / distance, dy / distance))
+        return tuple(found)
+
+    def _contact(self, a: int, b: int, nx: float, ny: float) -> Contact:
+        state, half = self._state, 0.5 * self._gap
+        speed = [float(state.speed[0, n]) for n in (a, b)]
+        along = [float(state.c[0, n]) * nx + float(state.s[0, n]) * ny for n in (a, b)]
+        return Contact(
+            tick=self._tick,
+            time=self._tick * self._instance.problem.period,
+            car=a,
+            other=b,
+            x=float(state.x[0, a]) + half * nx,
+            y=float(state.y[0, a]) + half * ny,
+            nx=nx,
+            ny=ny,
+            closing=(speed[0] * along[0], -speed[1] * along[1]),
+            moved=(abs(speed[0]) > STANDING, abs(speed[1]) > STANDING),
+        )
+
+
+def _lost(detail: str) -> ControllerError:
+    return ControllerError(End.WORLD_LOST.value, detail)

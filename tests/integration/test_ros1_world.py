@@ -1,0 +1,101 @@
+"""A world that is not ours, judged by our referee; `tests/ros_world.py` is that world."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import dubins_traffic as dt
+from dubins_traffic.campaign.sessions import rehearse
+from dubins_traffic.record.sink import End
+from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, need_ros
+
+COURSE = {
+    "duration": 3.0,
+    "number_trials": 1,
+    "e-agents": [{"type": "scripted", "name": "agent0", "parameters": {"commands": [[9, 0.2, 0.0]]}}],
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    rehearse(dt.draw(dt.load_config("demo")))
+
+
+def world(ros: Graph, fault: str) -> None:
+    ros.start(
+        [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, "ego", "0", "-0.3", "agent0", "3", "3"],
+        PYTHONPATH=str(ros.client_messages()),
+    )
+
+
+def run(ros: Graph, folder: Path, fault: str, **more: object) -> dt.Record:
+    world(ros, fault)
+    records = folder / "out"
+    options = [
+        "--simulator",
+        "ros1-world",
+        "--controller",
+        f"{ROOT}/tests/smooth.py:Smooth",
+        "--records",
+        records,
+    ]
+    status, _, err = finish(ros.session(configuration(folder, **{**COURSE, **more}), *options))
+    assert status in (0, 1), err
+    return dt.load_record(records / "trial-0000.mcap")
+
+
+def test_cars_elsewhere_are_driven_and_judged_here(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        record = run(ros, tmp_path, "none")
+    assert record.ending is not None
+    assert record.ending.end is End.DURATION
+    frames = record.frames
+    assert len(frames) == 91
+    assert (frames.x[0, 0], frames.y[0, 0]) == (0.0, -0.3)
+    assert frames.x[-1, 0] > 0.3
+    assert frames.x[-1, 1] - frames.x[0, 1] == pytest.approx(0.6, abs=0.1)
+    sheet = dt.score(record)
+    assert sheet.icra2016 is not None
+
+
+def test_a_node_drives_the_ego_and_a_tracker_sees_the_cars(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        world(ros, "none")
+        options = ["--simulator", "ros1-world", "--poses", "/tracker/{}", "--records", tmp_path / "out"]
+        session = ros.session(configuration(tmp_path, **COURSE), *options)
+        status, _, err = finish(ros.client("drive"))
+        assert status == 0, err
+        assert finish(session)[0] == 0
+    record = dt.load_record(tmp_path / "out" / "trial-0000.mcap")
+    assert record.ending is not None
+    assert record.ending.end is End.DURATION
+    assert record.instance.simulator == "ros1-world"
+    assert record.frames.command_speed[-1, 0] > 0.2
+    assert record.frames.x[-1, 0] > 0.3
+
+
+@pytest.mark.parametrize(("fault", "word"), [("freeze", "frozen"), ("jump", "jumped"), ("stop", "no pose")])
+def test_a_world_that_fails_ends_the_trial_with_its_reason(tmp_path: Path, fault: str, word: str) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        record = run(ros, tmp_path, fault, duration=20.0)
+    assert record.ending is not None
+    assert record.ending.end is End.WORLD_LOST
+    assert word in record.ending.detail
+
+
+def test_a_car_that_is_nowhere(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        world(ros, "none")
+        more = {"e-agents": [{"type": "wander", "name": "agent7"}]}
+        options = ["--simulator", "ros1-world", "--controller", "simple"]
+        status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, **more}), *options))
+    assert status == 2
+    assert "no pose of agent7" in err
+    assert json.loads((tmp_path / "config.json").read_text())["number_trials"] == 1
