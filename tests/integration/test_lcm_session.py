@@ -95,7 +95,10 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
 
 @pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_controller_killed_or_stopped_ends_its_trial_only(fault: signal.Signals) -> None:
-    with running(*PYTHON) as peer, running(*lcm_run("--silence", "0.7", "--trials", "1", "--json")) as session:
+    with (
+        running(*PYTHON) as peer,
+        running(*lcm_run("--silence", "0.7", "--trials", "1", "--json")) as session,
+    ):
         wait_for_commands()
         peer.send_signal(fault)
         status, out, err = ended(session)
