@@ -29,7 +29,7 @@ AGENTS = [
     {"type": "follow", "name": "agentf"},
     {"type": "parked", "name": "parked", "parameters": {"vacates_after": 3.0}},
 ]
-OWN_NETWORKS = {"random": {"intersections": [5, 14], "segments": [6, 18]}}
+OWN_NETWORKS = {"random": {"intersections": 8, "segments": 10}}
 GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
 
 
