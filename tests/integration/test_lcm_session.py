@@ -95,7 +95,10 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
 
 @pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_controller_killed_or_stopped_ends_its_trial_only(fault: signal.Signals) -> None:
-    with running(*PYTHON) as peer, running(*lcm_run("--silence", "0.7", "--trials", "1", "--json")) as session:
+    with (
+        running(*PYTHON) as peer,
+        running(*lcm_run("--silence", "0.7", "--trials", "1", "--json")) as session,
+    ):
         wait_for_commands()
         peer.send_signal(fault)
         status, out, err = ended(session)
@@ -146,6 +149,35 @@ def test_a_second_session_and_an_interrupted_one() -> None:
         status, _, err = ended(first)
     assert status == 1
     assert "interrupted after 0 trials" in err
+
+
+def test_a_log_of_a_trial_becomes_its_record(tmp_path: Path) -> None:
+    logger = str(Path(library.__file__).parents[1] / "bin" / "lcm-logger")
+    log, made = tmp_path / "trial.log", tmp_path / "made.mcap"
+    config = tmp_path / "short.json"
+    config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [4, 4]}))
+    url = os.environ["LCM_DEFAULT_URL"]
+    with running(logger, "-l", url, "--quiet", str(log)) as logging, running(*PYTHON):
+        time.sleep(0.5)
+        options = ("--lockstep", "--trials", "1", "--records", str(tmp_path))
+        with running(COMMAND, "lcm", "run", str(config), "--seed", "1", *options) as session:
+            assert ended(session)[0] == 0
+        time.sleep(0.3)
+        logging.send_signal(signal.SIGINT)
+        logging.wait(10)
+    subprocess.run([COMMAND, "convert", str(log), "-o", str(made)], check=True)
+    assert frames(made) == frames(tmp_path / "trial-0000.mcap")
+    there, here = dt.load_record(made), dt.load_record(tmp_path / "trial-0000.mcap")
+    for column in ("segment", "at", "crosses", "lane", "bits", "command_speed", "command_yaw_rate"):
+        assert getattr(there.frames, column).tolist() == getattr(here.frames, column).tolist(), column
+    assert there.ending == here.ending
+    assert there.instance.problem == here.instance.problem
+    (tmp_path / "cut.log").write_bytes(log.read_bytes()[:200])
+    done = subprocess.run(
+        [COMMAND, "convert", tmp_path / "cut.log", "-o", made], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert "cut.log" in done.stderr
 
 
 def test_the_messages_can_be_had(tmp_path: Path) -> None:
