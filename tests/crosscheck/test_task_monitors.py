@@ -51,6 +51,8 @@ def rules_of(found: dict[Key, int], car: int = 0) -> set[str]:
 
 
 QUICK = {"left_time": 2.0, "enter_time": 3.5, "exit_time": 2.0, "rest_time": 4.0, "goal_time": 5.0}
+HURRIED = {**QUICK, "exit_time": 4.0}
+"""Quick rules that the cars, at their speed, could still keep."""
 BREAKS = {"rolls": 0.3, "left": 0.3, "blocks": 0.5, "tailgates": 0.3, "parks": 1.0, "parks_for": 20.0}
 
 
@@ -92,20 +94,20 @@ def test_monitors_and_referee_agree_on_records(tmp_path: Path) -> None:
 
 
 def test_monitors_and_referee_agree_on_those_who_break_the_assumption(tmp_path: Path) -> None:
-    configuration = town(QUICK, breaks=True)
+    configuration = town(HURRIED, breaks=True)
     found = [
         compared(*record(tmp_path, configuration, controller, number))
         for controller in ("rules", "simple")
         for number in range(6)
     ]
-    rules = {"2.left", "2.return", "3.stop", "3.clear", "E3.enter", "E4", "E5", "E6"}
+    rules = {"2.left", "2.return", "3.stop", "3.clear", "E4", "E5", "E6"}
     assert all_rules(found, own=False) >= rules
 
 
 def test_what_is_forgiven(tmp_path: Path) -> None:
     found: list[dict[Key, int]] = []
     for exceptions in (1, 3):
-        configuration = town({**QUICK, "exceptions": exceptions, "exception_time": 15.0}, breaks=True)
+        configuration = town({**HURRIED, "exceptions": exceptions, "exception_time": 15.0}, breaks=True)
         found += [compared(*record(tmp_path, configuration, "lanes", number)) for number in range(6)]
     assert "E1" in all_rules(found, own=False)
     assert "3.stop" not in all_rules(found, own=False)

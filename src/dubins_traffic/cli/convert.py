@@ -31,7 +31,8 @@ class Sdf(StrEnum):
 
 def convert(
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="A road network, a record or a bag.", show_default=False)
+        str,
+        typer.Argument(metavar="FILE", help="A road network, a record, a bag or a log.", show_default=False),
     ],
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="FILE", help="What to write; its suffix says as what.")
@@ -46,10 +47,12 @@ def convert(
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
-    A ROS 1 bag becomes a record (`.mcap`); beside a bag stands the trial data of 2016, `.trial.json`.
+    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`); beside a bag stands the trial data of 2016,
+    `.trial.json`.
     """
     from dubins_traffic.campaign.bag_reader import bag_to_record, is_bag
     from dubins_traffic.campaign.bags import write_bag
+    from dubins_traffic.campaign.lcm_log import is_log, log_to_record
     from dubins_traffic.campaign.sources import load
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
@@ -57,12 +60,12 @@ def convert(
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
-    if is_bag(file):
+    if is_bag(file) or is_log(file):
         if Path(output).suffix.lower() != ".mcap":
             raise InputError(
                 "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
             )
-        bag_to_record(file, output, overwrite=True)
+        (bag_to_record if is_bag(file) else log_to_record)(file, output, overwrite=True)
         return
     found = load(file)
     suffix = Path(output).suffix.lower()

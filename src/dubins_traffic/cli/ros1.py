@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import faults, options
+from dubins_traffic.cli import options, session
 from dubins_traffic.errors import InputError
-
-if TYPE_CHECKING:
-    from dubins_traffic.campaign.single import Result
 
 app = typer.Typer(help="Trials over ROS 1, with the topics and services of 2016.", no_args_is_help=True)
 EXAMPLES = options.examples(
@@ -26,36 +21,11 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES, context_settings={"allow_extra_args": True})
 def run(
     context: typer.Context,
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="CONFIG|INSTANCE|RECORD",
-            help="A trials configuration (file or shipped name), an instance or a record; told by its content.",
-            show_default=False,
-            autocompletion=options.shipped,
-        ),
-    ],
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            "--controller",
-            metavar="C",
-            help="Drives the ego in this process.",
-            show_default="a node drives it",
-            autocompletion=options.controllers,
-        ),
-    ] = None,
-    remote: Annotated[
-        list[str] | None,
-        typer.Option("--remote", metavar="NAME", help="An e-agent that a node drives; may be repeated."),
-    ] = None,
-    trials: Annotated[
-        int | None,
-        typer.Option(
-            "--trials", metavar="N", min=1, help="How many.", show_default="as the configuration says"
-        ),
-    ] = None,
-    endless: Annotated[bool, typer.Option("--endless", help="Run trials until interrupted.")] = False,
+    source: session.Source,
+    controller: session.Controller = None,
+    remote: session.Remote = None,
+    trials: session.Trials = None,
+    endless: session.Endless = False,
     master: Annotated[
         bool,
         typer.Option("--master", help="Start a ROS master on this machine, at --port; without it, join one."),
@@ -63,21 +33,11 @@ def run(
     port: Annotated[
         int, typer.Option("--port", metavar="PORT", min=0, max=65535, help="Of that master; 0: any free one.")
     ] = 11311,
-    lockstep: Annotated[
-        bool, typer.Option("--lockstep", help="Wait for a command of every remote car each tick.")
-    ] = False,
-    factor: Annotated[
-        float, typer.Option("--factor", metavar="F", help="How many times as fast as the wall clock.")
-    ] = 1.0,
-    deadline: Annotated[
-        float, typer.Option("--deadline", metavar="SECONDS", help="For a command, in lockstep.")
-    ] = 5.0,
-    begin: Annotated[
-        float, typer.Option("--begin", metavar="SECONDS", help="For the first command after the instance.")
-    ] = 60.0,
-    silence: Annotated[
-        float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
-    ] = 5.0,
+    lockstep: session.Lockstep = False,
+    factor: session.Factor = 1.0,
+    deadline: session.Deadline = 5.0,
+    begin: session.Begin = 60.0,
+    silence: session.Silence = 5.0,
     clock: Annotated[
         bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
     ] = False,
@@ -94,27 +54,15 @@ def run(
         ),
     ] = None,
     seed: options.Seed = 0,
-    rnd: Annotated[
-        str | None,
-        typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's."),
-    ] = None,
-    data: Annotated[
-        str | None,
-        typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
-    ] = None,
-    data_over: Annotated[
-        str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")
-    ] = None,
-    records: Annotated[
-        str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
-    ] = None,
+    rnd: session.Network = None,
+    data: session.Data = None,
+    data_over: session.DataOver = None,
+    records: session.Records = None,
     json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
     from dubins_traffic.campaign.ros1 import Terms, run_over_ros1
     from dubins_traffic.campaign.sessions import programme
-    from dubins_traffic.cli.tables import show
-    from dubins_traffic.record.sink import FAULTS
     from dubins_traffic.transports.link import Patience
 
     _check_remappings(context.args)
@@ -127,22 +75,7 @@ def run(
     world = _is_world(simulator, poses)
     patience = Patience(begin=begin, silence=silence)
     terms = Terms(port if master else None, lockstep, factor, deadline, patience, clock, world, poses)
-    results: list[Result] = []
-    signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        for result in run_over_ros1(todo, terms):
-            results.append(result)
-            faults.tell(
-                f"trial {result.instance.trial}: {result.ending.end}: {result.ending.detail}".rstrip(": ")
-            )
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted after {len(results)} trials")
-        raise
-    finally:
-        if results:
-            show(todo.conclude(results), json=json)
-    if any(result.ending.end in FAULTS for result in results):
-        raise typer.Exit(faults.FAILED)
+    session.conduct(todo, run_over_ros1(todo, terms), json=json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))
@@ -179,7 +112,3 @@ def _check_remappings(arguments: list[str]) -> None:
             raise InputError(
                 "not an argument", file="ros1 run", value=argument, expected="name:=value at most"
             )
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt

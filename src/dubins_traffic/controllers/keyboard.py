@@ -147,10 +147,12 @@ class Map:
             for k in range(steps + 1):
                 put(x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps, "·")
         for number, vertex in enumerate(self._goals):
-            put(*self._points[vertex], str(number % 10))
+            x, y = self._points[vertex]
+            put(x, y, str(number % 10))
         for car in observation.others:
             put(car.pose.x, car.pose.y, "o")
-            put(*_ahead(car.pose, 1.5 / scale), "'")
+            x, y = _ahead(car.pose, 1.5 / scale)
+            put(x, y, "'")
         put(observation.pose.x, observation.pose.y, _arrow(observation.pose))
         return ["".join(row).rstrip() for row in cells]
 
