@@ -1,6 +1,8 @@
 """`dubins-traffic check-controller` on controllers with one fault each."""
 
 import json
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,12 @@ from dubins_traffic.campaign.checkup import Checkup, check_controller
 from dubins_traffic.campaign.course import course
 from dubins_traffic.cli.main import main
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
+from dubins_traffic.transports.ros1.messages import write_python
+from tests.ros import SYSTEM_PYTHON, need_ros
 
 ROOT = Path(__file__).resolve().parents[2]
+COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 
 FAULTY = """
 import math, os, time
@@ -111,6 +117,19 @@ def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[s
     command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
     assert main(["check-controller", command, "--over", "lcm"]) == 0
     assert capsys.readouterr().out.count("ok ") == 7
+
+
+def test_over_ros1_a_node_is_started_and_ended(tmp_path: Path) -> None:
+    need_ros()
+    write_python(tmp_path)
+    node = ROOT / "examples" / "ros1" / "controller.py"
+    command = ["env", f"PYTHONPATH={tmp_path}:{DIST_PACKAGES}", SYSTEM_PYTHON, str(node)]
+    done = subprocess.run(
+        [COMMAND, "check-controller", shlex.join(command), "--over", "ros1"],
+        check=False, capture_output=True, text=True, timeout=180,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("ok ") == 7
 
 
 def test_over_lcm_a_program_that_ends_at_once() -> None:

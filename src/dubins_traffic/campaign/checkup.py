@@ -87,7 +87,7 @@ def check_controller(controller: str, over: str | None = None) -> Checkup:
         controllers.load(controller)
         first, second = run_here(controller, 1), run_here(controller, 2)
     else:
-        first, second = run_over(over, controller), run_over(over, controller)
+        first, second = run_over(over, controller)
     answers = [answer for drive in first.drives for answer in drive.answers_s]
     period = min(instance.problem.period for instance in course().values())
     findings = (

@@ -54,8 +54,8 @@ class NotingLink(Link):
         return list(self._answers[EGO_NAME])
 
 
-def run_over(over: str, command: str) -> Pass:
-    """Run the course in lockstep with a program that drives over a transport.
+def run_over(over: str, command: str) -> tuple[Pass, Pass]:
+    """Run the course twice in lockstep with a program that drives over a transport, started afresh each time.
 
     Parameters
     ----------
@@ -71,33 +71,37 @@ def run_over(over: str, command: str) -> Pass:
     TransportError
         If the transport can't be opened.
     """
-    instances = course()
-    names, drives, lost = list(instances), list[Drive](), ""
     maestro = Maestro()
-    with ExitStack() as stack:
-        meeting = stack.enter_context(_MEETINGS[over](maestro))
+    with _MEETINGS[over](maestro) as meeting:
         patience = Patience(begin=PATIENCE / 3)
         link = NotingLink(meeting.transport, Lockstep(DEADLINE), patience=patience)
-        program = _start(command, meeting.environment)
-        watch = _Watch(program, link.inbox, maestro)
-        try:
-            session = Session(link, list(instances.values()).__getitem__, len(names), maestro)
-            for result in run_remote(session):
-                drives.append(driven(names[len(drives)], result, link.answers, link.commands))
-                watch.proceed()
-        except TransportError as error:
-            lost = str(error)
-        finally:
-            watch.end()
-            farewell = _dismiss(program)
+        first, second = (_run(link, maestro, command, meeting.environment) for _ in range(2))
+    return first, second
+
+
+def _run(link: NotingLink, maestro: Maestro, command: str, environment: Mapping[str, str]) -> Pass:
+    instances = course()
+    names, drives, lost = list(instances), list[Drive](), ""
+    program = _start(command, environment)
+    watch = _Watch(program, link.inbox)
+    try:
+        session = Session(link, list(instances.values()).__getitem__, len(names), maestro)
+        for result in run_remote(session):
+            drives.append(driven(names[len(drives)], result, link.answers, link.commands))
+            watch.proceed()
+    except TransportError as error:
+        lost = str(error)
+    finally:
+        watch.end()
+        farewell = _dismiss(program)
     return Pass(drives, farewell, lost)
 
 
 class _Watch:
     """Ends the course if the program has ended, or asks for no trial for too long."""
 
-    def __init__(self, program: subprocess.Popen[bytes], inbox: Inbox, maestro: Maestro) -> None:
-        self._program, self._inbox, self._maestro = program, inbox, maestro
+    def __init__(self, program: subprocess.Popen[bytes], inbox: Inbox) -> None:
+        self._program, self._inbox = program, inbox
         self._over, self._left = Event(), PATIENCE
         self._thread = Thread(target=self._look, name="watch", daemon=True)
         self._thread.start()
