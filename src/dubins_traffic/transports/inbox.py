@@ -87,7 +87,7 @@ class Inbox:
             slot.commands += 1
             if now - slot.window >= 1.0:
                 slot.window, slot.in_window = now, 0
-            slot.in_window += slot.fresh  # the first answer to a frame is asked for, however quickly frames follow
+            slot.in_window += slot.fresh  # the first answer to a frame was asked for
             if slot.in_window > self._flood and slot.fault is None:
                 slot.fault = (End.PEER_FLOOD, f"more than {self._flood} commands in a second")
             slot.speed, slot.yaw_rate, slot.tick = speed, yaw_rate, tick
