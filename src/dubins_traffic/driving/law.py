@@ -50,7 +50,7 @@ from dubins_traffic.driving.law_tables import (
 )
 from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, stays_right
 from dubins_traffic.driving.safety import VERGE, leaves_road, motion_is_safe
-from dubins_traffic.driving.seeing import gather, look_ahead, wanted_gap, way_to_go
+from dubins_traffic.driving.seeing import QUEUE_GAP, gather, look_ahead, wanted_gap, way_to_go
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
@@ -63,6 +63,8 @@ STUCK = 2.0
 asked, and on its way to another exit it might leave the disc outside its lane."""
 BUMPER = 0.005
 """Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
+PRESSED = 0.4
+"""Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
 HURRY = 0.25
@@ -170,6 +172,9 @@ def drive(
         speed = min(max(speed, build[THROUGH_SPEED]), build[FASTEST])
     speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
     kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
+    behind = who >= 0 and labels.lane[b, who] == ints[LANE] and kept > QUEUE_GAP
+    if behind and is_pressed(b, n, near, state, labels, roads, drivers, desk):
+        kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
     speed = min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead)
     if ints[KIND] == NEMESIS and not passes and before_ego(b, n, near, state, labels, roads, drivers, desk):
@@ -248,6 +253,24 @@ def pass_what_stands(
     elif (bits & BLOCKED != 0 or who < -1) and waited_long(ints, bits, build):
         find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
     return speed, offset
+
+
+@jit_inline
+def is_pressed(
+    b: int, n: int, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+) -> bool:  # fmt: skip
+    """Tell whether a car close behind is still in the disc at the beginning of the lane, and needs room to leave it."""
+    v = lane_start(roads, drivers.net[b], drivers.ints[b, n, LANE])
+    far = 2.0 * drivers.build[b, REACH] + PRESSED
+    if labels.crosses[b, n] >= 0:
+        return False
+    for k in range(near):
+        j = desk.near[k]
+        dx = state.x[b, j] - state.x[b, n]
+        dy = state.y[b, j] - state.y[b, n]
+        if labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
+            return True
+    return False
 
 
 @jit_inline
