@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-FILE_NAME = re.compile(r"# (\w+\.py)\n")
+FILE_NAME = re.compile(r"# (\w+\.(?:py|toml))\n")
 
 
 def blocks(language: str) -> list[str]:
@@ -40,7 +40,7 @@ def run_block(language: str, text: str, folder: Path) -> None:
 
 
 def test_all_code_runs(tmp_path):
-    ran = [(language, text) for language, text in BLOCK.findall(README) if language in {"sh", "python"}]
+    ran = [(language, text) for language, text in BLOCK.findall(README) if language in {"sh", "python", "toml"}]
     assert len(ran) >= 6
     for language, text in ran:
         run_block(language, text, tmp_path)
