@@ -50,6 +50,13 @@ def free_url() -> str:
         return f"udpm://239.255.76.67:{probe.getsockname()[1]}?ttl=0"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Compile what a trial needs before anyone waits for one."""
+    with Trial(make_instance(names=("agent0",), ticks=5)) as trial:
+        trial.advance((0.1, 0.1))
+
+
 class LcmPeer:
     """A peer written from the message definitions alone."""
 

@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip("cyclonedds")
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
@@ -44,6 +44,13 @@ class Law:
 
 def law(x: float, y: float) -> tuple[float, float]:
     return 0.25 + 0.01 * x, 0.3 * y
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Compile what a trial needs before anyone waits for one."""
+    with Trial(dt.draw(dt.load_config("demo"), 1, 0)) as trial:
+        trial.advance((0.1, 0.1))
 
 
 @pytest.fixture
