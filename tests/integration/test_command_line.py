@@ -24,7 +24,9 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-COMMANDS = ("network", "instance", "run", "score", "check", "spec", "plot", "replay", "convert", "list", "synth")
+COMMANDS = tuple(
+    "network instance run batch score check check-controller spec synth plot replay convert list".split()
+)
 CONFIG = "mc-small-4grid-agents2"
 
 CONTROLLERS = """

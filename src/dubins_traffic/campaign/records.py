@@ -9,15 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.protocols import End
 from dubins_traffic.record import wall
+from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.verdict import Ruling
 
 FOLDER = "records"
-FAULTS = frozenset(
-    {End.CONTROLLER_FAULT.value, End.AGENT_FAULT.value, End.DEADLINE.value, End.WORLD_LOST.value}
-)
-"""Ends of a trial by somebody's fault, or by that of the simulator."""
 
 
 class Keep(StrEnum):

@@ -11,9 +11,9 @@ import numpy as np
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, Cell
-from dubins_traffic.campaign.records import FAULTS
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.record.sink import FAULTS
 
 RESULTS = "results.parquet"
 WALL = "wall.parquet"

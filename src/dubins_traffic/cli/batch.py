@@ -8,7 +8,6 @@ import typer
 
 from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.progress import progress
-from dubins_traffic.cli.run import FAULTS
 
 EXAMPLES = options.examples(
     "batch town --trials 1000",
@@ -56,6 +55,7 @@ def batch(
     from dubins_traffic.campaign.batch import run_batch
     from dubins_traffic.cli.tables import show
     from dubins_traffic.problem.configuration import load_config
+    from dubins_traffic.record.sink import FAULTS
 
     drawn = load_config(configuration)
     count = drawn.number_trials if trials is None else trials

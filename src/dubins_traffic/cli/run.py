@@ -19,8 +19,6 @@ EXAMPLES = options.examples(
     "run out/trial-0003.mcap --controller simple --json",
     "run demo --simulator gazebo --records out",
 )
-FAULTS = ("controller_fault", "agent_fault", "deadline", "world_lost")
-"""Ends of a trial that make the exit status 1."""
 
 
 def run(
@@ -103,6 +101,7 @@ def run(
     from dubins_traffic.campaign.plan import plan
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
+    from dubins_traffic.record.sink import FAULTS
 
     if data is not None and data_over is not None:
         raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")

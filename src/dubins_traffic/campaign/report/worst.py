@@ -13,11 +13,11 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, Chunk
 from dubins_traffic.campaign.many import Job
-from dubins_traffic.campaign.records import FAULTS
 from dubins_traffic.campaign.table import places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
+from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.score import score
 from dubins_traffic.viewer.marks import breach_marks
 from dubins_traffic.viewer.replay import write_replay
