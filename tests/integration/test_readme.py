@@ -40,7 +40,9 @@ def run_block(language: str, text: str, folder: Path) -> None:
 
 
 def test_all_code_runs(tmp_path):
-    ran = [(language, text) for language, text in BLOCK.findall(README) if language in {"sh", "python", "toml"}]
+    ran = [
+        (language, text) for language, text in BLOCK.findall(README) if language in {"sh", "python", "toml"}
+    ]
     assert len(ran) >= 6
     for language, text in ran:
         run_block(language, text, tmp_path)
