@@ -25,7 +25,7 @@ from dubins_traffic.roads.network import RoadNetwork
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 COMMANDS = tuple(
-    "network instance run batch score check check-controller spec synth plot replay convert list".split()
+    ["network", "instance", "run", "batch", "score", "check", "check-controller", "spec", "synth", "plot", "replay", "convert", "list"]
 )
 CONFIG = "mc-small-4grid-agents2"
 
