@@ -24,9 +24,9 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-COMMANDS = tuple(
-    ["network", "instance", "run", "batch", "score", "check", "check-controller", "spec", "synth", "plot", "replay", "convert", "list"]
-)
+DRAWING = ("network", "instance", "spec", "synth")
+JUDGING = ("run", "batch", "score", "check", "check-controller")
+COMMANDS = (*DRAWING, *JUDGING, "plot", "replay", "convert", "list")
 CONFIG = "mc-small-4grid-agents2"
 
 CONTROLLERS = """
