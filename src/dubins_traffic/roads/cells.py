@@ -24,7 +24,8 @@ def covered(start: Floats, end: Floats, pad: float, size: float) -> tuple[Ints, 
     size : float
         Side of a cell; cell (0, 0) begins in the origin.
     """
-    pad += 1e-9 * (size + float(np.abs(start).max(initial=0.0)))
+    rounding = 1e-9 * (size + float(np.abs(start).max(initial=0.0)))
+    pad += rounding
     swap = start[:, 0] > end[:, 0]
     low = np.where(swap[:, None], end, start)
     high = np.where(swap[:, None], start, end)
@@ -32,10 +33,10 @@ def covered(start: Floats, end: Floats, pad: float, size: float) -> tuple[Ints, 
     last = np.floor((high[:, 0] + pad) / size).astype(np.int64)
     item, column = _spread(first, last)
     run = high[item, 0] - low[item, 0]
-    slope = np.divide(high[item, 1] - low[item, 1], run, out=np.zeros_like(run), where=run > 0)
+    upright = run <= rounding
+    slope = np.divide(high[item, 1] - low[item, 1], run, out=np.zeros_like(run), where=~upright)
     left = np.clip(column * size - pad - low[item, 0], 0.0, run)
     right = np.clip((column + 1) * size + pad - low[item, 0], 0.0, run)
-    upright = run <= 0
     y0 = low[item, 1] + slope * left
     y1 = cast(Floats, np.where(upright, high[item, 1], low[item, 1] + slope * right))
     bottom = np.floor((np.minimum(y0, y1) - pad) / size).astype(np.int64)
