@@ -119,7 +119,7 @@ def plan(
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if jobs and jobs[0].instance is not None:
-        _check_simulator(
+        check_simulator(
             "--simulator" if simulator else os.fspath(source), jobs[0].instance.simulator, show=show
         )
     target = None if data is None else check_data_file(Path(data), overwrite_data)
@@ -157,7 +157,8 @@ def _refuse(source: str, options: dict[str, object]) -> None:
             )
 
 
-def _check_simulator(source: str, name: str, *, show: bool) -> None:
+def check_simulator(source: str, name: str, *, show: bool = False) -> None:
+    """Raise InputError, naming `source`, if there is no simulator called `name` or it can't be used here."""
     try:
         simulators.load(name, show=show).close()
     except InputError as error:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from dubins_traffic.campaign.sessions import Programme, rehearse
+from dubins_traffic.campaign.sessions import Programme, moved_by, rehearse
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import InputError
-from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Clock
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.link import Link, Patience
@@ -96,13 +95,8 @@ def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
         if terms.world:
             ego = programme.controller is None
             simulator = ExternalWorld(transport.rospy, ego=ego, poses=terms.poses)
-            programme = replace(programme, supply=partial(_elsewhere, programme.supply))
+            programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
         yield from programme.run(link, maestro, simulator)
-
-
-def _elsewhere(supply: Callable[[int], Instance], number: int) -> Instance:
-    """Return an instance whose record says that its cars were not simulated here."""
-    return replace(supply(number), simulator=WORLD)
 
 
 def _told(programme: Programme) -> Told:

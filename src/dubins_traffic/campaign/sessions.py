@@ -6,11 +6,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from dubins_traffic.campaign.plan import check_data_file, check_folder
+from dubins_traffic.campaign.plan import check_data_file, check_folder, check_simulator
 from dubins_traffic.campaign.remote import Session, hand_over, run_remote
 from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.campaign.sources import load
@@ -86,6 +87,7 @@ def programme(
     data: str | os.PathLike[str] | None = None,
     overwrite_data: bool = False,
     records: str | os.PathLike[str] | None = None,
+    simulator: str | None = None,
 ) -> Programme:
     """Return what a session shall run, checked as far as can be before anything is opened.
 
@@ -109,6 +111,8 @@ def programme(
         Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
     records : path, optional
         Folder for the records, made if missing.
+    simulator : str, optional
+        What moves the cars, whatever the source says.
 
     Raises
     ------
@@ -126,6 +130,9 @@ def programme(
             "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
         )
     supply = _supply(found, seed or 0)
+    if simulator is not None:
+        check_simulator("--simulator", simulator)
+        supply = partial(moved_by, supply, simulator)
     hand_over(supply(0), remote)
     configuration = found if isinstance(found, Configuration) else None
     if data is not None and configuration is None:
@@ -154,6 +161,11 @@ def rehearse(instance: Instance) -> None:
     )
     brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
     run_trial(brief, Scripted(np.zeros((brief.ticks, 2))))
+
+
+def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> Instance:
+    """Return instance `number` of `supply`, to be moved by `simulator`."""
+    return replace(supply(number), simulator=simulator)
 
 
 def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:

@@ -44,7 +44,9 @@ def run(
     simulator: Annotated[
         str | None,
         typer.Option(
-            "--simulator", metavar="S", help="ros1-world: the cars are in a world that is not ours."
+            "--simulator",
+            metavar="S",
+            help="What moves the cars; ros1-world: they are in a world that is not ours.",
         ),
     ] = None,
     poses: Annotated[
@@ -68,11 +70,12 @@ def run(
     _check_remappings(context.args)
     if data is not None and data_over is not None:
         raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
+    world = _is_world(simulator, poses)
     todo = programme(
         source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
         data=data or data_over, overwrite_data=data is None, records=records,
+        simulator=None if world else simulator,
     )  # fmt: skip
-    world = _is_world(simulator, poses)
     patience = Patience(begin=begin, silence=silence)
     terms = Terms(port if master else None, lockstep, factor, deadline, patience, clock, world, poses)
     session.conduct(todo, run_over_ros1(todo, terms), json=json)
@@ -94,10 +97,6 @@ def messages(
 
 def _is_world(simulator: str | None, poses: str | None) -> bool:
     """Tell whether the cars are in another world."""
-    if simulator not in (None, "embedded", "ros1-world"):
-        raise InputError(
-            "not a simulator over ROS 1", file="--simulator", value=simulator, expected="ros1-world"
-        )
     if poses is not None and simulator != "ros1-world":
         raise InputError(
             "is of another world", file="--poses", value=poses, expected="--simulator ros1-world"

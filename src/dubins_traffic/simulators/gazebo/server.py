@@ -79,6 +79,8 @@ class Server:
         folder = _folder()
         self.log = Path(folder.name) / "gzserver.log"
         here, there = socket.socketpair()
+        for end in (here, there):
+            end.setblocking(True)  # libraries such as rospy set a default timeout now and then
         try:
             path = Path(folder.name) / "trial.world"
             path.write_text(world, encoding="utf-8")
