@@ -293,3 +293,20 @@ def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
         pytest.skip("libsdformat12 is not here: scripts/gazebo.sh installs it")
     assert new.stdout.strip() == "Valid."
     assert new.returncode == 0, new.stderr
+
+
+def test_an_installation_that_is_interrupted_says_how_to_go_on(tmp_path: Path) -> None:
+    prefix_folder = tmp_path / "prefix"
+    process = subprocess.Popen(
+        [*PROGRAM, "gazebo", "install", "--prefix", str(prefix_folder)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    while "list of packages" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert err == "dubins-traffic: interrupted; the same command goes on where it stopped\n"

@@ -40,8 +40,12 @@ def install(prefix: Prefix = None) -> None:
 
     folder = place(prefix)
     print(installer.announcement(folder), flush=True)
-    with _progress() as progress:
-        installer.install(folder, progress)
+    try:
+        with _progress() as progress:
+            installer.install(folder, progress)
+    except KeyboardInterrupt:
+        faults.tell("interrupted; the same command goes on where it stopped")
+        raise
     print("Gazebo works; use it with --simulator gazebo")
 
 
