@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import resource
 import signal
 import subprocess
@@ -89,7 +90,9 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path, table: bytes) -> None:
         status = process.wait(timeout=20)
     finished = kept(out)
     assert status == 1
-    assert f"{finished} of {TRIALS} trials are kept, --resume goes on" in told
+    said = re.search(rf"(\d+) of {TRIALS} trials are kept, --resume goes on", told)
+    assert said is not None
+    assert int(said[1]) <= finished  # a worker may have kept some more meanwhile
     assert 6 <= finished < TRIALS
     data = succeed(file, out, "--resume")
     assert parquet.read_table(out / "results.parquet").num_rows == TRIALS
