@@ -5,15 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
-from dubins_traffic.campaign.sessions import Programme, moved_by, rehearse
+from dubins_traffic.campaign.sessions import Pace, Programme, moved_by, rehearse
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import InputError
-from dubins_traffic.protocols import Clock
-from dubins_traffic.transports.clocks import Lockstep, RealTime
-from dubins_traffic.transports.link import Link, Patience
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.desk import Told
 from dubins_traffic.transports.ros1.external import NAME as WORLD
@@ -25,42 +22,31 @@ from dubins_traffic.transports.ros1.transport import Ros1
 DEFAULT_URI = "http://localhost:11311/"
 
 
-@dataclass(frozen=True, slots=True)
-class Terms:
-    """How a session meets the ROS graph.
+def run_over_ros1(
+    programme: Programme,
+    pace: Pace,
+    *,
+    master: int | None = None,
+    clock: bool = False,
+    world: bool = False,
+    poses: str | None = None,
+) -> Iterator[Result]:
+    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
 
     Parameters
     ----------
+    programme : Programme
+        What is run.
+    pace : Pace
+        How drivers are waited for.
     master : int, optional
         Port of a master to start on the loopback interface, 0 for any; None: join the one of ``ROS_MASTER_URI``.
-    lockstep : bool
-        Whether the simulation waits for a command of every remote car each tick; else it runs in real time.
-    factor : float
-        How many times as fast as the wall clock, in real time.
-    deadline : float
-        Seconds within which a command must come in lockstep.
-    patience : Patience
-        How long peers are waited for otherwise.
     clock : bool
         Whether `/clock` is published.
     world : bool
         Whether the cars are not simulated here but somewhere in the graph, in real time.
     poses : str, optional
         Of such a world: the topic of each car's pose, ``{}`` in place of its name.
-    """
-
-    master: int | None = None
-    lockstep: bool = False
-    factor: float = 1.0
-    deadline: float = 5.0
-    patience: Patience = field(default_factory=Patience)
-    clock: bool = False
-    world: bool = False
-    poses: str | None = None
-
-
-def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
-    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
 
     Raises
     ------
@@ -71,32 +57,30 @@ def run_over_ros1(programme: Programme, terms: Terms) -> Iterator[Result]:
     InputError
         If an instance can't be drawn.
     """
-    if terms.world and (terms.lockstep or terms.clock or terms.factor != 1.0):
+    if world and (pace.lockstep or clock or pace.factor != 1.0):
         expected = "neither --lockstep nor --clock nor --factor"
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
-    clock: Clock = Lockstep(terms.deadline) if terms.lockstep else RealTime(terms.factor)
-    maestro = Maestro() if programme.controller is None else None
+    ego = programme.controller is None
+    maestro = Maestro() if ego else None
     rehearse(programme.supply(0))
     with ExitStack() as stack:
-        if terms.master is not None:
-            master = Master(terms.master)
-            stack.callback(master.close)
+        uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
+        if master is not None:
+            started = Master(master)
+            stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
-            uri = master.uri
-        else:
-            uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
+            uri = started.uri
         stack.callback(leave)
-        transport = Ros1(
-            uri, maestro=maestro, told=_told(programme), clock=terms.clock, simulated=not terms.world
-        )
-        stack.callback(transport.close)
-        link = Link(transport, clock, ego=programme.controller is None, patience=terms.patience)
-        simulator = None
-        if terms.world:
-            ego = programme.controller is None
-            simulator = ExternalWorld(transport.rospy, ego=ego, poses=terms.poses)
-            programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
-        yield from programme.run(link, maestro, simulator)
+        transport = Ros1(uri, maestro=maestro, told=_told(programme), clock=clock, simulated=not world)
+        if not world:
+            yield from programme.run(transport, pace, maestro)
+            return
+        programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
+        yield from programme.run(transport, pace, maestro, partial(_elsewhere, transport, ego, poses))
+
+
+def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:
+    return ExternalWorld(transport.rospy, ego=ego, poses=poses)
 
 
 def _told(programme: Programme) -> Told:

@@ -3,43 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
-from dubins_traffic.campaign.sessions import Programme
+from dubins_traffic.campaign.sessions import Pace, Programme
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.protocols import Clock, Transport
-from dubins_traffic.transports.clocks import Lockstep, RealTime
-from dubins_traffic.transports.link import Link, Patience
+from dubins_traffic.protocols import Transport
 from dubins_traffic.transports.maestro import Maestro
-
-
-@dataclass(frozen=True, slots=True)
-class Terms:
-    """How a session meets its drivers.
-
-    Parameters
-    ----------
-    domain : int, optional
-        Number of the DDS domain; by default that of ``ROS_DOMAIN_ID``, else 0.
-    here : bool
-        Whether nothing leaves this machine.
-    lockstep : bool
-        Whether the simulation waits for a command of every remote car each tick; else it runs in real time.
-    factor : float
-        How many times as fast as the wall clock, in real time.
-    deadline : float
-        Seconds within which a command must come in lockstep.
-    patience : Patience
-        How long peers are waited for otherwise.
-    """
-
-    domain: int | None = None
-    here: bool = True
-    lockstep: bool = False
-    factor: float = 1.0
-    deadline: float = 5.0
-    patience: Patience = field(default_factory=Patience)
 
 
 def make_transport(domain: int | None, maestro: Maestro | None, *, here: bool = True) -> Transport:
@@ -57,8 +26,21 @@ def make_transport(domain: int | None, maestro: Maestro | None, *, here: bool = 
     return Ros2(domain, maestro=maestro, here=here)
 
 
-def run_over_ros2(programme: Programme, terms: Terms) -> Iterator[Result]:
+def run_over_ros2(
+    programme: Programme, pace: Pace, *, domain: int | None = None, here: bool = True
+) -> Iterator[Result]:
     """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
+
+    Parameters
+    ----------
+    programme : Programme
+        What is run.
+    pace : Pace
+        How drivers are waited for.
+    domain : int, optional
+        Number of the DDS domain; by default that of ``ROS_DOMAIN_ID``, else 0.
+    here : bool
+        Whether nothing leaves this machine.
 
     Raises
     ------
@@ -69,11 +51,5 @@ def run_over_ros2(programme: Programme, terms: Terms) -> Iterator[Result]:
     InputError
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
-    clock: Clock = Lockstep(terms.deadline) if terms.lockstep else RealTime(terms.factor)
     maestro = Maestro() if programme.controller is None else None
-    transport = make_transport(terms.domain, maestro, here=terms.here)
-    try:
-        link = Link(transport, clock, ego=programme.controller is None, patience=terms.patience)
-        yield from programme.run(link, maestro)
-    finally:
-        transport.close()
+    yield from programme.run(make_transport(domain, maestro, here=here), pace, maestro)

@@ -23,15 +23,51 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.problem.trial_data import TrialData
-from dubins_traffic.protocols import Simulator
+from dubins_traffic.protocols import Clock, Simulator, Transport
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
-from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.link import Link, Patience
 from dubins_traffic.transports.maestro import Maestro
 
 REHEARSAL = 1.2
 """Seconds: more than a block of frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How a session meets its drivers in time.
+
+    Parameters
+    ----------
+    lockstep : bool
+        Whether the simulation waits for a command of every remote car each tick; else it runs in real time.
+    factor : float
+        How many times as fast as the wall clock, in real time.
+    deadline : float
+        Seconds within which a command must come in lockstep.
+    patience : Patience
+        How long peers are waited for otherwise.
+
+    Raises
+    ------
+    InputError
+        If there is no such clock.
+    """
+
+    lockstep: bool = False
+    factor: float = 1.0
+    deadline: float = 5.0
+    patience: Patience = field(default_factory=Patience)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no clock before anything is opened."""
+        self.clock()
+
+    def clock(self) -> Clock:
+        """Return a clock of this pace."""
+        return Lockstep(self.deadline) if self.lockstep else RealTime(self.factor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +87,19 @@ class Programme:
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def run(
-        self, link: Link, maestro: Maestro | None, simulator: Simulator | None = None
+        self,
+        transport: Transport,
+        pace: Pace,
+        maestro: Maestro | None,
+        world: Callable[[], Simulator] | None = None,
     ) -> Iterator[Result]:
-        """Run it over `link`; see `remote.run_remote`."""
-        return run_remote(
-            Session(
+        """Run it over `transport`, which is closed however that ends; see `remote.run_remote`.
+
+        `world` makes the simulator, instead of the one that instances name, once the transport is open.
+        """
+        try:
+            link = Link(transport, pace.clock(), ego=self.controller is None, patience=pace.patience)
+            session = Session(
                 link,
                 self.supply,
                 self.trials,
@@ -63,9 +107,11 @@ class Programme:
                 self.controller or "",
                 self.remote,
                 self.records,
-                simulator,
+                None if world is None else world(),
             )
-        )
+            yield from run_remote(session)
+        finally:
+            transport.close()
 
     def conclude(self, results: Sequence[Result]) -> ScoreSheet:
         """Return the scores, and write the trial data file if one was asked for."""

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import options, session
-from dubins_traffic.errors import InputError
 
 app = typer.Typer(help="Trials over LCM, with typed messages by UDP multicast.", no_args_is_help=True)
 EXAMPLES = options.examples(
@@ -19,7 +18,7 @@ EXAMPLES = options.examples(
 
 @app.command("run", epilog=EXAMPLES)
 def run(
-    source: session.Source,
+    source: options.Source,
     url: Annotated[
         str | None,
         typer.Option(
@@ -42,25 +41,21 @@ def run(
     begin: session.Begin = 60.0,
     silence: session.Silence = 5.0,
     seed: options.Seed = 0,
-    rnd: session.Network = None,
-    data: session.Data = None,
-    data_over: session.DataOver = None,
-    records: session.Records = None,
+    rnd: options.Network = None,
+    data: options.Data = None,
+    data_over: options.DataOver = None,
+    records: options.Records = None,
     json: options.Json = False,
 ) -> None:
     """Run trials whose ego, or some of whose e-agents, are driven over LCM. Ctrl-C keeps all finished trials."""
-    from dubins_traffic.campaign.lcm import Terms, run_over_lcm
-    from dubins_traffic.campaign.sessions import programme
-    from dubins_traffic.transports.link import Patience
+    from dubins_traffic.campaign.lcm import run_over_lcm
 
-    if data is not None and data_over is not None:
-        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
-    todo = programme(
-        source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
-        data=data or data_over, overwrite_data=data is None, records=records,
+    todo = session.programme(
+        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
+        records=records,
     )  # fmt: skip
-    terms = Terms(url, wait, lockstep, factor, deadline, Patience(begin=begin, silence=silence))
-    session.conduct(todo, run_over_lcm(todo, terms), json=json)
+    pace = session.pace(lockstep, factor, deadline, begin, silence)
+    session.conduct(todo, run_over_lcm(todo, pace, url=url, wait=wait), json=json)
 
 
 @app.command("messages", epilog=options.examples("lcm messages -o dubins_traffic_lcm.lcm"))

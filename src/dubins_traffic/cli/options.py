@@ -54,7 +54,40 @@ Output = Annotated[
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
+Data = Annotated[
+    str | None,
+    typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
+]
+DataOver = Annotated[str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")]
+Network = Annotated[
+    str | None, typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's.")
+]
+Records = Annotated[
+    str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
+]
+Source = Annotated[
+    str,
+    typer.Argument(
+        metavar="CONFIG|INSTANCE|RECORD",
+        help="A trials configuration (file or shipped name), an instance or a record; told by its content.",
+        show_default=False,
+        autocompletion=shipped,
+    ),
+]
 Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
+
+
+def trial_data(data: str | None, data_over: str | None) -> str | None:
+    """Return the one trial data file of the options -f and -F, None without either.
+
+    Raises
+    ------
+    InputError
+        If both are given.
+    """
+    if data is not None and data_over is not None:
+        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
+    return data_over if data is None else data
 
 
 def write(text: str, output: str | None) -> None:

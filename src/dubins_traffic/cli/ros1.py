@@ -21,7 +21,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES, context_settings={"allow_extra_args": True})
 def run(
     context: typer.Context,
-    source: session.Source,
+    source: options.Source,
     controller: session.Controller = None,
     remote: session.Remote = None,
     trials: session.Trials = None,
@@ -56,29 +56,26 @@ def run(
         ),
     ] = None,
     seed: options.Seed = 0,
-    rnd: session.Network = None,
-    data: session.Data = None,
-    data_over: session.DataOver = None,
-    records: session.Records = None,
+    rnd: options.Network = None,
+    data: options.Data = None,
+    data_over: options.DataOver = None,
+    records: options.Records = None,
     json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
-    from dubins_traffic.campaign.ros1 import Terms, run_over_ros1
-    from dubins_traffic.campaign.sessions import programme
-    from dubins_traffic.transports.link import Patience
+    from dubins_traffic.campaign.ros1 import run_over_ros1
 
     _check_remappings(context.args)
-    if data is not None and data_over is not None:
-        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
     world = _is_world(simulator, poses)
-    todo = programme(
-        source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
-        data=data or data_over, overwrite_data=data is None, records=records,
+    todo = session.programme(
+        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
+        records=records,
         simulator=None if world else simulator,
     )  # fmt: skip
-    patience = Patience(begin=begin, silence=silence)
-    terms = Terms(port if master else None, lockstep, factor, deadline, patience, clock, world, poses)
-    session.conduct(todo, run_over_ros1(todo, terms), json=json)
+    pace = session.pace(lockstep, factor, deadline, begin, silence)
+    at = port if master else None
+    results = run_over_ros1(todo, pace, master=at, clock=clock, world=world, poses=poses)
+    session.conduct(todo, results, json=json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import options, session
-from dubins_traffic.errors import InputError
 
 app = typer.Typer(
     help="Trials over ROS 2 by DDS, with the topics of 2016 and its mode service.", no_args_is_help=True
@@ -21,7 +20,7 @@ EXAMPLES = options.examples(
 
 @app.command("run", epilog=EXAMPLES)
 def run(
-    source: session.Source,
+    source: options.Source,
     domain: Annotated[
         int | None,
         typer.Option(
@@ -42,24 +41,18 @@ def run(
     begin: session.Begin = 60.0,
     silence: session.Silence = 5.0,
     seed: options.Seed = 0,
-    rnd: session.Network = None,
-    data: session.Data = None,
-    data_over: session.DataOver = None,
-    records: session.Records = None,
+    rnd: options.Network = None,
+    data: options.Data = None,
+    data_over: options.DataOver = None,
+    records: options.Records = None,
     json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials."""
-    from dubins_traffic.campaign.ros2 import Terms, run_over_ros2
-    from dubins_traffic.campaign.sessions import programme
-    from dubins_traffic.transports.link import Patience
+    from dubins_traffic.campaign.ros2 import run_over_ros2
 
-    if data is not None and data_over is not None:
-        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
-    todo = programme(
-        source, controller, trials=trials, endless=endless, seed=seed, rnd=rnd, remote=remote or (),
-        data=data or data_over, overwrite_data=data is None, records=records,
+    todo = session.programme(
+        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
+        records=records,
     )  # fmt: skip
-    patience = Patience(begin=begin, silence=silence)
-    session.conduct(
-        todo, run_over_ros2(todo, Terms(domain, not wide, lockstep, factor, deadline, patience)), json=json
-    )
+    pace = session.pace(lockstep, factor, deadline, begin, silence)
+    session.conduct(todo, run_over_ros2(todo, pace, domain=domain, here=not wide), json=json)

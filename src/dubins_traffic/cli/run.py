@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
     from dubins_traffic.campaign.single import Result
@@ -22,15 +21,7 @@ EXAMPLES = options.examples(
 
 
 def run(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="CONFIG|INSTANCE|RECORD",
-            help="A trials configuration (file or shipped name), an instance or a record; told by its content.",
-            show_default=False,
-            autocompletion=options.shipped,
-        ),
-    ],
+    source: options.Source,
     controller: Annotated[
         str | None,
         typer.Option(
@@ -61,20 +52,10 @@ def run(
         ),
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")] = 1,
-    rnd: Annotated[
-        str | None,
-        typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's."),
-    ] = None,
-    data: Annotated[
-        str | None,
-        typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
-    ] = None,
-    data_over: Annotated[
-        str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")
-    ] = None,
-    records: Annotated[
-        str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
-    ] = None,
+    rnd: options.Network = None,
+    data: options.Data = None,
+    data_over: options.DataOver = None,
+    records: options.Records = None,
     deadline: Annotated[
         float | None,
         typer.Option(
@@ -103,8 +84,6 @@ def run(
     from dubins_traffic.cli.tables import show
     from dubins_traffic.record.sink import FAULTS
 
-    if data is not None and data_over is not None:
-        raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
     todo = plan(
         source,
         controller,
@@ -112,7 +91,7 @@ def run(
         repeat=repeat,
         seed=seed,
         rnd=rnd,
-        data=data or data_over,
+        data=options.trial_data(data, data_over),
         overwrite_data=data is None,
         records=records,
         deadline=deadline,

@@ -5,25 +5,16 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterable
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.sessions import Programme
+    from dubins_traffic.campaign.sessions import Pace, Programme
     from dubins_traffic.campaign.single import Result
 
-Source = Annotated[
-    str,
-    typer.Argument(
-        metavar="CONFIG|INSTANCE|RECORD",
-        help="A trials configuration (file or shipped name), an instance or a record; told by its content.",
-        show_default=False,
-        autocompletion=options.shipped,
-    ),
-]
 Controller = Annotated[
     str | None,
     typer.Option(
@@ -56,17 +47,29 @@ Begin = Annotated[
 Silence = Annotated[
     float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
 ]
-Network = Annotated[
-    str | None, typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's.")
-]
-Data = Annotated[
-    str | None,
-    typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
-]
-DataOver = Annotated[str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")]
-Records = Annotated[
-    str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
-]
+
+
+def programme(
+    source: str,
+    controller: str | None,
+    remote: list[str] | None,
+    data: str | None,
+    data_over: str | None,
+    **more: Any,
+) -> Programme:
+    """Return what a session shall run, as its command's options say; `more` as for `campaign.sessions.programme`."""
+    from dubins_traffic.campaign.sessions import programme
+
+    file = options.trial_data(data, data_over)
+    return programme(source, controller, remote=remote or (), data=file, overwrite_data=data is None, **more)
+
+
+def pace(lockstep: bool, factor: float, deadline: float, begin: float, silence: float) -> Pace:
+    """Return how drivers are waited for, as a command's options say."""
+    from dubins_traffic.campaign.sessions import Pace
+    from dubins_traffic.transports.link import Patience
+
+    return Pace(lockstep, factor, deadline, Patience(begin=begin, silence=silence))
 
 
 def conduct(todo: Programme, session: Iterable[Result], *, json: bool) -> None:

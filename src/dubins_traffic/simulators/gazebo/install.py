@@ -25,8 +25,8 @@ OLDEST_LIBC: Final = (2, 31)
 ANNOUNCEMENT: Final = """\
 Gazebo 11 goes into {folder}
   about 260 MB to download, 1.1 GB on disk, two minutes; no root needed, nothing outside that folder is touched
-  Gazebo is under the Apache License 2.0; the libraries it needs are Debian's packages, each under the licence that
-  {folder}/root/usr/share/doc/PACKAGE/copyright states"""
+  Gazebo is under the Apache License 2.0; the libraries it needs are Debian's packages, each under the licence in the
+  copyright file that it carries, below the folder root of the installation"""
 OWN: Final = "This machine's own Gazebo is used: {server}\n  only its plugin is built, in {folder}"
 
 
