@@ -24,6 +24,7 @@ __all__ = [
     "Ending",
     "Mailbox",
     "Polled",
+    "Reports",
     "Scans",
     "Simulator",
     "Sink",
@@ -106,6 +107,15 @@ class Closes(Protocol):
 
     def close(self) -> None:
         """Free what is held."""
+        ...
+
+
+@runtime_checkable
+class Reports(Protocol):
+    """A controller that has something to say of what it does; it stands in the record as events of the ego."""
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return kind and detail of what has happened since the last call, which is made after every `act`."""
         ...
 
 

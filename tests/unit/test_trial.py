@@ -107,6 +107,23 @@ def test_a_controller_ends_its_own_trial_only(controller, end, detail) -> None:
     assert result.wall.reproducible
 
 
+def test_what_a_controller_reports_is_an_event_of_the_ego():
+    class Telling(Straight):
+        calls = 0
+
+        def report(self):
+            self.calls += 1
+            return [("turn", f"call {self.calls}")] if self.calls in (3, 31) else []
+
+    sink = Collect()
+    run_trial(instance(), Telling(), sinks=[sink])
+    events = [event for block in sink.blocks for event in block.events]
+    assert [(event.tick, event.kind, event.car, event.detail) for event in events] == [
+        (2, "turn", 0, "call 3"),
+        (30, "turn", 0, "call 31"),
+    ]
+
+
 def test_a_controller_that_fails_to_start() -> None:
     class Broken(Straight):
         def start(self, problem):

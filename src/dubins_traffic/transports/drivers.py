@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import Command, Labels, Observation, State
 from dubins_traffic.errors import PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Closes, Controller, End
+from dubins_traffic.protocols import Closes, Controller, End, Reports
 from dubins_traffic.transports.link import EGO_NAME, Link
 
 if TYPE_CHECKING:
@@ -42,6 +42,10 @@ class LocalController:
         """Start the controller, then the trial."""
         self._controller.start(problem)
         self._link.announce()
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what the controller has to say."""
+        return self._controller.report() if isinstance(self._controller, Reports) else ()
 
     def close(self) -> None:
         """Close the controller if it wants to be closed."""

@@ -10,7 +10,7 @@ from time import perf_counter
 from types import FrameType
 
 from dubins_traffic.errors import ControllerError, PeerError
-from dubins_traffic.protocols import Closes, Controller, End, Ending
+from dubins_traffic.protocols import Closes, Controller, End, Ending, Reports
 from dubins_traffic.record.wall import Wall, measured, summary
 from dubins_traffic.trial.trial import Trial
 
@@ -47,6 +47,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
 def _drive(trial: Trial, controller: Controller, deadline: float | None, latencies: list[float]) -> None:
     act = controller.act
     advance = trial.advance
+    report = controller.report if isinstance(controller, Reports) else None
     while trial.ending is None:
         observation = trial.observation
         with _Answerable(trial):
@@ -58,6 +59,10 @@ def _drive(trial: Trial, controller: Controller, deadline: float | None, latenci
                     command = act(observation)
             elapsed = perf_counter() - started
         latencies.append(elapsed)
+        if report is not None:
+            with _Answerable(trial):
+                for kind, detail in report():
+                    trial.note(kind, detail)
         if deadline is not None and elapsed > deadline:
             raise _late(trial, deadline)
         if command is None:

@@ -130,11 +130,15 @@ class Trial:
             watcher.watch(self._tick, self._state, self._labels)
         return contacts
 
+    def note(self, kind: str, detail: str = "") -> None:
+        """Put an event of the ego, at the present tick, into the record."""
+        self._buffer.note(Event(self._tick, kind, EGO, detail))
+
     def end(self, end: End, detail: str = "") -> Ending:
         """End the trial for the reason `end` unless it has ended; return its ending."""
         if self.ending is None:
             if end is not End.DURATION:
-                self._buffer.note(Event(self._tick, end.value, EGO, detail))
+                self.note(end.value, detail)
             self.ending = Ending(end, self._tick, detail)
             self._buffer.end(self.ending)
         return self.ending
