@@ -126,8 +126,10 @@ class Watcher(Protocol):
         """A trial has been placed; its first frame follows."""
         ...
 
-    def watch(self, tick: int, state: State, labels: Labels) -> None:
+    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
         """Frame `tick` has been reached; the arrays are the simulator's own and change with the next tick.
+
+        `observe` returns the ego's observation of this frame, made once for all who ask.
 
         Raises
         ------
@@ -139,11 +141,11 @@ class Watcher(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One frame as a transport sends it.
+    """One frame as a transport sends it, to be read before the method that is given it returns.
 
     `time` is in simulated seconds; `state` and `labels` hold every car of the trial, (1, N). `observe(n)` makes car
-    n's own observation, once however often it is asked: what a controller in this process would be handed. `running`
-    is false while the cars are only shown and nobody drives.
+    n's own observation, of a frame once however often it is asked: what a controller in this process would be handed.
+    `running` is false while the cars are only shown and nobody drives.
     """
 
     tick: int

@@ -91,13 +91,15 @@ class Link:
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
-    def watch(self, tick: int, state: State, labels: Labels) -> None:
+    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
         """Send frame `tick` when it is due."""
         if self._running:
             due = self.clock.due(tick)
             self._pass_time(due, state)
             self._slip(due)
-        self._tick, (self._state, self._labels) = tick, kept(state, labels)
+        self._tick, self._own = tick, observe
+        self._state, self._labels = (state, labels) if self._stream is None else kept(state, labels)
+        self._seen: dict[int, Observation] = {}
         if self._running:
             self._halt()
         self._send()
@@ -311,25 +313,26 @@ class Link:
 
     def _send_again(self) -> None:
         self._next_view = monotonic() + self._interval
-        self.transport.frame(self._view(self._state, 0.0))
+        self.transport.frame(self._view(self._state, 0.0, self._observe))
 
     def _show(self, state: State, elapsed: float, now: float) -> None:
         self._next_view = max(self._next_view + self._interval, now)
         if self._stream is not None:
-            self._stream.stream(self._view(state, elapsed))
+            self._stream.stream(self._view(state, elapsed, lambda car: self._sense(car, state)))
 
-    def _view(self, state: State, elapsed: float) -> View:
+    def _view(self, state: State, elapsed: float, observe: Callable[[int], Observation]) -> View:
         time = self._tick / self._instance.problem.rate + elapsed
-        made: dict[int, Observation] = {}
-
-        def observe(car: int) -> Observation:
-            if car not in made:
-                senses = self._senses.get(car) or self._sense(car)
-                made[car] = senses.observe(self._tick, state, self._labels)
-            return made[car]
-
         return View(self._tick, time, state, self._labels, observe, self._running)
 
-    def _sense(self, car: int) -> Senses:
-        self._senses[car] = Senses(self._instance, car, None if car == EGO else SIGHT)
-        return self._senses[car]
+    def _observe(self, car: int) -> Observation:
+        """Return the observation of `car` in the present frame; the ego's is the trial's own."""
+        if car == EGO:
+            return self._own()
+        if car not in self._seen:
+            self._seen[car] = self._sense(car, self._state)
+        return self._seen[car]
+
+    def _sense(self, car: int, state: State) -> Observation:
+        if car not in self._senses:
+            self._senses[car] = Senses(self._instance, car, None if car == EGO else SIGHT)
+        return self._senses[car].observe(self._tick, state, self._labels)

@@ -72,7 +72,7 @@ class Trial:
         self._observation: Observation | None = None
         for watcher in self._watchers:
             watcher.begin(instance)
-            watcher.watch(0, self._state, self._labels)
+            watcher.watch(0, self._state, self._labels, self._observe)
 
     @property
     def tick(self) -> int:
@@ -82,9 +82,7 @@ class Trial:
     @property
     def observation(self) -> Observation:
         """What the ego knows in the present frame."""
-        if self._observation is None:
-            self._observation = self._senses.observe(self._tick, self._state, self._labels)
-        return self._observation
+        return self._observe()
 
     def step(self, command: tuple[float, float]) -> Observation:
         """Hold `command` (speed m/s, yaw rate rad/s) for one tick and return the next observation.
@@ -127,7 +125,7 @@ class Trial:
         elif contacts and self.instance.end_on_collision:
             self._end_on_collision(contacts)
         for watcher in self._watchers:
-            watcher.watch(self._tick, self._state, self._labels)
+            watcher.watch(self._tick, self._state, self._labels, self._observe)
         return contacts
 
     def note(self, kind: str, detail: str = "") -> None:
@@ -153,6 +151,11 @@ class Trial:
 
     def __exit__(self, *_error: object) -> None:
         self.close()
+
+    def _observe(self) -> Observation:
+        if self._observation is None:
+            self._observation = self._senses.observe(self._tick, self._state, self._labels)
+        return self._observation
 
     def _agent_fault(self) -> Sequence[Contact]:
         self.end(End.AGENT_FAULT, agent_fault(self.instance, self._commands[0]))
