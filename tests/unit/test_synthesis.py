@@ -16,9 +16,12 @@ import pytest
 from dubins_traffic.errors import InputError
 from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
 from dubins_traffic.synthesis.checker import StrategyError, check
+from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.export import save_game
 from dubins_traffic.synthesis.game import build, estimate
 from dubins_traffic.synthesis.play import Environment, play
 from dubins_traffic.synthesis.solver import Solution, solve
+from dubins_traffic.synthesis.story import told
 from dubins_traffic.synthesis.strategy import Strategy
 from tests.games import ALL, board, solved
 
@@ -158,6 +161,53 @@ def test_the_estimate_is_close() -> None:
     assert expected.positions == game.positions
     assert 0.9 < expected.moves / game.to.shape[0] < 1.1
     assert game.bytes < expected.bytes < 500 << 20
+
+
+def lean(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Solution:
+    some = board(rows, columns, others, assumed, order_degree)
+    game = build(some, limit=estimate(some).lean_bytes)
+    assert game.lean
+    assert game.bytes < solved(rows, columns, others, assumed, order_degree).game.bytes
+    return solve(game)
+
+
+@pytest.mark.parametrize(
+    ("size", "assumed", "degree"),
+    [
+        ((2, 2, 3), ALL, 1),
+        ((2, 2, 3), KEEP_MOVING, 1),
+        ((2, 3, 3), "E1,E2,E3:forfeits,E4,E5,E6", 3),
+        ((2, 3, 2), "E1,E2,E3:one-forfeit,E4,E5,E6", 3),
+        ((3, 4, 2), "E1,E3,E4,E5,E6", 1),
+    ],
+)
+def test_a_lean_game_has_the_same_moves_winners_and_ranks(
+    size: tuple[int, int, int], assumed: str, degree: int
+) -> None:
+    whole, thin = solved(*size, assumed, degree), lean(*size, assumed, degree)
+    assert np.concatenate([turns.to for turns in thin.game.turns()]).tolist() == whole.game.to.tolist()
+    assert thin.game.moves == whole.game.moves
+    for position in range(0, whole.game.positions, 97):
+        assert thin.game.turns_of(position).tolist() == whole.game.turns_of(position).tolist()
+    assert np.array_equal(thin.winning, whole.winning)
+    assert np.array_equal(thin.vacuous, whole.vacuous)
+    assert len(thin.ranks) == len(whole.ranks) == 2
+    for own, other in zip(thin.ranks, whole.ranks, strict=True):
+        assert np.array_equal(own.rank, other.rank)
+        assert own.debt.tolist() == other.debt.tolist()
+    check(thin.game, thin.ranks)
+    assert [int(loss.lost.sum()) for loss in thin.losses] == [int(loss.lost.sum()) for loss in whole.losses]
+
+
+def test_a_counterstrategy_of_a_lean_game_tells_the_same_story() -> None:
+    whole, thin = solved(2, 2, 3, KEEP_MOVING), lean(2, 2, 3, KEEP_MOVING)
+    assert told(Counterstrategy(thin), 0) == told(Counterstrategy(whole), 0)
+
+
+def test_a_lean_game_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"game.npz: too large a game to be written: got '\d+ moves"):
+        save_game(lean(2, 2, 2).game, tmp_path / "game.npz")
+    assert not list(tmp_path.iterdir())
 
 
 def test_assumptions_by_name() -> None:

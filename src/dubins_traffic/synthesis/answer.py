@@ -89,7 +89,7 @@ class Answer:
         found = [
             f"{board.others} e-agents, {board.arena.cells} cells, crossings from degree "
             f"{board.arena.order_degree} on; assumed: {board.assumption}",
-            f"{game.positions:,} positions, {game.to.shape[0]:,} moves of the environment",
+            f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
         vacuous = int(self.solution.vacuous.sum())

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.synthesis.arrays import Flags, Numbers
 from dubins_traffic.synthesis.game import Game
 from dubins_traffic.synthesis.search import NO_DEBT
@@ -51,7 +50,7 @@ def check(game: Game, ranks: Sequence[Ranks]) -> None:
         wrong = _astray(game, own, best)
         if wrong.any():
             raise _error(game, goal, wrong, "leads to no lower rank while nothing is owed")
-        lost = reached & _some(answers(game, following)[game.to] == LOST, game.to_at)
+        lost = reached & (_worst(game, answers(game, following)) == LOST)
         lost |= reached & (following.rank < 0)
         if lost.any():
             raise _error(game, goal, lost, "leads from the goal to where the next one is not reached")
@@ -76,13 +75,13 @@ def _astray(game: Game, ranks: Ranks, best: Numbers) -> Flags:
     owing[owner[game.owed == debt[owner]]] = True
     after = np.searchsorted(ranks.start, ranks.start, side="right").astype(np.int32)
     bound = np.where(owing, np.append(after, LOST)[layer], below)
-    worst = np.maximum.reduceat(best[game.to], game.to_at[:-1])
-    return held & (worst >= bound)
+    return held & (_worst(game, best) >= bound)
 
 
-def _some(flags: Flags, at: Ints) -> Flags:
-    """Return for which positions some of their moves has a flag."""
-    return np.logical_or.reduceat(flags, at[:-1])
+def _worst(game: Game, best: Numbers) -> Numbers:
+    """Return the highest of `best` (N+1,) to which the environment can bring the ego from each position (N,)."""
+    worst = [np.maximum.reduceat(best[turns.to], turns.at[:-1]) for turns in game.turns()]
+    return np.concatenate(worst)
 
 
 def _error(game: Game, goal: int, wrong: Flags, fault: str) -> StrategyError:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.synthesis.arrays import Flags
+from dubins_traffic.synthesis.arrays import Flags, Numbers
 from dubins_traffic.synthesis.solver import Solution
 
 NEVER = np.int64(2**62)
@@ -76,8 +76,7 @@ class Counterstrategy:
         return int(moves[np.argmin(worst)]), debt
 
     def _moves(self, position: int) -> Ints:
-        game = self.solution.game
-        return game.to[game.to_at[position] : game.to_at[position + 1]].astype(np.int64)
+        return self.solution.game.turns_of(position).astype(np.int64)
 
     def _answers(self, position: int) -> list[int]:
         game = self.solution.game
@@ -112,13 +111,7 @@ class Counterstrategy:
         owing = owner[game.owed == debt]
         owing = owing[self.solution.losses[level].lost[owing]]
         turns[owing] = NEVER
-        safe = self._keeping(level)
-        sizes = game.to_at[owing + 1] - game.to_at[owing]
-        rows = np.repeat(np.arange(owing.size), sizes)
-        starts = np.cumsum(sizes) - sizes
-        edges = np.arange(rows.size) - starts[rows] + game.to_at[owing][rows]
-        good = safe[game.to[edges]]
-        rows, ends = rows[good], game.to[edges][good]
+        rows, ends = self._safe_moves(owing, self._keeping(level))
         reached, place = np.unique(ends.astype(np.int64), return_inverse=True)
         turn = 0
         while True:
@@ -131,15 +124,32 @@ class Counterstrategy:
                 return turns
             turns[owing[new]] = turn
 
+    def _safe_moves(self, positions: Ints, safe: Flags) -> tuple[Ints, Numbers]:
+        """Return the moves of the environment from sorted `positions` to where it is `safe`: places in it, and ends."""
+        rows: list[Ints] = []
+        ends: list[Numbers] = []
+        for turns in self.solution.game.turns():
+            low, high = np.searchsorted(positions, (turns.first, turns.first + len(turns.at) - 1))
+            own = positions[low:high] - turns.first
+            row, edge = _edges(turns.at, own)
+            good = safe[turns.to[edge]]
+            rows.append(row[good] + low)
+            ends.append(turns.to[edge[good]])
+        return np.concatenate(rows), np.concatenate(ends)
+
     def _worst(self, reached: Ints, turns: Ints) -> Ints:
         """Return the most turns that the ego can make of each of the positions reached."""
         game = self.solution.game
         inner = reached[reached < game.positions]
-        sizes = game.ego_at[inner + 1] - game.ego_at[inner]
-        starts = np.cumsum(sizes) - sizes
-        rows = np.repeat(np.arange(inner.size), sizes)
-        edges = np.arange(rows.size) - starts[rows] + game.ego_at[inner][rows]
+        rows, edges = _edges(game.ego_at, inner)
         worst = np.zeros(reached.size, dtype=np.int64)
-        if inner.size:
-            worst[: inner.size] = np.maximum.reduceat(turns[game.ego_to[edges]], starts)
+        np.maximum.at(worst, rows, turns[game.ego_to[edges]])
         return worst
+
+
+def _edges(at: Ints, positions: Ints) -> tuple[Ints, Ints]:
+    """Return all edges from `positions`, those from p being at[p] to at[p + 1]: places in `positions`, and edges."""
+    sizes = at[positions + 1] - at[positions]
+    rows = np.repeat(np.arange(positions.size), sizes)
+    starts = np.cumsum(sizes) - sizes
+    return rows, np.arange(rows.size) - starts[rows] + at[positions][rows]

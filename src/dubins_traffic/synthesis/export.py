@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from dubins_traffic import files
+from dubins_traffic.errors import InputError
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import Game
@@ -69,7 +70,14 @@ def header(board: Board) -> dict[str, Any]:
 
 
 def save_game(game: Game, path: str | Path) -> None:
-    """Write a game to a file, whole or not at all; InputError if that can't be done."""
+    """Write a game to a file, whole or not at all; InputError if that can't be done, or if the game is lean."""
+    if game.lean:
+        raise InputError(
+            "too large a game to be written",
+            file=str(path),
+            value=f"{game.moves} moves of the environment",
+            expected="memory for all of them (--memory)",
+        )
     arrays = {
         "header": np.frombuffer(json.dumps(header(game.board)).encode(), dtype=np.uint8),
         "scene": scene_numbers(game.board),

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.synthesis.arrays import Bytes, Flags
+from dubins_traffic.synthesis.moves import environment
+from dubins_traffic.synthesis.positions import unrank
 from dubins_traffic.synthesis.search import (
     NEXT_RANK,
     NO_DEBT,
@@ -30,6 +32,17 @@ from dubins_traffic.synthesis.search import (
 )
 
 
+@jit_inner
+def _turns(g: Graph, position: int) -> tuple[int, int]:
+    """Return where the moves of the environment from a position begin and end in `g.to`; of a lean game, now."""
+    if not g.lean:
+        return int(g.to_at[position]), int(g.to_at[position + 1])
+    g.out.used[0] = 0
+    unrank(g.tables, g.others, position, g.work.scenes)
+    environment(g.tables, g.others, g.ego_at.shape[0] - 1, g.work, g.out)
+    return 0, int(g.out.used[0])
+
+
 @jit
 def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
     """Set `found` (N,) to Cpre(`safe`); `ready` (N+1,) is room."""
@@ -43,7 +56,8 @@ def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
                 break
     for position in range(count):
         found[position] = True
-        for e in range(g.to_at[position], g.to_at[position + 1]):
+        first, last = _turns(g, position)
+        for e in range(first, last):
             if ready[g.to[e]] == 0:
                 found[position] = False
                 break
@@ -52,15 +66,15 @@ def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
 @jit_inner
 def _watch(g: Graph, s: Search, position: int) -> bool:
     """Let a position watch its next move that is not ready; true if there is none."""
-    first = g.to_at[position]
-    for e in range(first + s.seen[position], g.to_at[position + 1]):
+    first, last = _turns(g, position)
+    for e in range(first + s.seen[position], last):
         to = g.to[e]
         if s.ready[to] == 0:
             s.seen[position] = e - first
             s.next_watcher[position] = s.watchers[to]
             s.watchers[to] = position
             return False
-    s.seen[position] = g.to_at[position + 1] - first
+    s.seen[position] = last - first
     return True
 
 
@@ -68,8 +82,8 @@ def _watch(g: Graph, s: Search, position: int) -> bool:
 def _watch_owed(g: Graph, s: Search, o: int) -> None:
     """Let a debt watch the next of its ends that is not ready; if there is none it becomes a candidate."""
     position = g.owner[o]
-    first = g.to_at[position]
-    for e in range(first + s.owed_seen[o], g.to_at[position + 1]):
+    first, last = _turns(g, position)
+    for e in range(first + s.owed_seen[o], last):
         to = g.to[e]
         if (g.moved[e] & g.owed_mask[o]) != 0 and s.ready[to] == 0:
             s.owed_seen[o] = e - first
@@ -131,7 +145,8 @@ def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
 @jit_inner
 def _stays(g: Graph, s: Search, position: int) -> bool:
     """Say whether the ego can get from a position into Y or the marked ones, whatever the environment does."""
-    for e in range(g.to_at[position] + s.seen[position], g.to_at[position + 1]):
+    first, last = _turns(g, position)
+    for e in range(first + s.seen[position], last):
         to = g.to[e]
         if s.ready[to]:
             continue
@@ -252,7 +267,8 @@ def _possible(g: Graph, s: Search, count: int) -> int:
 @jit_inner
 def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
     """Say whether some move of the environment, answered by the ego, leads into Y or to a member of less depth."""
-    for e in range(g.to_at[position], g.to_at[position + 1]):
+    first, last = _turns(g, position)
+    for e in range(first, last):
         to = g.to[e]
         if s.ready[to]:
             return True

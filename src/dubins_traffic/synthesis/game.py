@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.synthesis.arrays import Bytes, Cells, Flags, Numbers
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
-from dubins_traffic.synthesis.moves import Moves, Work, expand
+from dubins_traffic.synthesis.moves import Moves, Work, expand, list_moves
 
 Progress: TypeAlias = Callable[[str, float], object]
 """Told what is being done, and which share of it."""
@@ -45,25 +45,43 @@ class Estimate:
         Of the environment, about.
     bytes : int
         Memory at the peak, about.
+    lean_bytes : int
+        The same for a lean game.
     """
 
     positions: int
     moves: int
     bytes: int
+    lean_bytes: int
+
+
+class Turns(NamedTuple):
+    """Moves of the environment from the positions `first` to before ``first + len(at) - 1``.
+
+    Those from position ``first + k`` lead to ``to[at[k]:at[k + 1]]``.
+    """
+
+    first: int
+    at: Ints
+    to: Numbers
 
 
 @dataclass(frozen=True)
 class Game:
     """The game: N positions, E moves of the environment, F of the ego, O debts.
 
-    Position N is none: it stands for the ego having been rammed.
+    Position N is none: it stands for the ego having been rammed. A *lean* game does not keep the moves of the
+    environment, most of what a game consists of; they are worked out anew each time.
 
     Attributes
     ----------
     board : Board
         What the numbers of positions mean.
+    moves, most_moves : int
+        E, and the most from one position.
     to_at : (N+1,) int64
-        Where the moves of the environment from each position begin in `to`.
+        Where the moves of the environment from each position begin in `to`. This and the next two are empty in a
+        lean game.
     to : (E,) int32
         The positions to which they lead; there the ego moves.
     moved : (E,) uint8
@@ -83,6 +101,8 @@ class Game:
     """
 
     board: Board
+    moves: int
+    most_moves: int
     to_at: Ints
     to: Numbers
     moved: Bytes
@@ -99,6 +119,11 @@ class Game:
         return self.ego_cell.shape[0]
 
     @property
+    def lean(self) -> bool:
+        """Whether the moves of the environment are not kept."""
+        return self.to_at.shape[0] == 0
+
+    @property
     def debts(self) -> int:
         """How many kinds of debts there may be: one a cell and one a goal."""
         return self.board.arena.cells + len(self.board.arena.goals)
@@ -106,6 +131,27 @@ class Game:
     def at_goal(self, goal: int) -> Flags:
         """Return where (N,) the ego is at a goal."""
         return np.isin(self.ego_cell, np.array(self.board.arena.goal_nodes[goal], dtype=np.int16))
+
+    def turns(self) -> Iterator[Turns]:
+        """Yield the moves of the environment from all positions, in order, some positions at a time."""
+        if not self.lean:
+            yield Turns(0, self.to_at, self.to)
+            return
+        first = 0
+        for pieces in _expanded(self.board, max(64, 4 * self.moves // self.positions), WORKERS):
+            for part in pieces:
+                yield Turns(first, _starts([part.many]), part.to)
+                first += part.many.shape[0]
+
+    def turns_of(self, position: int) -> Numbers:
+        """Return the positions to which the environment may bring one."""
+        if not self.lean:
+            return self.to[self.to_at[position] : self.to_at[position + 1]]
+        out = room(1, self.most_moves)
+        list_moves(
+            self.board.tables, self.board.others, self.positions, position, Work.of(self.board.tables), out
+        )
+        return out.to[: int(out.used[0])]
 
     @cached_property
     def bytes(self) -> int:
@@ -147,9 +193,12 @@ def estimate(board: Board) -> Estimate:
         sizes += out.used
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
     goals = len(board.arena.goals)
-    building = 2 * (5 * moves + 4 * ego_moves + 3 * debts) + 26 * count
-    solving = 5 * moves + 8 * ego_moves + 7 * debts + count * (26 + goals * 46) + goals * debts * 12
-    return Estimate(count, int(moves), int(PROGRAM + SPARE * max(building, solving)))
+    building = 2 * (4 * ego_moves + 3 * debts) + 26 * count
+    solving = 8 * ego_moves + 7 * debts + 26 * count
+    a_goal, a_way = 46 * count + 12 * debts, 5 * count
+    whole = max(building + 10 * moves, solving + 5 * moves + goals * a_goal)
+    lean = max(building, solving + a_goal + goals * a_way)
+    return Estimate(count, int(moves), int(PROGRAM + SPARE * whole), int(PROGRAM + SPARE * lean))
 
 
 def build(
@@ -162,7 +211,8 @@ def build(
     board : Board
         The positions.
     limit : int, optional
-        Bytes of memory that may be used; half of what the machine has, if not given.
+        Bytes of memory that may be used; half of what the machine has, if not given. A game that would take more is
+        built lean.
     progress : callable, optional
         Told about it now and then.
     workers : int
@@ -171,26 +221,32 @@ def build(
     Raises
     ------
     InputError
-        If the game would take more memory than `limit`, and as `estimate`.
+        If even lean the game would take more memory than `limit`, and as `estimate`.
     """
     expected = estimate(board)
     allowed = memory() // 2 if limit is None else limit
-    if expected.bytes > allowed:
+    lean = expected.bytes > allowed
+    size = expected.lean_bytes if lean else expected.bytes
+    if size > allowed:
         raise InputError(
             "too large a game",
-            value=f"{expected.positions} positions, about {expected.bytes / 2**20:.0f} MiB",
+            value=f"{expected.positions} positions, about {size / 2**20:.0f} MiB",
             expected=f"at most {allowed / 2**20:.0f} MiB (--memory), so fewer cars or a smaller network",
         )
-    what = f"build {expected.positions:,} positions, about {expected.bytes / 2**20:.0f} MiB"
+    kept = ", moves not kept" if lean else ""
+    what = f"build {expected.positions:,} positions, about {size / 2**20:.0f} MiB{kept}"
     each = max(64, 4 * expected.moves // expected.positions)
     pieces: list[Moves] = []
     for piece in _expanded(board, each, workers):
-        pieces += piece
+        pieces += [_without_turns(part) if lean else part for part in piece]
         if progress:
             progress(what, sum(part.many.shape[0] for part in pieces) / expected.positions)
+    many = [part.many for part in pieces]
     return Game(
         board,
-        _starts([part.many for part in pieces]),
+        sum(int(part.sum()) for part in many),
+        max(int(part.max()) for part in many),
+        np.empty(0, dtype=np.int64) if lean else _starts(many),
         np.concatenate([part.to for part in pieces]),
         np.concatenate([part.moved for part in pieces]),
         _starts([part.ego_many for part in pieces]),
@@ -273,6 +329,11 @@ def _trimmed(out: Moves, rows: int) -> Moves:
         out.owed_many[:rows].copy(),
         out.used,
     )
+
+
+def _without_turns(part: Moves) -> Moves:
+    """Return the moves of a block without those of the environment, the numbers of which stay."""
+    return part._replace(to=part.to[:0].copy(), moved=part.moved[:0].copy())
 
 
 def _starts(counts: list[Numbers]) -> Ints:

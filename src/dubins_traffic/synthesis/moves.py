@@ -185,7 +185,7 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
 
 
 @jit_inner
-def _environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
+def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
     """Write the moves of the environment from `work.scenes`; false if there is no room."""
     _units(t, work)
     used = out.used[0]
@@ -325,7 +325,7 @@ def expand(
         row = position - begun
         before, ego_before, owed_before = out.used[0], out.used[1], out.used[2]
         unrank(t, others, position, work.scenes)
-        room = _environment(t, others, positions, work, out)
+        room = environment(t, others, positions, work, out)
         room = room and _owe(t, work, out)
         cell = -1
         if room:

@@ -9,6 +9,8 @@ import numpy as np
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.synthesis.arrays import Bytes, Cells, Numbers
+from dubins_traffic.synthesis.board import Tables
+from dubins_traffic.synthesis.positions import Moves, Work
 
 UNRANKED = -1
 NOBODY = -1
@@ -18,8 +20,17 @@ STOPPED, RANKED, NEXT_RANK, QUEUED, TAKEN, UNFRIENDLY = range(6)
 
 
 class Graph(NamedTuple):
-    """The game (`game.Game`), and the moves of the ego backwards."""
+    """The game (`game.Game`), and the moves of the ego backwards.
 
+    Of a lean game `to` and `moved` are room for the moves of one position, and `work` and `out` serve to work them
+    out; so each thread needs a graph of its own.
+    """
+
+    lean: bool
+    tables: Tables
+    others: int
+    work: Work
+    out: Moves
     to_at: Ints
     to: Numbers
     moved: Bytes

@@ -15,7 +15,8 @@ import numpy as np
 
 from dubins_traffic.synthesis.arrays import Cells, Flags, Numbers
 from dubins_traffic.synthesis.fixpoint import forced, reach
-from dubins_traffic.synthesis.game import WORKERS, Game, Progress
+from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
+from dubins_traffic.synthesis.positions import Work
 from dubins_traffic.synthesis.search import (
     NEXT_RANK,
     RANKED,
@@ -49,6 +50,14 @@ class Ranks:
     rank: Numbers
     start: Numbers
     debt: Cells
+
+
+@dataclass(frozen=True)
+class _Way:
+    """The ranks of a goal, and whether being friendly has cost any position."""
+
+    ranks: Ranks
+    unfriendly: bool
 
 
 @dataclass(frozen=True)
@@ -101,17 +110,23 @@ class Solution:
 
 
 def graph(game: Game) -> Graph:
-    """Return what the kernels are given of a game."""
+    """Return what the kernels are given of a game; one thread at a time may use that of a lean game."""
     count = game.positions
     back_at = np.zeros(count + 1, dtype=np.int64)
     back = np.empty(game.ego_to.shape[0], dtype=np.int32)
     reverse(game.ego_at, game.ego_to, back_at, back)
     owner = np.empty(game.owed.shape[0], dtype=np.int32)
     own(game.owed_at, owner)
-    return Graph(
+    out = room(0, 0) if game.lean else room(0, 0)._replace(to=game.to, moved=game.moved)
+    found = Graph(
+        game.lean,
+        game.board.tables,
+        game.board.others,
+        Work.of(game.board.tables),
+        out,
         game.to_at,
-        game.to,
-        game.moved,
+        out.to,
+        out.moved,
         game.ego_at,
         game.ego_to,
         back_at,
@@ -121,6 +136,15 @@ def graph(game: Game) -> Graph:
         game.owed_mask,
         owner,
     )
+    return for_thread(game, found)
+
+
+def for_thread(game: Game, shared: Graph) -> Graph:
+    """Return a graph for one more thread."""
+    if not game.lean:
+        return shared
+    out = room(1, game.most_moves)
+    return shared._replace(work=Work.of(game.board.tables), out=out, to=out.to, moved=out.moved)
 
 
 def solve(game: Game, *, progress: Progress | None = None, workers: int = WORKERS) -> Solution:
@@ -162,9 +186,9 @@ class _Solver:
         spoiled = False
         while True:
             targets = self._targets(won)
-            searches = self._side_by_side(targets, friendly)
-            spoiled = spoiled or any(bool(search.control[UNFRIENDLY]) for search in searches)
-            ways = [search.rank != UNRANKED for search in searches]
+            found = self._searched(targets, friendly)
+            spoiled = spoiled or any(way.unfriendly for way in found)
+            ways = [way.ranks.rank != UNRANKED for way in found]
             before = won
             for goal in goals:
                 lost = won & ~ways[goal]
@@ -172,7 +196,7 @@ class _Solver:
                     losses.append(Loss(goal, targets[goal], lost))
                 won = won & ways[goal]
             if won.sum() in (before.sum(), 0):
-                return won, tuple(_ranks(search, won) for search in searches), tuple(losses), spoiled
+                return won, tuple(_within(way.ranks, won) for way in found), tuple(losses), spoiled
 
     def _targets(self, won: Flags) -> list[Flags]:
         """Return, for each goal, where it has been reached and the ego stays where it has won."""
@@ -184,35 +208,51 @@ class _Solver:
         forced(self._graph, won, ready, kept)
         return [target & kept for target in targets]
 
-    def _side_by_side(self, targets: list[Flags], friendly: bool) -> list[Search]:
-        """Return the searches for all goals; interrupted by Ctrl-C."""
+    def _searched(self, targets: list[Flags], friendly: bool) -> list[_Way]:
+        """Return the ways to all goals: side by side, or for the sake of memory one after the other."""
+        if not self._game.lean:
+            return self._side_by_side(targets, friendly, "solve")
+        found: list[_Way] = []
+        for k, target in enumerate(targets):
+            found += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
+        return found
+
+    def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Way]:
+        """Return the ways to these targets; interrupted by Ctrl-C."""
         game = self._game
         searches = [Search.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
         with ThreadPoolExecutor(self._workers) as pool:
             try:
                 cells = game.board.arena.cells
                 running = {
-                    pool.submit(reach, self._graph, target, cells, friendly, search)
+                    pool.submit(reach, for_thread(game, self._graph), target, cells, friendly, search)
                     for target, search in zip(targets, searches, strict=True)
                 }
                 while running:
                     done, running = wait(running, timeout=LOOK)
-                    self._tell(searches)
+                    self._tell(searches, what)
                     for future in done:
                         future.result()
             except BaseException:
                 for search in searches:
                     search.control[STOPPED] = 1
                 raise
-        return searches
+        return [_way(search) for search in searches]
 
-    def _tell(self, searches: list[Search]) -> None:
+    def _tell(self, searches: list[Search], what: str) -> None:
         if self._progress:
             ranked = sum(int(search.control[RANKED]) for search in searches)
-            self._progress("solve", ranked / (len(searches) * self._game.positions))
+            self._progress(what, ranked / (len(searches) * self._game.positions))
 
 
-def _ranks(search: Search, won: Flags) -> Ranks:
+def _way(search: Search) -> _Way:
+    """Return what a search has found; its room may go."""
     used = int(search.control[NEXT_RANK])
-    rank = np.where(won, search.rank, np.int32(UNRANKED)).astype(np.int32, copy=False)
-    return Ranks(rank, search.start[:used].copy(), search.debt[:used].copy())
+    ranks = Ranks(search.rank, search.start[:used].copy(), search.debt[:used].copy())
+    return _Way(ranks, bool(search.control[UNFRIENDLY]))
+
+
+def _within(ranks: Ranks, won: Flags) -> Ranks:
+    """Return the ranks of the positions that are won."""
+    rank = np.where(won, ranks.rank, np.int32(UNRANKED)).astype(np.int32, copy=False)
+    return Ranks(rank, ranks.start, ranks.debt)
