@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dubins_traffic.campaign.sources import load, load_record
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
     from dubins_traffic.cars.state import Command, Contact, Frames, Observation, Pose, SensedCar, Twist
+    from dubins_traffic.controllers.shield import Shield
     from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
     from dubins_traffic.problem.configuration import Configuration, load_config
     from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
@@ -39,6 +40,7 @@ _PLACES = {
     "campaign.sources": ("load", "load_record"),
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
     "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
+    "controllers.shield": ("Shield",),
     "errors": ("ControllerError", "DubinsTrafficError", "InputError", "RecordError"),
     "problem.configuration": ("Configuration", "load_config"),
     "problem.document": ("instance_from_document", "instance_to_document", "load_instance"),
@@ -97,6 +99,7 @@ __all__ = [
     "ScoreSheet",
     "Scorer",
     "SensedCar",
+    "Shield",
     "Simulator",
     "Sink",
     "Trial",

@@ -63,6 +63,7 @@ def plan(
     deadline: float | None = None,
     simulator: str | None = None,
     show: bool = False,
+    shield: bool = False,
 ) -> Plan:
     """Return what is to be run, checked as far as can be before anything runs.
 
@@ -91,6 +92,8 @@ def plan(
         Its name, instead of that in the source.
     show : bool
         Whether the simulator shows the trials in a window of its own, at the pace of the clock.
+    shield : bool
+        Whether the controller drives under the shield (`controllers.shield`).
 
     Raises
     ------
@@ -100,6 +103,7 @@ def plan(
     found = load(source, rnd=rnd, seed=seed or 0)
     if controller is None:
         controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
+    controller = controllers.shielded(controller) if shield else controller
     controllers.load(controller)
     _check_deadline(deadline)
     if isinstance(found, RoadNetwork):

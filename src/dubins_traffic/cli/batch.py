@@ -49,11 +49,13 @@ def batch(
     records: Annotated[
         str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
     ] = None,
+    shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
     """Run many trials together and score them: the same scores as of [b]run[/b], much sooner."""
     from dubins_traffic.campaign.batch import run_batch
     from dubins_traffic.cli.tables import show
+    from dubins_traffic.controllers.registry import shielded
     from dubins_traffic.problem.configuration import load_config
     from dubins_traffic.record.sink import FAULTS
 
@@ -62,7 +64,7 @@ def batch(
     with progress(count) as tell:
         done = run_batch(
             drawn,
-            controller,
+            shielded(controller) if shield else controller,
             trials=trials,
             seed=seed,
             batch=together,

@@ -53,6 +53,12 @@ Output = Annotated[
     str | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
 ]
+Shield = Annotated[
+    bool,
+    typer.Option(
+        "--shield", help="Change the ego's commands as little as needed for it to keep rules 1 to 3."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 Data = Annotated[
     str | None,

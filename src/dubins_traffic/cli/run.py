@@ -16,6 +16,7 @@ EXAMPLES = options.examples(
     "run demo --controller simple --trials 20 --jobs 2 --records out",
     "run my-trials.json --controller my_controller.py:MyController -f data.json",
     "run out/trial-0003.mcap --controller simple --json",
+    "run town --controller lanes --shield",
     "run demo --simulator gazebo --records out",
 )
 
@@ -75,6 +76,7 @@ def run(
     gui: Annotated[
         bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
     ] = False,
+    shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
@@ -97,6 +99,7 @@ def run(
         deadline=deadline,
         simulator=simulator,
         show=gui,
+        shield=shield,
     )
     results: list[Result] = []
     try:

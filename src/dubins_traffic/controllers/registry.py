@@ -26,6 +26,8 @@ _DESCRIPTIONS = {
     "rules": "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
     "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
 }
+SHIELDED = "+shield"
+"""What ends the name of a controller that drives under the shield (`controllers.shield`)."""
 _OPTION = "--controller"
 _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
@@ -43,6 +45,7 @@ def load(spec: str) -> Controller:
     spec : str
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
         directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again.
+        Followed by ``+shield``: the same under the shield.
 
     Raises
     ------
@@ -50,6 +53,9 @@ def load(spec: str) -> Controller:
         If there is no such name, module, file or class, if the code raises while it is loaded or constructed, or
         if the object lacks a method of `dubins_traffic.protocols.Controller`.
     """
+    if spec.endswith(SHIELDED):
+        inner = load(spec.removesuffix(SHIELDED))
+        return cast(Controller, importlib.import_module("dubins_traffic.controllers.shield").Shield(inner))
     if spec in _BUILT_IN:
         module, name = _BUILT_IN[spec]
         return cast(Controller, getattr(importlib.import_module(module), name)())
@@ -78,6 +84,11 @@ def load(spec: str) -> Controller:
                 "start(problem) and act(observation) -> (speed, yaw rate)",
             )
     return cast(Controller, made)
+
+
+def shielded(spec: str) -> str:
+    """Return the name of a controller under the shield."""
+    return spec if spec.endswith(SHIELDED) else spec + SHIELDED
 
 
 def _load_file(place: str, spec: str) -> ModuleType:

@@ -1,0 +1,205 @@
+"""Random, hostile and broken controllers under the shield among `lawful` e-agents: does the ego keep rules 1 to 3?
+
+    python -m benchmarks shield
+    python -m benchmarks.shield [TRIALS] [JOBS] [FIRST]
+
+Each trial is 60 s on a random network of 6 to 40 intersections with 1 to 6 e-agents. Every fourth has obstacles in and
+beside the lanes, every eighth a car with another body or other bounds. The kinds of `benchmarks.shield_hostile` take
+turns. A tenth as many trials are driven by the controller `rules` itself: in how many does the shield step in?
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.drawing import random_roads, random_trial
+from benchmarks.rules import e_agents
+from benchmarks.shield_hostile import KINDS, Hostile
+from benchmarks.table import Row, show
+from dubins_traffic.campaign.asked import grouped
+from dubins_traffic.campaign.group import Group
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.controllers.shield import Shield
+from dubins_traffic.driving.law import decide
+from dubins_traffic.driving.law_tables import desk
+from dubins_traffic.driving.shield import shield
+from dubins_traffic.driving.shield_tables import REASON, REASONS, egos, guards
+from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.scoring.score import Score
+
+DURATION = 60.0
+SEED = 2016
+TOGETHER = 240
+BODIES: tuple[dict[str, Any], ...] = (
+    {"body": {"rectangle": {"length": 0.4, "width": 0.25}}},
+    {"bounds": {"turning_radius": 0.26}},
+    {"bounds": {"speed": 1.2, "yaw_rate": 2.5, "speed_min": -0.2}},
+    {
+        "body": {"rectangle": {"length": 0.35, "width": 0.2}},
+        "bounds": {"turning_radius": 0.2, "speed_min": 0.0},
+    },
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Shielded:
+    """One trial: who drove, what the ego and the others broke, collisions and those with the ego at fault, in how many
+    ticks the shield stepped in for each reason, and metres driven.
+    """
+
+    number: int
+    kind: str
+    end: str
+    own: tuple[str, ...]
+    others: tuple[str, ...]
+    collisions: int
+    at_fault: int
+    reasons: Mapping[str, int]
+    distance: float
+
+
+def instance(number: int, seconds: float = DURATION) -> Instance:
+    """Return the random instance of a number."""
+    draws = Draws(SEED, number, 907)
+    network = random_roads(draws, 40, 0.5)
+    agents = e_agents("lawful", draws.between(1, 6), draws)
+    more: dict[str, Any] = {"car": BODIES[number // 8 % len(BODIES)]} if number % 8 == 3 else {}
+    if number % 4 == 1:
+        bare = random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+        more["obstacles"] = _obstacles(bare, draws)
+    return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+
+
+def _obstacles(bare: Instance, draws: Draws) -> list[dict[str, Any]]:
+    """Return one to three discs in and beside lanes."""
+    network = bare.problem.network
+    found: list[dict[str, Any]] = []
+    for _ in range(draws.between(1, 3)):
+        (x0, y0), (x1, y1) = network.lane_line(draws.below(network.lanes), draws.uniform(-0.7, 0.1))
+        share = draws.uniform(0.3, 0.7)
+        x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+        found.append({"disc": {"x": x, "y": y, "radius": draws.uniform(0.05, 0.2)}})
+    return found
+
+
+def trials(numbers: Sequence[int], seconds: float = DURATION, kinds: Sequence[str] = KINDS) -> list[Shielded]:
+    """Run trials together, the `kinds` taking turns."""
+    found: list[Shielded] = []
+    for own in grouped([instance(number, seconds) for number in numbers]):
+        found += _run(own, [kinds[(one.trial + one.trial // len(kinds)) % len(kinds)] for one in own])
+    return found
+
+
+def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
+    """Run trials of one control rate and width together."""
+    group = Group(own, keeps_rules=False)
+    count, places = group.state.x.shape
+    problems = [one.problem for one in own]
+    roads, net = pack_distinct(
+        [problem.network for problem in problems], [problem.car.lane_width for problem in problems]
+    )
+    bodies = pack_obstacles([problem.obstacles for problem in problems])
+    law, drivers, watch = egos(problems, places, net), egos(problems, places, net), guards(problems)
+    room = desk(places, int(np.diff(roads.seg_off).max()))
+    hostile = Hostile(kinds, law.build, net, roads, SEED + own[0].trial)
+    reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
+    while len(active := group.active):
+        tick = np.full(count, -1)
+        tick[active] = group.ticks[active]
+        now = int(tick.max())
+        decide(now, group.state, group.labels, roads, bodies, law, room, group.commands)
+        group.commands[:, EGO] = hostile.ask(now, group.state, group.labels, group.commands[:, EGO].copy())
+        shield(
+            tick, False, group.state, group.labels, roads, bodies, drivers, watch, room, group.commands
+        )  # fmt: skip
+        reasons[active, watch.mark[active, REASON]] += 1
+        group.advance()
+    for b, one in enumerate(own):
+        told = {REASONS[k]: int(n) for k, n in enumerate(reasons[b]) if k and n}
+        yield _shielded(one.trial, kinds[b], group.outcome(b, kinds[b]).score, told)
+
+
+def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int]) -> Shielded:
+    verdict = score.verdict
+    assert verdict is not None
+    return Shielded(
+        number,
+        kind,
+        str(score.end),
+        tuple(one.rule for one in verdict.violations if one.car == "ego"),
+        tuple(one.rule for one in verdict.violations if one.car != "ego"),
+        len(score.collisions),
+        sum(one.at_fault for one in score.collisions),
+        reasons,
+        score.driven.distance_m,
+    )
+
+
+def ruled(number: int, seconds: float = DURATION) -> Shielded:
+    """Run a trial of the controller `rules` under the shield."""
+    driver = Shield("rules")
+    score = run_trial(instance(number, seconds), driver).score
+    return _shielded(number, "rules", score, {"": driver.guard.count} if driver.guard.count else {})
+
+
+def bars(found: Sequence[Shielded]) -> list[Row]:
+    """Return the table of the bars."""
+    hostile = [one for one in found if one.kind != "rules"]
+    quiet = [one for one in found if one.kind == "rules"]
+    rows = [_breaches("random, hostile and broken", hostile), _breaches("rules", quiet)]
+    alone = sum(1 for one in quiet if not one.reasons) / max(len(quiet), 1)
+    rows.append(Row("rules: never stepped in", f"{100 * alone:.1f} % of trials", ">= 95 %", alone >= 0.95))
+    for kind in KINDS:
+        own = [one for one in hostile if one.kind == kind]
+        ticks = sum(sum(one.reasons.values()) for one in own) / max(len(own), 1) / (30.0 * DURATION)
+        driven = sum(one.distance for one in own) / max(len(own), 1)
+        rows.append(
+            Row(f"{kind}: ticks stepped in; driven", f"{100 * ticks:.1f} %; {driven:.1f} m", "", True)
+        )
+    return rows
+
+
+def _breaches(kind: str, found: Sequence[Shielded]) -> Row:
+    broke = sum(1 for one in found if one.own or one.at_fault)
+    return Row(f"{kind}, {len(found)} trials: with a breach of rules 1 to 3", str(broke), "0", broke == 0)
+
+
+def measured(count: int = 20000, jobs: int = 2, first: int = 0) -> list[Shielded]:
+    """Run `count` trials of the hostile kinds and a tenth as many of `rules`, in `jobs` processes."""
+    numbers = range(first, first + count)
+    parts = [numbers[k : k + TOGETHER] for k in range(0, count, TOGETHER)]
+    found: list[Shielded] = []
+    with ProcessPoolExecutor(jobs) as pool:
+        for part in pool.map(trials, parts):
+            found += part
+            print(f"{len(found)} of {count}", file=sys.stderr, end="\r", flush=True)
+        found += pool.map(ruled, range(first, first + max(count // 10, 1)), chunksize=8)
+    return found
+
+
+def measure() -> list[Row]:
+    """Run all trials and return the table of the bars."""
+    return bars(measured())
+
+
+def main() -> None:
+    """Print what is remarkable, and the table."""
+    found = measured(*(int(argument) for argument in sys.argv[1:4]))
+    for one in found:
+        if one.own or one.at_fault or (one.kind == "rules" and one.reasons):
+            print(one)
+    show("shield", bars(found))
+
+
+if __name__ == "__main__":
+    main()

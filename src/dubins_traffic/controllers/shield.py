@@ -1,0 +1,78 @@
+"""The shield as a controller about another controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.controllers import registry
+from dubins_traffic.driving.guard import Guard
+from dubins_traffic.protocols import Closes, Controller, Reports
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+EVENT = "shield"
+"""Kind of the events that say when the shield stepped in."""
+
+
+class Shield:
+    """Another controller, whose commands are changed as little as needed for the ego to break none of rules 1 to 3.
+
+    Parameters
+    ----------
+    controller : Controller or str
+        Whatever drives; by name as `controllers.registry.load` takes it.
+
+    Notes
+    -----
+    What the other raises, and that it gives up, is passed on: these end a trial as they do without a shield. Numbers
+    that are not finite are taken for (0, 0). Every tick in which the shield steps in becomes an event `shield`.
+
+    Examples
+    --------
+    >>> import dubins_traffic as dt
+    >>> instance = dt.draw(dt.load_config("town"), seed=1, trial=0)
+    >>> dt.run_trial(instance, dt.Shield("simple")).score.verdict.clean
+    True
+    """
+
+    def __init__(self, controller: Controller | str) -> None:
+        self._controller = registry.load(controller) if isinstance(controller, str) else controller
+        self.guard = Guard()
+        self._events: list[tuple[str, str]] = []
+
+    def start(self, problem: Problem) -> None:
+        """Start the other controller; InputError if the car can't keep the rules."""
+        self.guard.start(problem)
+        self._events = []
+        self._controller.start(problem)
+
+    def act(self, observation: Observation) -> Command | None:
+        """Ask the other controller, and let its command through if it breaks nothing."""
+        asked = self._controller.act(observation)
+        if asked is None:
+            return None
+        given = self.guard.filter(observation, asked)
+        found = self.guard.intervention
+        if found is not None:
+            self._events.append((EVENT, told(found.asked, found.given, found.reason)))
+        return given
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what has happened since the last call: kind and detail of each event."""
+        found, self._events = self._events, []
+        inner = self._controller.report() if isinstance(self._controller, Reports) else ()
+        return [*inner, *found]
+
+    def close(self) -> None:
+        """Close the other controller if it wants to be closed."""
+        if isinstance(self._controller, Closes):
+            self._controller.close()
+
+
+def told(asked: tuple[float, float], given: tuple[float, float], reason: str) -> str:
+    """Return the detail of an event: asked and given commands in m/s and rad/s, and the rule at stake."""
+    numbers = [f"({speed:.6g}, {yaw_rate:.6g})" for speed, yaw_rate in (asked, given)]
+    return f"{reason}: asked {numbers[0]}, given {numbers[1]}"

@@ -1,0 +1,100 @@
+"""The shield of one ego, tick by tick: from observations and asked commands to commands that break no rule."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.driving.fitness import check_fit
+from dubins_traffic.driving.law_tables import Desk, Drivers, desk
+from dubins_traffic.driving.shield import shield
+from dubins_traffic.driving.shield_tables import REASON, REASONS, Guards, egos, guards
+from dubins_traffic.roads.table import RoadTable, pack
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+
+class Intervention(NamedTuple):
+    """A tick in which the shield stepped in: what was asked for, what was done, and the rule that was at stake."""
+
+    tick: int
+    asked: tuple[float, float]
+    given: Command
+    reason: str
+
+
+class Guard:
+    """Keeps an ego within rules 1 to 3, whatever it is asked to do (`driving.shield`, docs/shield.md).
+
+    Examples
+    --------
+    >>> guard = Guard()                                              # doctest: +SKIP
+    >>> guard.start(problem)                                         # doctest: +SKIP
+    >>> command = guard.filter(observation, (0.5, 0.0))              # doctest: +SKIP
+
+    Attributes
+    ----------
+    intervention : Intervention or None
+        Of the last tick; None if its command was let through.
+    count : int
+        How many ticks the shield has stepped in.
+    """
+
+    def __init__(self) -> None:
+        self.intervention: Intervention | None = None
+        self.count = 0
+
+    def start(self, problem: Problem) -> None:
+        """Prepare for a trial; InputError if the car can't keep the rules (`driving.fitness`)."""
+        check_fit(problem, owes=False)
+        cars = 1 + len(problem.e_agents)
+        self.intervention = None
+        self.count = 0
+        self._state = State.zeros(1, cars)
+        self._labels = Labels.zeros(1, cars)
+        self._command = np.zeros((1, cars, 2))
+        self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
+        self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
+        self._desk: Desk = desk(cars, len(problem.network.segments))
+        self._drivers: Drivers = egos([problem], cars, np.zeros(1, dtype=np.int64))
+        self._guards: Guards = guards([problem])
+        self._tick = np.zeros(1, dtype=np.int64)
+
+    def filter(self, observation: Observation, command: tuple[float, float]) -> Command:
+        """Return `command`, or the nearest one found with which the ego breaks nothing.
+
+        Parameters
+        ----------
+        observation : Observation
+            Of every tick, from the first on. After a gap the ego does not back up until it has driven on.
+        command : tuple of float
+            Speed, m/s, and yaw rate, rad/s. Out of bounds it means what the simulator makes of it; numbers that are
+            not finite mean (0, 0).
+        """
+        state, labels = self._state, self._labels
+        state.count[0] = 1 + len(observation.others)
+        seen = [(observation.pose, observation.twist, observation.propositions)]
+        seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
+        for n, (pose, twist, propositions) in enumerate(seen):
+            state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
+            state.speed[0, n], state.yaw_rate[0, n] = twist
+            for array, value in zip(labels, propositions, strict=True):
+                array[0, n] = value
+        self._tick[0] = observation.tick
+        asked = (float(command[0]), float(command[1]))
+        self._command[0, EGO] = asked
+        shield(
+            self._tick, True, state, labels, self._roads, self._obstacles, self._drivers, self._guards,
+            self._desk, self._command,
+        )  # fmt: skip
+        reason = int(self._guards.mark[0, REASON])
+        given = Command(*self._command[0, EGO].tolist())
+        self.intervention = None
+        if reason:
+            self.count += 1
+            self.intervention = Intervention(observation.tick, asked, given, REASONS[reason])
+        return given
