@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from dubins_traffic.cars.state import Frames
+from dubins_traffic.cars.state import Frames, Labels
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -35,6 +35,33 @@ def words(network: RoadNetwork, names: Sequence[str], segment: Ints, at: Ints) -
             x, y = network.intersections[v]
             found.append(f"{name}_t_{x}_{y}")
     return tuple(found)
+
+
+class Caption:
+    """The labels that hold in the latest frame of a trial, worded anew only when they change.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+        The roads.
+    names : sequence of str
+        Names of the cars.
+    """
+
+    def __init__(self, network: RoadNetwork, names: Sequence[str]) -> None:
+        self._network, self._names = network, names
+        self._shown = (b"", b"")
+        self.words: list[str] = []
+
+    def update(self, labels: Labels) -> bool:
+        """Take the labels of trial 0 of a batch; return whether other words hold than before."""
+        segment, at = labels.segment[0], labels.at[0]
+        shown = (segment.tobytes(), at.tobytes())
+        if shown == self._shown:
+            return False
+        self._shown = shown
+        self.words = list(words(self._network, self._names, segment, at))
+        return True
 
 
 def labels_2016(network: RoadNetwork, names: Sequence[str], frames: Frames) -> Iterator[tuple[str, ...]]:

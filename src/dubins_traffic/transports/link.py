@@ -69,6 +69,7 @@ class Link:
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
         self._polled = transport if isinstance(transport, Polled) else None
+        self._between = self._stream is not None and not clock.lockstep
         self._interval = IDLE if self._stream is None else self._stream.interval
         transport.open(self.inbox)
 
@@ -98,7 +99,7 @@ class Link:
             self._pass_time(due, state)
             self._slip(due)
         self._tick, self._own = tick, observe
-        self._state, self._labels = (state, labels) if self._stream is None else kept(state, labels)
+        self._state, self._labels = kept(state, labels) if self._between else (state, labels)
         self._seen: dict[int, Observation] = {}
         if self._running:
             self._halt()

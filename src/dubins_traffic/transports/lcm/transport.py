@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
-from dubins_traffic.spec.labels import words
+from dubins_traffic.spec.labels import Caption
 from dubins_traffic.transports.lcm import connection, encoding
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     command_t,
@@ -60,7 +60,6 @@ class Lcm:
         self._trial = NO_TRIAL
         self._trials = 0
         self._announced = b""
-        self._shown = (b"", b"")
         self._open = False
 
     def open(self, mailbox: Mailbox) -> None:
@@ -77,8 +76,8 @@ class Lcm:
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars."""
-        self._instance = instance
         self._encoder = encoding.Encoder(instance.names)
+        self._caption = Caption(instance.problem.network, instance.names)
         self._announced, self._trial = b"", NO_TRIAL
         for subscription in self._subscriptions:
             self._lcm.unsubscribe(subscription)
@@ -145,13 +144,10 @@ class Lcm:
     def _show(self, view: View) -> None:
         message = self._encoder.world(self._trial, view.tick, view.time, view.state, view.labels)
         self._publish(connection.WORLD, message)
-        segment, at = view.labels.segment[0], view.labels.at[0]
-        shown = (segment.tobytes(), at.tobytes())
-        if view.tick == 0 or shown != self._shown:
-            self._shown = shown
+        if self._caption.update(view.labels) or view.tick == 0:
             labels = labels_t()
             labels.trial, labels.tick, labels.time = self._trial, view.tick, view.time
-            labels.label = list(words(self._instance.problem.network, self._instance.names, segment, at))
+            labels.label = self._caption.words
             labels.labels = len(labels.label)
             self._publish(connection.LABELS, labels.encode())
 

@@ -11,7 +11,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.protocols import View
-from dubins_traffic.spec.labels import words
+from dubins_traffic.spec.labels import Caption
 from dubins_traffic.transports.ros1.messages import load
 
 if TYPE_CHECKING:
@@ -88,8 +88,7 @@ class World:
         self._rospy = topics.rospy
         self._publisher = topics.publisher
         self._names = instance.names
-        self._network = instance.problem.network
-        self._rate = instance.problem.rate
+        self._caption = Caption(instance.problem.network, instance.names)
         self._label_message = self._m.LabelStamped()
         self._label_message.header.frame_id = "map"
         self._labels = self._publisher("/loutput", self._m.LabelStamped, latch=True)
@@ -165,7 +164,8 @@ class World:
     def _put_labels(self, view: View, time: Any) -> None:
         message = self._label_message
         message.header.stamp = time
-        message.label = list(words(self._network, self._names, view.labels.segment[0], view.labels.at[0]))
+        if self._caption.update(view.labels):
+            message.label = self._caption.words
         self._labels.publish(message)
 
     def _put_odometry(self, view: View, time: Any) -> None:
