@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -40,7 +41,7 @@ def ros(tmp_path: Path) -> Iterator[Graph]:
 
 @pytest.fixture(scope="module")
 def nodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The C++ examples, built with g++ against Debian's roscpp."""
+    """The examples and a client in C++, built with g++ against Debian's roscpp."""
     need_ros()
     folder = tmp_path_factory.mktemp("nodes")
     messages = [
@@ -57,8 +58,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True
     )
     builds = []
-    for name in ("controller", "wander"):
-        source = ROOT / "examples" / "ros1" / f"{name}.cpp"
+    for source in ("examples/ros1/controller.cpp", "examples/ros1/wander.cpp", "tests/ros_client.cpp"):
         command = [
             "g++",
             "-Wall",
@@ -66,12 +66,12 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "-Werror",
             "-isystem",
             folder / "include",
-            source,
+            ROOT / source,
             "-o",
-            folder / name,
+            folder / Path(source).stem,
         ]
         builds.append(subprocess.Popen([*command, *flags.stdout.split()]))
-    assert [build.wait(120) for build in builds] == [0, 0]
+    assert [build.wait(120) for build in builds] == [0, 0, 0]
     return folder
 
 
@@ -87,10 +87,37 @@ def test_message_sums_are_those_of_2016() -> None:
 
 
 def test_a_python_client_goes_through_trials_resets_and_restarts(ros: Graph, tmp_path: Path) -> None:
-    records = tmp_path / "out"
-    config = configuration(tmp_path, duration=1.5)
-    session = ros.session(config, "--records", records, "-f", tmp_path / "data.json")
-    client = ros.client("drive", "reset:10", "restart:10", "drive")
+    session = begun(ros, tmp_path)
+    seen = through(session, ros.client("drive", "reset:10", "restart:10", "drive"), tmp_path)
+    assert seen[0]["names"] == ["ego", "agent0", "agent1"]
+    assert seen[0]["states"] >= 1.5 * 100
+    assert seen[0]["odometry"] >= 1.5 * 25
+    assert seen[0]["scans"] >= 10
+    data = json.loads((tmp_path / "data.json").read_text())
+    assert len(data["instances"]) == 4
+
+
+def test_a_client_in_cpp_goes_through_trials_resets_and_restarts(
+    ros: Graph, tmp_path: Path, nodes: Path
+) -> None:
+    session = begun(ros, tmp_path)
+    client = ros.start([nodes / "ros_client", "drive", "reset", "restart", "drive"])
+    seen = through(session, client, tmp_path)
+    assert [each["sent"] >= 10 for each in seen] == [True] * 4
+    frames = dt.load_record(tmp_path / "out" / "trial-0000.mcap").frames
+    assert frames.command_speed[1:, 0].mean() > 0.2
+
+
+def begun(ros: Graph, folder: Path) -> subprocess.Popen[str]:
+    """Start a session of three short trials."""
+    config = configuration(folder, duration=1.5)
+    return ros.session(config, "--records", folder / "out", "-f", folder / "data.json")
+
+
+def through(
+    session: subprocess.Popen[str], client: subprocess.Popen[str], folder: Path
+) -> list[dict[str, Any]]:
+    """Return what a client has seen that drove, asked RESET, asked RESTART and drove."""
     status, out, err = finish(client)
     assert status == 0, err
     seen = lines(out)
@@ -98,7 +125,7 @@ def test_a_python_client_goes_through_trials_resets_and_restarts(ros: Graph, tmp
     assert status == 0, err
     assert [(each["started"], each["again"], each["last"]) for each in seen] == [(True, False, "")] * 4
     assert not any(each["refused"] for each in seen)
-    assert ends(records) == {
+    assert ends(folder / "out") == {
         "trial-0000": End.DURATION,
         "trial-0001": End.RESET,
         "trial-0002": End.RESET,
@@ -106,13 +133,8 @@ def test_a_python_client_goes_through_trials_resets_and_restarts(ros: Graph, tmp
     }
     assert seen[0]["problem"].keys() == {"version", "goals", "rnd", "intersection_radius"}
     assert seen[2]["problem"] == seen[3]["problem"] != seen[1]["problem"]
-    assert seen[0]["names"] == ["ego", "agent0", "agent1"]
     assert sum("_s_" in label for label in seen[0]["labels"]) == 3
-    assert seen[0]["states"] >= 1.5 * 100
-    assert seen[0]["odometry"] >= 1.5 * 25
-    assert seen[0]["scans"] >= 10
-    data = json.loads((tmp_path / "data.json").read_text())
-    assert len(data["instances"]) == 4
+    return seen
 
 
 def test_programs_in_cpp_drive_the_ego_and_an_e_agent(ros: Graph, tmp_path: Path, nodes: Path) -> None:

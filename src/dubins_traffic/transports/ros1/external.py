@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +10,8 @@ from threading import Lock
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
-from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.state import EGO, Contact, Pose, State
+from dubins_traffic.cars.touching import Touching
 from dubins_traffic.errors import ControllerError, InputError, TransportError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
@@ -35,9 +34,6 @@ CREEP = 0.05
 """Speed, m/s, above which a command counts as telling a car to drive."""
 LEAP, SHARE = 0.25, 1.5
 """A car jumps if it moves by more than its top speed allows times SHARE, and LEAP metres."""
-APART = 0.01
-"""Metres of gap after which two cars that touched may touch anew."""
-STANDING = 0.02
 
 
 @dataclass(slots=True)
@@ -50,7 +46,7 @@ class _Seen:
 
 
 class ExternalWorld:
-    """A `protocols.Simulator` that moves nothing itself: one trial at a time, in real time, round cars.
+    """A `protocols.Simulator` that moves nothing itself: one trial at a time, in real time.
 
     Parameters
     ----------
@@ -83,11 +79,8 @@ class ExternalWorld:
                 "a world outside has no batch", field="trials", value=len(instances), expected="1"
             )
         (self._instance,) = instances
-        body = self._instance.problem.car.body
-        if not isinstance(body, Disc):
-            raise InputError("round cars only", field="car.body", value=body, expected="a disc")
-        self._gap = 2.0 * body.radius
-        self._touching: set[tuple[int, int]] = set()
+        problem = self._instance.problem
+        self._touching = Touching(problem.car, problem.obstacles, problem.period)
         self._tick = 0
         self._listen()
         self._await()
@@ -114,7 +107,7 @@ class ExternalWorld:
                 self._send(name, float(speed[n]), float(yaw_rate[n]))
         self._tick += 1
         self._look(speed)
-        return [self._contacts()]
+        return [self._touching.update(self._tick, self._state)]
 
     def close(self) -> None:
         """Stop the cars that are driven here."""
@@ -201,37 +194,6 @@ class ExternalWorld:
             else:
                 self._began = now
             state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = x, y, c, s
-
-    def _contacts(self) -> tuple[Contact, ...]:
-        """Return the pairs that touch now and did not before, as the poses tell."""
-        state, found = self._state, list[Contact]()
-        x, y = state.x[0].tolist(), state.y[0].tolist()
-        for a, b in itertools.combinations(range(len(x)), 2):
-            dx, dy = x[b] - x[a], y[b] - y[a]
-            distance = math.hypot(dx, dy)
-            if distance > self._gap + APART:
-                self._touching.discard((a, b))
-            elif distance <= self._gap and (a, b) not in self._touching and distance > 0.0:
-                self._touching.add((a, b))
-                found.append(self._contact(a, b, dx / distance, dy / distance))
-        return tuple(found)
-
-    def _contact(self, a: int, b: int, nx: float, ny: float) -> Contact:
-        state, half = self._state, 0.5 * self._gap
-        speed = [float(state.speed[0, n]) for n in (a, b)]
-        along = [float(state.c[0, n]) * nx + float(state.s[0, n]) * ny for n in (a, b)]
-        return Contact(
-            tick=self._tick,
-            time=self._tick * self._instance.problem.period,
-            car=a,
-            other=b,
-            x=float(state.x[0, a]) + half * nx,
-            y=float(state.y[0, a]) + half * ny,
-            nx=nx,
-            ny=ny,
-            closing=(speed[0] * along[0], -speed[1] * along[1]),
-            moved=(abs(speed[0]) > STANDING, abs(speed[1]) > STANDING),
-        )
 
 
 def _lost(detail: str) -> ControllerError:
