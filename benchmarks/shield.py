@@ -3,8 +3,9 @@
     python -m benchmarks shield
     python -m benchmarks.shield [TRIALS] [JOBS] [FIRST]
 
-Each trial is 60 s on a random network of 6 to 40 intersections with 1 to 6 e-agents. Every fourth has obstacles in and
-beside the lanes, every eighth a car with another body or other bounds. The kinds of `benchmarks.shield_hostile` take
+Each trial is 60 s on a random network of 6 to 40 intersections with 1 to 6 e-agents. One in four has obstacles in and
+beside the lanes, in one in four the ego starts in any direction but backward, in one in eight cars have other bodies
+or bounds, one in sixteen has 8 to 12 e-agents on 6 to 8 intersections. The kinds of `benchmarks.shield_hostile` take
 turns. A tenth as many trials are driven by the controller `rules` itself: in how many does the shield step in?
 """
 
@@ -13,7 +14,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from benchmarks.table import Row, show
 from dubins_traffic.campaign.asked import grouped
 from dubins_traffic.campaign.group import Group
 from dubins_traffic.campaign.single import run_trial
-from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.controllers.shield import Shield
 from dubins_traffic.driving.law import decide
@@ -33,9 +34,11 @@ from dubins_traffic.driving.law_tables import desk
 from dubins_traffic.driving.shield import shield
 from dubins_traffic.driving.shield_tables import REASON, REASONS, egos, guards
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.table import pack_distinct
 from dubins_traffic.scoring.score import Score
+from dubins_traffic.spec.propositions import LEFT
 
 DURATION = 60.0
 SEED = 2016
@@ -54,7 +57,7 @@ BODIES: tuple[dict[str, Any], ...] = (
 @dataclass(frozen=True, slots=True)
 class Shielded:
     """One trial: who drove, what the ego and the others broke, collisions and those with the ego at fault, in how many
-    ticks the shield stepped in for each reason, and metres driven.
+    ticks the shield stepped in for each reason, how often the ego crossed the centre line, and metres driven.
     """
 
     number: int
@@ -65,26 +68,34 @@ class Shielded:
     collisions: int
     at_fault: int
     reasons: Mapping[str, int]
+    passed: int
     distance: float
 
 
 def instance(number: int, seconds: float = DURATION) -> Instance:
     """Return the random instance of a number."""
     draws = Draws(SEED, number, 907)
-    network = random_roads(draws, 40, 0.5)
-    agents = e_agents("lawful", draws.between(1, 6), draws)
-    more: dict[str, Any] = {"car": BODIES[number // 8 % len(BODIES)]} if number % 8 == 3 else {}
-    if number % 4 == 1:
+    crowded, blocked, turned, other = (draws.below(n) == 0 for n in (16, 4, 4, 8))
+    network = random_roads(draws, 8 if crowded else 40, 0.5)
+    agents = e_agents("lawful", draws.between(8, 12) if crowded else draws.between(1, 6), draws)
+    more: dict[str, Any] = {"car": BODIES[draws.below(len(BODIES))]} if other else {}
+    if blocked:
         bare = random_trial(network, agents, seconds, SEED, number, rules=True, **more)
         more["obstacles"] = _obstacles(bare, draws)
-    return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+    drawn = random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+    if turned and not other:
+        x, y, c, s = drawn.starts[EGO]
+        cosine, sine = sincos(draws.uniform(-1.5, 1.5))
+        start = Pose(x, y, c * cosine - s * sine, c * sine + s * cosine)
+        drawn = replace(drawn, starts=(start, *drawn.starts[1:]))
+    return drawn
 
 
 def _obstacles(bare: Instance, draws: Draws) -> list[dict[str, Any]]:
-    """Return one to three discs in and beside lanes."""
+    """Return discs in and beside lanes, at least two and one for every four lanes."""
     network = bare.problem.network
     found: list[dict[str, Any]] = []
-    for _ in range(draws.between(1, 3)):
+    for _ in range(max(2, network.lanes // 4)):
         (x0, y0), (x1, y1) = network.lane_line(draws.below(network.lanes), draws.uniform(-0.7, 0.1))
         share = draws.uniform(0.3, 0.7)
         x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
@@ -113,6 +124,7 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
     room = desk(places, int(np.diff(roads.seg_off).max()))
     hostile = Hostile(kinds, law.build, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
+    passed, aside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
     while len(active := group.active):
         tick = np.full(count, -1)
         tick[active] = group.ticks[active]
@@ -124,12 +136,14 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         )  # fmt: skip
         reasons[active, watch.mark[active, REASON]] += 1
         group.advance()
+        before, aside = aside, (group.labels.bits[:, EGO] & LEFT) != 0
+        passed += aside & ~before
     for b, one in enumerate(own):
         told = {REASONS[k]: int(n) for k, n in enumerate(reasons[b]) if k and n}
-        yield _shielded(one.trial, kinds[b], group.outcome(b, kinds[b]).score, told)
+        yield _shielded(one.trial, kinds[b], group.outcome(b, kinds[b]).score, told, int(passed[b]))
 
 
-def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int]) -> Shielded:
+def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0) -> Shielded:
     verdict = score.verdict
     assert verdict is not None
     return Shielded(
@@ -141,6 +155,7 @@ def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int]) 
         len(score.collisions),
         sum(one.at_fault for one in score.collisions),
         reasons,
+        passed,
         score.driven.distance_m,
     )
 

@@ -12,6 +12,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.driving.law_tables import FASTEST, MIDDLE, SLOWEST, YAW_MOST
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.propositions import LEFT
 
 LAG = 15
 """By how many ticks `lags` drives late."""
@@ -22,8 +23,8 @@ class Scene(NamedTuple):
 
     `law` (K, 2): what the law of the road says; `fast`, `slow`, `most` (K,): largest and smallest speed and largest
     yaw rate; `wild` (K, 2): a command at random, a third out of bounds; `dice` (K,) in [0, 1). `pose` (K, 4): x, y,
-    cos, sin. `lane` (K, 4): direction of the lane, lateral offset in it, half its width. `other` (K, 2): toward the
-    nearest other car, metres. `memory` (K, 3): their own.
+    cos, sin. `lane` (K, 4): direction of the lane, lateral offset in it, half its width. `left` (K,): 1 across the
+    centre line. `other` (K, 2): toward the nearest other car. `memory` (K, 3): their own.
     """
 
     tick: int
@@ -35,6 +36,7 @@ class Scene(NamedTuple):
     dice: Floats
     pose: Floats
     lane: Floats
+    left: Floats
     other: Floats
     memory: Floats
 
@@ -145,9 +147,23 @@ def halts(scene: Scene) -> Floats:
     return hold(scene, np.where(stop[:, None], 0.0, scene.law), np.where(stop, 12000.0 * scene.dice, 1.0))
 
 
+def quits(scene: Scene) -> Floats:
+    """As the law says until the centre line is crossed; then at random for up to two seconds each, until it is not."""
+    across = scene.left > 0.0
+    return hold(
+        scene, np.where(across[:, None], scene.wild, scene.law), np.where(across, 60.0 * scene.dice, 1.0)
+    )
+
+
+def lingers(scene: Scene) -> Floats:
+    """As the law says, but half pulled out it stands for up to eight seconds now and then."""
+    stop = (scene.lane[:, 2] > -0.9 * scene.lane[:, 3]) & (scene.dice < 0.03)
+    return hold(scene, np.where(stop[:, None], 0.0, scene.law), np.where(stop, 8000.0 * scene.dice, 1.0))
+
+
 DRIVERS: tuple[Callable[[Scene], Floats], ...] = (
     jitter, held, rams, left, straddles, runs, reverses, broken, teases, circles, dithers, wrong, blind,
-    dawdles, halts,
+    dawdles, halts, quits, lingers,
 )  # fmt: skip
 KINDS = (*(driver.__name__ for driver in DRIVERS), "lags")
 """`lags` does what the law said half a second ago."""
@@ -186,7 +202,8 @@ class Hostile:
         pose = np.stack([array[:, EGO] for array in state[:4]], axis=1)
         scene = Scene(
             tick, law, build[:, FASTEST], build[:, SLOWEST], build[:, YAW_MOST], wild, dice, pose,
-            self._lane(pose, labels), _toward(state), self._memory,
+            self._lane(pose, labels), np.where(labels.bits[:, EGO] & LEFT, 1.0, 0.0), _toward(state),
+            self._memory,
         )  # fmt: skip
         asked = law.copy()
         for driver in DRIVERS:

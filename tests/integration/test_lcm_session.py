@@ -93,6 +93,22 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
     assert len(made[0]) == 2
 
 
+def test_an_ego_elsewhere_drives_under_the_shield(tmp_path: Path) -> None:
+    with running(*PYTHON) as peer:
+        time.sleep(0.3)
+        options = ("--lockstep", "--trials", "1", "--records", str(tmp_path), "--shield", "--json")
+        with running(*lcm_run(*options)) as session:
+            status, out, _ = ended(session)
+        peer.send_signal(signal.SIGINT)
+        ended(peer)
+    (score,) = json.loads(out)["trials"]
+    assert (status, score["end"], score["controller"]) == (0, "duration", "lcm+shield")
+    assert score["interventions"] > 0
+    assert score["off_road_s"] == 0.0
+    record = dt.load_record(tmp_path / "trial-0000.mcap")
+    assert sum(event.kind == "shield" for event in record.frames.events) == score["interventions"]
+
+
 @pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_controller_killed_or_stopped_ends_its_trial_only(fault: signal.Signals) -> None:
     with (

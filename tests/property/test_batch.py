@@ -57,7 +57,7 @@ def plain(found: Score) -> Mapping[str, Any]:
     }
 
 
-@pytest.mark.parametrize("controller", ["rules", "simple", "lanes"])
+@pytest.mark.parametrize("controller", ["rules", "simple", "lanes", "lanes+shield"])
 @pytest.mark.parametrize(
     "more",
     [

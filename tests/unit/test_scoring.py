@@ -225,6 +225,7 @@ def test_the_score_as_json() -> None:
         "time_to_begin_s": 0.5,
         "verdict": None,
         "formulas": [],
+        "interventions": 0,
     }
     assert document == expected
     assert list(document) == list(expected)

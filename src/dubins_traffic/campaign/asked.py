@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,8 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.protocols import Controller, End
+from dubins_traffic.protocols import Controller, End, Reports
+from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import checked_command
 from dubins_traffic.trial.run import close
@@ -79,6 +81,8 @@ class _Seats:
         self._answer: object = None
         self._begin: list[float | None] = [None] * len(instances)
         self._told = np.zeros(len(instances), dtype=bool)
+        self._reports: list[Callable[[], Sequence[tuple[str, str]]] | None] = []
+        self._interventions = [0] * len(instances)
         self._trials = np.array([instance.trial for instance in instances])
         if shared is not None:
             shared.start_batch(self._trials.tolist(), [instance.problem for instance in instances])
@@ -86,6 +90,7 @@ class _Seats:
         for b, instance in enumerate(instances):
             driver = make()
             self._drivers.append(driver)
+            self._reports.append(driver.report if isinstance(driver, Reports) else None)
             started = perf_counter()
             if self._try(b, lambda driver=driver, problem=instance.problem: driver.start(problem)):
                 self._begin[b] = perf_counter() - started
@@ -98,12 +103,25 @@ class _Seats:
             tick = int(group.ticks[b])
             seen = self._senses[b].observe(tick, *self._views[b])
             driver = self._drivers[b]
-            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)):
+            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)) or not self._listen(b):
                 continue
             if self._answer is None:
                 group.end(b, End.GAVE_UP, f"the controller gave up at tick {tick}")
                 continue
             self.take(b, tick, self._answer)
+
+    def _listen(self, b: int) -> bool:
+        """Count how often a shield has stepped in; tell whether the trial goes on."""
+        report = self._reports[b]
+        if report is None:
+            return True
+        answer = self._answer
+        heard = self._try(b, report)
+        if heard:
+            told = cast("Sequence[tuple[str, str]]", self._answer)
+            self._interventions[b] += sum(kind == SHIELD for kind, _ in told)
+        self._answer = answer
+        return heard
 
     def take(self, b: int, tick: int, command: object) -> None:
         """Let a command take effect, or end the trial if it is none."""
@@ -148,7 +166,9 @@ class _Seats:
             ending = self.group.endings[b]
             if self._drivers and ending is not None:
                 self.group.endings[b] = close(self._drivers[b], ending)
-            yield self.group.outcome(b, controller, self._begin[b])
+            outcome = self.group.outcome(b, controller, self._begin[b])
+            score = replace(outcome.score, interventions=self._interventions[b])
+            yield replace(outcome, score=score)
 
     def _of_trial(self, b: int) -> tuple[State, Labels]:
         """Return the state and labels of trial b alone; they follow those of the group."""

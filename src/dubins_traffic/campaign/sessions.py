@@ -74,7 +74,8 @@ class Pace:
 class Programme:
     """What a session runs: where its instances come from, how many trials, and where things are written.
 
-    `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere.
+    `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
+    the ego drives under the shield.
     """
 
     supply: Callable[[int], Instance]
@@ -84,6 +85,7 @@ class Programme:
     remote: tuple[str, ...]
     records: Path | None
     data: Path | None
+    shield: bool = False
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def run(
@@ -104,7 +106,7 @@ class Programme:
                 self.supply,
                 self.trials,
                 maestro,
-                self.controller or "",
+                self.controller or (controllers.SHIELDED if self.shield else ""),
                 self.remote,
                 self.records,
                 None if world is None else world(),
@@ -134,6 +136,7 @@ def programme(
     overwrite_data: bool = False,
     records: str | os.PathLike[str] | None = None,
     simulator: str | None = None,
+    shield: bool = False,
 ) -> Programme:
     """Return what a session shall run, checked as far as can be before anything is opened.
 
@@ -159,6 +162,8 @@ def programme(
         Folder for the records, made if missing.
     simulator : str, optional
         What moves the cars, whatever the source says.
+    shield : bool
+        Whether the ego, wherever it is driven, drives under the shield (`controllers.shield`).
 
     Raises
     ------
@@ -170,6 +175,7 @@ def programme(
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
     if controller is not None:
+        controller = controllers.shielded(controller) if shield else controller
         controllers.load(controller)
     if trials is not None and (trials < 1 or endless):
         raise InputError(
@@ -194,6 +200,7 @@ def programme(
         tuple(remote),
         None if records is None else check_folder(Path(records)),
         None if data is None else check_data_file(Path(data), overwrite_data),
+        shield,
     )
 
 

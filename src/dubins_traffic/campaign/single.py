@@ -126,7 +126,8 @@ def run_trial(
     sinks : sequence of Sink
         Further sinks.
     link : Link, optional
-        To the drivers of remote cars. If the ego is one, `controller` is not looked at.
+        To the drivers of remote cars. If the ego is one, `controller` matters only if it is a name that ends in
+        ``+shield``: then that ego drives under the shield.
     simulator : Simulator, optional
         Instead of the one that the instance names; closed when the trial is over.
 
@@ -137,6 +138,8 @@ def run_trial(
     """
     if link is not None and link.ego:
         name, driver = link.transport.name, RemoteController(link)
+        if isinstance(controller, str) and controller.endswith(controllers.SHIELDED):
+            name, driver = controllers.shielded(name), controllers.under_shield(driver)
     else:
         name = controller if isinstance(controller, str) else type(controller).__name__
         driver = controllers.load(controller) if isinstance(controller, str) else controller

@@ -60,6 +60,7 @@ def run(
     data: options.Data = None,
     data_over: options.DataOver = None,
     records: options.Records = None,
+    shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
@@ -69,7 +70,7 @@ def run(
     world = _is_world(simulator, poses)
     todo = session.programme(
         source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
-        records=records,
+        records=records, shield=shield,
         simulator=None if world else simulator,
     )  # fmt: skip
     pace = session.pace(lockstep, factor, deadline, begin, silence)

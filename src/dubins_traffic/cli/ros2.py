@@ -45,6 +45,7 @@ def run(
     data: options.Data = None,
     data_over: options.DataOver = None,
     records: options.Records = None,
+    shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials."""
@@ -52,7 +53,7 @@ def run(
 
     todo = session.programme(
         source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
-        records=records,
+        records=records, shield=shield,
     )  # fmt: skip
     pace = session.pace(lockstep, factor, deadline, begin, silence)
     session.conduct(todo, run_over_ros2(todo, pace, domain=domain, here=not wide), json=json)

@@ -32,6 +32,12 @@ JUDGED: dict[str, Callable[[Score], str]] = {
 """What is shown where a score has a verdict, in place of the time off the road, which is one of the rules."""
 
 
+SHIELDED: dict[str, Callable[[Score], str]] = {
+    "stepped in": lambda score: str(score.interventions),
+}
+"""What is shown where a shield has stepped in: in how many ticks."""
+
+
 def show(sheet: ScoreSheet, *, json: bool) -> None:
     """Print scores on standard output: JSON for machines, else a table."""
     if json:
@@ -100,8 +106,10 @@ def formula_table(sheet: ScoreSheet) -> Table:
 
 def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
     judged = any(score.verdict is not None for score in scores)
+    shielded = any(score.interventions for score in scores)
     rest = {heading: cell for heading, cell in CELLS.items() if heading != "off road"}
-    return {**JUDGED, **rest} if judged else CELLS
+    shown = {**JUDGED, **rest} if judged else CELLS
+    return {**shown, **SHIELDED} if shielded else shown
 
 
 def _narrow(text: str, width: int = 0) -> str:

@@ -54,8 +54,7 @@ def load(spec: str) -> Controller:
         if the object lacks a method of `dubins_traffic.protocols.Controller`.
     """
     if spec.endswith(SHIELDED):
-        inner = load(spec.removesuffix(SHIELDED))
-        return cast(Controller, importlib.import_module("dubins_traffic.controllers.shield").Shield(inner))
+        return under_shield(load(spec.removesuffix(SHIELDED)))
     if spec in _BUILT_IN:
         module, name = _BUILT_IN[spec]
         return cast(Controller, getattr(importlib.import_module(module), name)())
@@ -89,6 +88,11 @@ def load(spec: str) -> Controller:
 def shielded(spec: str) -> str:
     """Return the name of a controller under the shield."""
     return spec if spec.endswith(SHIELDED) else spec + SHIELDED
+
+
+def under_shield(controller: Controller) -> Controller:
+    """Return a controller that drives as `controller` does under the shield (`controllers.shield`)."""
+    return cast(Controller, importlib.import_module("dubins_traffic.controllers.shield").Shield(controller))
 
 
 def _load_file(place: str, spec: str) -> ModuleType:

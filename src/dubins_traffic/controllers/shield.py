@@ -9,12 +9,10 @@ from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
 from dubins_traffic.driving.guard import Guard
 from dubins_traffic.protocols import Closes, Controller, Reports
+from dubins_traffic.record.sink import SHIELD
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
-
-EVENT = "shield"
-"""Kind of the events that say when the shield stepped in."""
 
 
 class Shield:
@@ -24,6 +22,13 @@ class Shield:
     ----------
     controller : Controller or str
         Whatever drives; by name as `controllers.registry.load` takes it.
+    overtakes : bool
+        Whether the ego may cross the centre line to pass what stands.
+
+    Attributes
+    ----------
+    guard : Guard
+        What keeps the ego within the rules, and counts how often it had to.
 
     Notes
     -----
@@ -38,9 +43,9 @@ class Shield:
     True
     """
 
-    def __init__(self, controller: Controller | str) -> None:
+    def __init__(self, controller: Controller | str, *, overtakes: bool = True) -> None:
         self._controller = registry.load(controller) if isinstance(controller, str) else controller
-        self.guard = Guard()
+        self.guard = Guard(overtakes=overtakes)
         self._events: list[tuple[str, str]] = []
 
     def start(self, problem: Problem) -> None:
@@ -57,7 +62,7 @@ class Shield:
         given = self.guard.filter(observation, asked)
         found = self.guard.intervention
         if found is not None:
-            self._events.append((EVENT, told(found.asked, found.given, found.reason)))
+            self._events.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given
 
     def report(self) -> Sequence[tuple[str, str]]:

@@ -30,6 +30,11 @@ class Intervention(NamedTuple):
 class Guard:
     """Keeps an ego within rules 1 to 3, whatever it is asked to do (`driving.shield`, docs/shield.md).
 
+    Parameters
+    ----------
+    overtakes : bool
+        Whether the ego may cross the centre line at all.
+
     Examples
     --------
     >>> guard = Guard()                                              # doctest: +SKIP
@@ -44,7 +49,8 @@ class Guard:
         How many ticks the shield has stepped in.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, overtakes: bool = True) -> None:
+        self._overtakes = overtakes
         self.intervention: Intervention | None = None
         self.count = 0
 
@@ -61,8 +67,9 @@ class Guard:
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
         self._desk: Desk = desk(cars, len(problem.network.segments))
         self._drivers: Drivers = egos([problem], cars, np.zeros(1, dtype=np.int64))
-        self._guards: Guards = guards([problem])
-        self._tick = np.zeros(1, dtype=np.int64)
+        self._guards: Guards = guards([problem], overtakes=self._overtakes)
+        self._tick = np.full(1, -1)
+        self._shield()  # compiles, so that nobody waits for that in the first tick
 
     def filter(self, observation: Observation, command: tuple[float, float]) -> Command:
         """Return `command`, or the nearest one found with which the ego breaks nothing.
@@ -87,10 +94,7 @@ class Guard:
         self._tick[0] = observation.tick
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
-        shield(
-            self._tick, True, state, labels, self._roads, self._obstacles, self._drivers, self._guards,
-            self._desk, self._command,
-        )  # fmt: skip
+        self._shield()
         reason = int(self._guards.mark[0, REASON])
         given = Command(*self._command[0, EGO].tolist())
         self.intervention = None
@@ -98,3 +102,9 @@ class Guard:
             self.count += 1
             self.intervention = Intervention(observation.tick, asked, given, REASONS[reason])
         return given
+
+    def _shield(self) -> None:
+        shield(
+            self._tick, True, self._state, self._labels, self._roads, self._obstacles, self._drivers,
+            self._guards, self._desk, self._command,
+        )  # fmt: skip

@@ -48,6 +48,8 @@ BACK = 0.4
 """So far after that its body is back in the right lane, metres."""
 TURNING = 1.2
 """Seconds that passing takes beyond what the distance asks for."""
+COMES = 0.7
+"""Cars that come are taken to drive as fast as the car can, at least at this speed, m/s."""
 SPARE = 0.6
 """Metres to spare before a car that comes."""
 SLOW = 0.05
@@ -118,7 +120,7 @@ def find_way_past(
     if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, build):
         return
     time = (back - own) / (0.8 * build[FASTEST]) + TURNING
-    comes = 0.7 * time + SPARE
+    comes = max(COMES, build[FASTEST]) * time + SPARE
     room = line - back
     j = desk.head[drivers.ints[b, n, LANE] >> 1]
     while j >= 0:

@@ -57,7 +57,8 @@ not."""
 LEFT_RELEASE, TURN_BACK, LEFT_TIME, SIGHT2 = range(4)
 LIMITS: Final = 4
 """Columns of `Guards.limit`: a car that is left is so until its body is below this, metres; progress lost that makes a
-turn, metres; for how long a car may be left, s; square of the sensing radius, metres squared."""
+turn, metres; for how long an ego may be left, s, 0 if it shall not overtake; square of the sensing radius, metres
+squared."""
 
 
 class Guards(NamedTuple):
@@ -68,11 +69,11 @@ class Guards(NamedTuple):
     mark: Ints
 
 
-def guards(problems: Sequence[Problem]) -> Guards:
-    """Return what the shield knows of trials that have not begun."""
+def guards(problems: Sequence[Problem], *, overtakes: bool = True) -> Guards:
+    """Return what the shield knows of trials that have not begun; whether their egos may overtake."""
     rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
     limit = [
-        (own.left_release, own.turn_back, own.left_time, problem.sensing_radius**2)
+        (own.left_release, own.turn_back, own.left_time if overtakes else 0.0, problem.sensing_radius**2)
         for own, problem in zip(rules, problems, strict=True)
     ]
     mark = np.zeros((len(problems), MARKS), dtype=np.int64)

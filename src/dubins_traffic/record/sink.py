@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Final, Protocol
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
@@ -51,6 +51,10 @@ FAULTS = frozenset(
     }
 )
 """Ends that are somebody's fault and not a trial's own."""
+
+
+SHIELD: Final = "shield"
+"""Kind of the events that say when a shield has stepped in."""
 
 
 @dataclass(frozen=True, slots=True)

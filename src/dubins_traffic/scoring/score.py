@@ -11,7 +11,7 @@ from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.reader import Record
-from dubins_traffic.record.sink import Ending
+from dubins_traffic.record.sink import SHIELD, Ending
 from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
@@ -56,6 +56,8 @@ class Score:
         The verdict by the rules of the road; None if the problem does not ask for them.
     formulas : tuple of FormulaVerdict
         The verdicts on the formulas that the problem carries beside its task.
+    interventions : int
+        In how many ticks a shield has stepped in (docs/shield.md).
     """
 
     trial: int
@@ -75,6 +77,7 @@ class Score:
     time_to_begin_s: float | None
     verdict: Verdict | None
     formulas: tuple[FormulaVerdict, ...]
+    interventions: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as a JSON object; the fields of `driven` stand beside the others."""
@@ -126,6 +129,7 @@ class Scorer:
         self._ending: Ending | None = None
         self._count = 0
         self._shown = 0
+        self._interventions = 0
         self._waiting: list[Frames] = []
         for metric in self._metrics:
             metric.begin(instance)
@@ -133,6 +137,7 @@ class Scorer:
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
         self._count += len(frames)
+        self._interventions += sum(event.kind == SHIELD for event in frames.events)
         self._waiting.append(frames)
         if self._count - self._shown >= _BLOCK:
             self._show()
@@ -178,6 +183,7 @@ class Scorer:
             time_to_begin_s=None if wall is None else wall.time_to_begin_s,
             verdict=self._judging.result(),
             formulas=self._formulas.result(),
+            interventions=self._interventions,
         )
 
     def _show(self) -> None:

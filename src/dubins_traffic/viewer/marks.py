@@ -52,6 +52,18 @@ def event_mark(instance: Instance, rate: float, event: Event) -> Mark:
     return Mark(event.tick / rate, "event", f"{text} ({event.detail})" if event.detail else text, event.car)
 
 
+def event_marks(instance: Instance, frames: Frames) -> list[Mark]:
+    """Return the marks of events; a run of one kind, of one car, tick by tick, is marked where it begins."""
+    marks: list[Mark] = []
+    latest: dict[tuple[str, int], int] = {}
+    for event in frames.events:
+        key = (event.kind, event.car)
+        if latest.get(key) != event.tick - 1:
+            marks.append(event_mark(instance, frames.rate, event))
+        latest[key] = event.tick
+    return marks
+
+
 def breach_marks(instance: Instance, violations: Sequence[Violation]) -> list[Mark]:
     """Return the marks of breaches of the rules, which name who broke which, where, and since when it came."""
     return [
@@ -91,7 +103,7 @@ def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:
 def marks_of(instance: Instance, frames: Frames, more: Sequence[Mark] = ()) -> list[Mark]:
     """Return all marks of a trial in order of time: contacts, events, visits of goals and `more`."""
     marks = [contact_mark(instance, contact) for contact in frames.contacts]
-    marks += [event_mark(instance, frames.rate, event) for event in frames.events]
+    marks += event_marks(instance, frames)
     points, lattice = instance.problem.network.points, instance.problem.network.intersections
     for frame, vertex in goal_visits(instance, frames):
         x, y = lattice[vertex]
