@@ -331,7 +331,7 @@ def test_completion_offers_commands_configurations_and_controllers():
     assert complete("dubins-traffic run mc") == [CONFIG]
     assert complete("dubins-traffic run demo --controller l") == ["lanes"]
     assert options.shipped("de") == ["demo"]
-    assert options.controllers("s") == ["simple"]
+    assert options.controllers("s") == ["simple", "synthesized"]
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])

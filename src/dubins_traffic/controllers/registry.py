@@ -19,12 +19,14 @@ _BUILT_IN = {
     "lanes": ("dubins_traffic.controllers.lanes", "Lanes"),
     "rules": ("dubins_traffic.controllers.rules", "Rules"),
     "simple": ("dubins_traffic.controllers.simple", "Simple"),
+    "synthesized": ("dubins_traffic.controllers.synthesized", "Synthesized"),
 }
 _DESCRIPTIONS = {
     "keyboard": "you, with the arrow keys, in real time; the map is drawn in the terminal",
     "lanes": "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
     "rules": "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
     "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
+    "synthesized": "plays a winning strategy of the game of cells, found at the start; drives as rules does",
 }
 SHIELDED = "+shield"
 """What ends the name of a controller that drives under the shield (`controllers.shield`)."""
@@ -44,8 +46,9 @@ def load(spec: str) -> Controller:
     ----------
     spec : str
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
-        directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again.
-        Followed by ``+shield``: the same under the shield.
+        directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
+        strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`. Followed by
+        ``+shield``: the same under the shield.
 
     Raises
     ------
@@ -60,6 +63,10 @@ def load(spec: str) -> Controller:
         return cast(Controller, getattr(importlib.import_module(module), name)())
     if spec.endswith(".mcap"):
         return cast(Controller, importlib.import_module("dubins_traffic.controllers.scripted").replay(spec))
+    if spec.endswith(".npz"):
+        return cast(
+            Controller, importlib.import_module("dubins_traffic.controllers.synthesized").player(spec)
+        )
     place, colon, name = spec.rpartition(":")
     if not (colon and place and name.isidentifier()):
         raise _refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))

@@ -1,0 +1,238 @@
+"""The controller `synthesized`: plays a winning strategy of the game of cells on the road."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Command, Observation
+from dubins_traffic.controllers.rules import Rules
+from dubins_traffic.driving.exits import BACK
+from dubins_traffic.driving.gates import MARGIN
+from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
+from dubins_traffic.driving.rounds import nearest_stage
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.synthesis.advice import Advice, advise
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.road_play import RoadPlay, Terms
+from dubins_traffic.synthesis.sightings import Sighting
+from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.strategy import Strategy
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+NO_GOAL: Final = -2
+"""The vertex of the only stage that the law is given: it is at no intersection, since the strategy seeks the goals."""
+NO_STAGE: Final = -1
+SECOND_BEST: Final = 2.5
+"""What an exit counts for each that the strategy likes better, metres: it is taken for want of room, in time."""
+HURRY: Final = 0.6
+"""So long before it would lose its place in the order an ego that the strategy lets wait enters, seconds."""
+LOOK: Final = 1.0
+"""Seconds after which it is asked again where unseen cars may be."""
+STRATEGY_LEFT: Final = "strategy_left"
+STRATEGY_RESUMED: Final = "strategy_resumed"
+"""Kinds of events: the position is one from which the strategy does not win, or is no longer."""
+
+
+@dataclass
+class _Course:
+    """What the ego seeks, and what it is told.
+
+    `ways` (M, L) are the metres from each lane to the goal of each stage, at that goal already to the next; `goals` are
+    the goals of the stages, by their places in the arena, and `vertices` their intersections.
+    """
+
+    strategy: Strategy
+    play: RoadPlay
+    ways: Floats
+    goals: list[int]
+    vertices: list[int]
+    stage: int = NO_STAGE
+    advice: Advice | None = None
+    wins: bool = True
+    reports: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+
+
+class Synthesized(Rules):
+    """Chooses exits, and when to wait, by a winning strategy, and drives as `rules` does.
+
+    Parameters
+    ----------
+    strategy : Strategy, optional
+        What to play; found when the trial starts, if not given.
+
+    Notes
+    -----
+    The strategy is asked whenever something has changed in the game while the ego is in a lane. Where it has nothing to
+    say (the ego is behind another car, or the others have broken their assumption so that it would not win) the ego
+    goes on as `rules` does, until it can be asked again.
+    """
+
+    def __init__(self, strategy: Strategy | None = None) -> None:
+        super().__init__()
+        self._strategy = strategy
+        self._course: _Course | None = None
+
+    def start(self, problem: Problem) -> None:
+        """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
+        super().start(problem)
+        drivers = self._drivers
+        if drivers is None or not problem.e_agents:
+            return
+        strategy = _solved(problem) if self._strategy is None else _fitting(self._strategy, problem)
+        rules = RuleParameters.from_mapping(problem.rules)
+        self._period = problem.period
+        self._edge = problem.intersection_radius + problem.car.body.reach + MARGIN
+        self._patience = (rules.forfeit_time - HURRY) * problem.rate
+        arena = strategy.board.arena
+        vertices: list[int] = drivers.stage.tolist()
+        self._course = _Course(
+            strategy,
+            RoadPlay(strategy.board, _terms(problem), ("ego", *problem.e_agents)),
+            _ways(drivers, [arena.network.arms(v) for v in vertices]),
+            [arena.goals.index(v) for v in vertices],
+            vertices,
+        )
+        drivers.ints[0, EGO, [FIRST, LAST, PLACE]] = 0, 1, 0
+        self._drivers = drivers._replace(
+            stage=np.array([NO_GOAL]), distance=np.zeros((1, arena.network.lanes))
+        )
+        self._points: list[list[float]] = problem.network.points.tolist()
+
+    def act(self, observation: Observation) -> Command:
+        """Drive on."""
+        course = self._course
+        if course is None:
+            return super().act(observation)
+        self._follow(course, observation)
+        command = super().act(observation)
+        return self._waiting(course.advice, observation, command)
+
+    @property
+    def play(self) -> RoadPlay | None:
+        """The play that is followed; None where there is no game, without goals or other cars."""
+        return None if self._course is None else self._course.play
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what the play has come upon since the last call."""
+        if self._course is None or not self._course.reports:
+            return ()
+        found, self._course.reports = self._course.reports, []
+        return found
+
+    def _follow(self, course: _Course, seen: Observation) -> None:
+        """Bring the play up to date, and ask the strategy if anything has changed."""
+        cars = [Sighting(EGO, seen.pose, seen.propositions)]
+        cars += [Sighting(car.index, car.pose, car.propositions) for car in seen.others]
+        changed = course.play.follow(seen.tick, cars)
+        if course.stage == NO_STAGE:
+            course.stage = nearest_stage(course.ways, seen.propositions.lane, seen.propositions.segment)
+        elif seen.propositions.at == course.vertices[course.stage]:
+            course.stage = (course.stage + 1) % len(course.goals)
+        elif not changed:
+            return
+        course.reports += course.play.noted
+        course.play.noted.clear()
+        self._ask(course, seen)
+
+    def _ask(self, course: _Course, seen: Observation) -> None:
+        """Ask the strategy, and let the law take the way that it likes best."""
+        drivers = self._drivers
+        assert drivers is not None
+        stages = len(course.goals)
+        goal, following = course.goals[course.stage], course.goals[(course.stage + 1) % stages]
+        position = course.play.position
+        if position is not None:
+            self._note_wins(course, course.strategy.wins(position))
+        drivers.distance[0] = course.ways[course.stage]
+        course.advice = None
+        if seen.propositions.crosses >= 0:
+            return
+        course.advice = advise(course.strategy, course.play, goal, following)
+        if course.advice is None or not course.advice.exits:
+            return
+        lane = seen.propositions.lane
+        node = course.strategy.board.arena.nodes[course.advice.node]
+        for place, out in enumerate(_liked(course.advice.exits, node.exits, drivers.distance[0])):
+            back = BACK if out == lane ^ 1 and len(node.exits) > 1 else 0.0
+            drivers.distance[0, out] = SECOND_BEST * place - back
+            if place == 0 and drivers.ints[0, EGO, LANE] == lane:
+                drivers.ints[0, EGO, NEXT] = out
+
+    @staticmethod
+    def _note_wins(course: _Course, wins: bool) -> None:
+        if wins != course.wins:
+            course.wins = wins
+            course.reports.append((STRATEGY_RESUMED if wins else STRATEGY_LEFT, ""))
+
+    def _waiting(self, advice: Advice | None, seen: Observation, command: Command) -> Command:
+        """Return the command of an ego that waits before the disc ahead, if it is told to and keeps its place."""
+        drivers = self._drivers
+        if advice is None or advice.enter or seen.propositions.crosses >= 0 or drivers is None:
+            return command
+        if drivers.ints[0, EGO, TURN] > self._patience:
+            return command
+        arena = self._course.strategy.board.arena if self._course else None
+        assert arena is not None
+        x, y = self._points[arena.nodes[advice.node].vertex]
+        room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)
+        if command.speed * self._period <= room:
+            return command
+        return Command(room / self._period, 0.0)
+
+
+def player(file: str) -> Synthesized:
+    """Return the controller that plays the strategy in a file; InputError if it can't be read."""
+    return Synthesized(Strategy.load(file))
+
+
+def _liked(free: Sequence[int], exits: Sequence[int], distance: Floats) -> list[int]:
+    """Return exits, the best first: those that are free in the game, then the others by distance."""
+    return [*free, *sorted(set(exits) - set(free), key=lambda lane: (distance[lane], lane))]
+
+
+def _terms(problem: Problem) -> Terms:
+    return Terms(
+        sight=problem.sensing_radius,
+        margin=problem.intersection_radius + problem.car.body.reach,
+        look=max(1, round(LOOK * problem.rate)),
+    )
+
+
+def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
+    """Return `_Course.ways`."""
+    found = drivers.distance.copy()
+    for stage, lanes in enumerate(arms):
+        found[stage, list(lanes)] = drivers.distance[(stage + 1) % len(arms), list(lanes)]
+    return found
+
+
+def _solved(problem: Problem) -> Strategy:
+    """Return the strategy for a problem, which wins from nowhere if the game is lost; InputError if it is too large."""
+    board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
+    return Strategy.of(solve(build(board)))
+
+
+def _fitting(strategy: Strategy, problem: Problem) -> Strategy:
+    """Return a strategy; InputError if it is one of another problem."""
+    own, wanted = strategy.board.arena, arena_of(problem)
+    differences = {
+        "network": own.network.to_document() != wanted.network.to_document(),
+        "goals": set(own.goals) != set(wanted.goals),
+        "order_degree": own.order_degree != wanted.order_degree,
+        "cars": strategy.board.others != len(problem.e_agents),
+    }
+    for name, differ in differences.items():
+        if differ:
+            raise InputError("a strategy for another problem", field=name, expected="that of this problem")
+    return strategy

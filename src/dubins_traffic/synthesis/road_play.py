@@ -1,0 +1,319 @@
+"""The play of the game that a trial on the road amounts to, checked move by move.
+
+A frame shows some cars. Who is farthest on in a cell holds it in the game; a car behind another one in the same cell,
+or out of sight, has no place that the game could know, so one is assumed for it, out of the way, and revised as soon as
+the road shows otherwise. The order of those who have not stopped yet at a crossing is assumed in the same way. What is
+shown is never assumed: a car that is shown moves by moves of the game, or its move is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dubins_traffic.spec.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.synthesis.assumption import Forfeits
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
+from dubins_traffic.synthesis.moves import Work, list_moves
+from dubins_traffic.synthesis.queues import EGO, OTHER, RENEWED, Scene
+from dubins_traffic.synthesis.sightings import NOWHERE, WAITS, Ground, Sighting
+
+EGO_CAR: Final = 0
+NO_TICKET: Final = -1
+UNKNOWN_MOVE: Final = "unknown_move"
+NEW_TICKET: Final = "new_ticket"
+"""Kinds of what is noted: a move that the game does not know; a place in the order given up, which the rules allow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """How the road is seen.
+
+    Attributes
+    ----------
+    sight : float
+        The ego sees the cars within this distance, metres.
+    margin : float
+        How far from an intersection a car in its disc may be, metres.
+    look : int
+        Ticks after which it is asked again where unseen cars may be.
+    """
+
+    sight: float
+    margin: float
+    look: int
+
+
+class MoveList:
+    """The moves of a board, listed on demand."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self._work = Work.of(board.tables)
+        self._out = room(1, LARGEST_CHOICE)
+
+    def of_others(self, position: int) -> set[int]:
+        """Return the positions that the environment may make of a position."""
+        self._list(position)
+        return set(self._out.to[: self._out.used[0]].tolist())
+
+    def of_ego(self, position: int) -> list[int]:
+        """Return the positions that the ego may make of a position, that one first."""
+        self._list(position)
+        return self._out.ego_to[: self._out.used[1]].tolist()
+
+    def _list(self, position: int) -> None:
+        board = self._board
+        list_moves(board.tables, board.others, board.positions, position, self._work, self._out)
+
+
+class RoadPlay:
+    """Follows a trial as a play of the game.
+
+    Parameters
+    ----------
+    board : Board
+        The game.
+    terms : Terms
+        How the road is seen.
+    names : sequence of str
+        Of the cars, the ego first.
+
+    Attributes
+    ----------
+    position : int or None
+        Where the play is; None while the ego is behind another car in its cell.
+    cells : list of int
+        Of all cars, the ego's first, shown or assumed.
+    moves : MoveList
+        What the game allows.
+    noted : list of (str, str)
+        Kind and detail of what the game does not know. The caller takes what is there.
+    checked, revised : int
+        How many moves have been looked up in the game, and how often an assumed place has been changed.
+    """
+
+    def __init__(self, board: Board, terms: Terms, names: Sequence[str]) -> None:
+        self.ground = Ground(board.arena)
+        self.moves = MoveList(board)
+        self.position: int | None = None
+        self.cells = [NOWHERE] * (board.others + 1)
+        self.noted: list[tuple[str, str]] = []
+        self.checked = 0
+        self.revised = 0
+        self._board = board
+        self._terms = terms
+        self._names = names
+        self._signature: object = None
+        self._again = 0
+        self._shown: dict[int, int] = {}
+        self._seen: dict[int, Sighting] = {}
+        self._queues: list[list[int]] = [[] for _ in board.arena.nodes]
+        self._ticket = [NO_TICKET] * (board.others + 1)
+        self._bits = [0] * (board.others + 1)
+
+    def follow(self, tick: int, cars: Sequence[Sighting]) -> bool:
+        """Take in a frame, the ego first in `cars`; return whether anything has changed."""
+        signature = [(car.car, *car.propositions[2:4], car.propositions.bits & WAITS) for car in cars]
+        if signature == self._signature and tick < self._again:
+            return False
+        self._signature = signature
+        self._seen = {car.car: car for car in cars}
+        self._again = tick + self._terms.look
+        cells = {car.car: self._cell(car) for car in cars}
+        shown = self._holders(cells)
+        self._assume(shown)
+        self._note_crowds(shown, cells)
+        self._play(shown)
+        self._show(shown, cells)
+        self._assume(shown)
+        self._settle(tick)
+        self.position = self._number()
+        return True
+
+    def _cell(self, car: Sighting) -> int:
+        before = self.cells[car.car] if car.car in self._shown or car.car == EGO_CAR else NOWHERE
+        return self.ground.cell(before, car.pose, car.propositions)
+
+    def _holders(self, cells: dict[int, int]) -> dict[int, int]:
+        """Return the cells of the cars that hold them: in each, who holds it already or is farthest on."""
+        shown: dict[int, int] = {}
+        holder: dict[int, int] = {}
+        for car, cell in cells.items():
+            if cell == NOWHERE:
+                continue
+            other = holder.get(cell)
+            if other is None or self._is_before(car, other, cell):
+                holder[cell] = car
+        for cell, car in holder.items():
+            shown[car] = cell
+        return shown
+
+    def _is_before(self, car: int, other: int, cell: int) -> bool:
+        if cell < len(self._board.arena.nodes):
+            return self._shown.get(car) == cell and self._shown.get(other) != cell
+        along = self.ground.along
+        return along(cell, self._seen[car].pose) > along(cell, self._seen[other].pose)
+
+    def _note_crowds(self, shown: dict[int, int], cells: dict[int, int]) -> None:
+        """Note who has gone where somebody is already: only through a bend one may follow another."""
+        arena = self._board.arena
+        for car, cell in cells.items():
+            entered = car in self._shown and car not in shown and self._shown[car] != cell != NOWHERE
+            if entered and cell < len(arena.nodes) and len(arena.nodes_of(arena.nodes[cell].vertex)) == 1:
+                self._note_move(car, self._shown[car], cell)
+
+    def _assume(self, shown: dict[int, int]) -> None:
+        """Find places for the cars that are not shown, where those that are shown have been and are not in the way."""
+        taken = set(self._shown.values()) | set(shown.values())
+        if EGO_CAR not in shown:
+            taken.add(self.cells[EGO_CAR])
+        ego = self.cells[EGO_CAR]
+        avoided = set(self._board.arena.following(ego)) if ego != NOWHERE else set[int]()
+        for cell in tuple(avoided):
+            avoided.update(self._board.arena.following(cell))
+        nodes = len(self._board.arena.nodes)
+        for car in range(1, len(self.cells)):
+            if car in self._shown:
+                continue
+            cell = self.cells[car]
+            unseen = car not in self._seen
+            if cell < nodes or cell in taken or (unseen and self._would_be_seen(cell)):
+                cell = self._elsewhere(car, cell, taken, avoided)
+                self._put(car, cell)
+                self.revised += 1
+            taken.add(cell)
+
+    def _would_be_seen(self, cell: int) -> bool:
+        return self.ground.within(cell, self._seen[EGO_CAR].pose, self._terms.sight, self._terms.margin)
+
+    def _elsewhere(self, car: int, cell: int, taken: set[int], avoided: set[int]) -> int:
+        start = max(cell, 0)
+        if car in self._seen:
+            return self.ground.nearest_free(start, taken, avoided)
+        open_to_view = {other for other in range(self._board.arena.cells) if self._would_be_seen(other)}
+        found = self.ground.nearest_free(start, taken | open_to_view, avoided)
+        return found if found != NOWHERE else self.ground.nearest_free(start, taken, avoided)
+
+    def _put(self, car: int, cell: int) -> None:
+        """Move a car, out of the queue it is in and last into the one it comes to."""
+        nodes = len(self._board.arena.nodes)
+        old = self.cells[car]
+        if old >= nodes:
+            queue = self._queues[self._board.arena.lane_end[old - nodes][0]]
+            if car in queue:
+                queue.remove(car)
+        self.cells[car] = cell
+        if cell >= nodes:
+            self._queues[self._board.arena.lane_end[cell - nodes][0]].append(car)
+
+    def _play(self, shown: dict[int, int]) -> None:
+        """Make the moves of the cars that were shown and are, first those into free cells, of these e-agents first."""
+        self.position = self._number()
+        moved = [car for car in shown if self._shown.get(car, shown[car]) != shown[car]]
+        pending = sorted(moved, key=lambda car: (car == EGO_CAR, car))
+        while pending:
+            car = next((car for car in pending if shown[car] not in self.cells), pending[0])
+            pending.remove(car)
+            self._move(car, shown[car])
+
+    def _move(self, car: int, cell: int) -> None:
+        """Make a move and look it up in the game."""
+        before, old = self.position, self.cells[car]
+        self._put(car, cell)
+        self.position = self._number()
+        self.checked += 1
+        if before is None or self.position is None:
+            known = before is None and cell in self._board.arena.following(old)
+        elif car == EGO_CAR:
+            known = self.position in self.moves.of_ego(before)
+        else:
+            known = self.position in self.moves.of_others(before)
+        if not known:
+            self._note_move(car, old, cell)
+
+    def _note_move(self, car: int, old: int, cell: int) -> None:
+        arena = self._board.arena
+        self.noted.append((UNKNOWN_MOVE, f"{self._names[car]} from {arena.name(old)} to {arena.name(cell)}"))
+
+    def _show(self, shown: dict[int, int], cells: dict[int, int]) -> None:
+        """Put the cars that have come into view, and the ego if it is behind another, where they are."""
+        for car, cell in shown.items():
+            if self.cells[car] != cell or car not in self._shown:
+                self._put(car, cell)
+        if EGO_CAR not in shown and cells[EGO_CAR] != NOWHERE:
+            self._put(EGO_CAR, cells[EGO_CAR])
+        self._shown = shown
+
+    def _settle(self, tick: int) -> None:
+        """Bring all queues into the order of the road."""
+        for car in range(len(self.cells)):
+            self._update_ticket(car, tick)
+        for queue in self._queues:
+            if len(queue) > 1:
+                place = {car: k for k, car in enumerate(queue)}
+                queue.sort(key=lambda car: self._order(car, place[car]))
+
+    def _order(self, car: int, place: int) -> tuple[int, int, int]:
+        if car not in self._shown:
+            return (3, place, 0)
+        if self._ticket[car] == NO_TICKET:
+            return (2, place, 0)
+        return (0 if self._bits[car] & FIRST else 1, self._ticket[car], place)
+
+    def _update_ticket(self, car: int, tick: int) -> None:
+        seen = self._seen.get(car)
+        bits = 0 if seen is None else seen.propositions.bits & WAITS
+        before, self._bits[car] = self._bits[car], bits
+        if not bits & STOPPED:
+            self._ticket[car] = NO_TICKET
+        elif self._ticket[car] == NO_TICKET:
+            self._ticket[car] = tick
+        elif bits & FORFEITED and (not before & FORFEITED or (before & FIRST and not bits & FIRST)):
+            self._ticket[car] = tick
+            self.noted.append(
+                (NEW_TICKET, f"{self._names[car]} in {self._board.arena.name(self.cells[car])}")
+            )
+
+    def _number(self) -> int | None:
+        """Return the number of the position in which the cars are, None if there is none."""
+        board, arena = self._board, self._board.arena
+        nodes = len(arena.nodes)
+        if NOWHERE in self.cells or len(set(self.cells)) < len(self.cells):
+            return None
+        inside = {cell: car for car, cell in enumerate(self.cells) if cell < nodes}
+        scenes: list[Scene] = []
+        for node, queue in enumerate(self._queues):
+            own = inside.get(node)
+            if own is None and not queue:
+                scenes.append(EMPTY)
+                continue
+            scenes.append(self._scene(node, own, queue))
+        try:
+            return board.number(scenes)
+        except KeyError:
+            return None
+
+    def _scene(self, node: int, inside: int | None, queue: Sequence[int]) -> Scene:
+        arena = self._board.arena
+        kind = self._board.scenery(node).kind
+        nodes = len(arena.nodes)
+        parked: list[int] = []
+        waiting: list[tuple[int, int]] = []
+        for car in queue:
+            slot = arena.lane_end[self.cells[car] - nodes][1]
+            if kind.parks and car != EGO_CAR and self._ticket[car] == NO_TICKET:
+                parked.append(slot)
+                continue
+            renewed = kind.forfeits is Forfeits.ONCE and self._bits[car] & FORFEITED
+            waiting.append((slot, EGO if car == EGO_CAR else RENEWED if renewed else OTHER))
+        return Scene(
+            None if inside is None else EGO if inside == EGO_CAR else OTHER,
+            tuple(waiting) if kind.ordered else tuple(sorted(waiting)),
+            tuple(sorted(parked)),
+        )
+
+
+EMPTY: Final = Scene()
