@@ -11,8 +11,10 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
+from dubins_traffic.controllers.shield import EVENT, told
 from dubins_traffic.driving.exits import BACK
 from dubins_traffic.driving.gates import MARGIN
+from dubins_traffic.driving.guard import Guard
 from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
 from dubins_traffic.driving.rounds import nearest_stage
 from dubins_traffic.errors import InputError
@@ -74,14 +76,15 @@ class Synthesized(Rules):
     Notes
     -----
     The strategy is asked whenever something has changed in the game while the ego is in a lane. Where it has nothing to
-    say (the ego is behind another car, or the others have broken their assumption so that it would not win) the ego
-    goes on as `rules` does, until it can be asked again.
+    say, since the ego is behind another car, the ego goes on as `rules` does. So it does where the strategy does not
+    win, as when the others have broken their assumption; then under the shield, until the strategy wins again.
     """
 
     def __init__(self, strategy: Strategy | None = None) -> None:
         super().__init__()
         self._strategy = strategy
         self._course: _Course | None = None
+        self._guard = Guard()
 
     def start(self, problem: Problem) -> None:
         """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
@@ -90,6 +93,7 @@ class Synthesized(Rules):
         if drivers is None or not problem.e_agents:
             return
         strategy = _solved(problem) if self._strategy is None else _fitting(self._strategy, problem)
+        self._guard.start(problem)
         rules = RuleParameters.from_mapping(problem.rules)
         self._period = problem.period
         self._edge = problem.intersection_radius + problem.car.body.reach + MARGIN
@@ -116,6 +120,8 @@ class Synthesized(Rules):
             return super().act(observation)
         self._follow(course, observation)
         command = super().act(observation)
+        if not course.wins:
+            return self._guarded(course, observation, command)
         return self._waiting(course.advice, observation, command)
 
     @property
@@ -174,6 +180,14 @@ class Synthesized(Rules):
         if wins != course.wins:
             course.wins = wins
             course.reports.append((STRATEGY_RESUMED if wins else STRATEGY_LEFT, ""))
+
+    def _guarded(self, course: _Course, seen: Observation, command: Command) -> Command:
+        """Return what the shield makes of a command."""
+        given = self._guard.filter(seen, command)
+        found = self._guard.intervention
+        if found is not None:
+            course.reports.append((EVENT, told(found.asked, found.given, found.reason)))
+        return given
 
     def _waiting(self, advice: Advice | None, seen: Observation, command: Command) -> Command:
         """Return the command of an ego that waits before the disc ahead, if it is told to and keeps its place."""
