@@ -11,7 +11,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.controllers.shield import EVENT, told
+from dubins_traffic.controllers.shield import told
 from dubins_traffic.driving.exits import BACK
 from dubins_traffic.driving.gates import MARGIN
 from dubins_traffic.driving.guard import Guard
@@ -19,6 +19,7 @@ from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TU
 from dubins_traffic.driving.rounds import nearest_stage
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.synthesis.advice import Advice, advise
 from dubins_traffic.synthesis.board import Board
@@ -186,7 +187,7 @@ class Synthesized(Rules):
         given = self._guard.filter(seen, command)
         found = self._guard.intervention
         if found is not None:
-            course.reports.append((EVENT, told(found.asked, found.given, found.reason)))
+            course.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given
 
     def _waiting(self, advice: Advice | None, seen: Observation, command: Command) -> Command:
