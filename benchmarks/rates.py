@@ -47,5 +47,5 @@ def _figure(rate: Rate, found: dict[tuple[str, int], float | None]) -> str:
 
 
 def _short(value: float) -> str:
-    """Return two digits of a ratio, without an exponent."""
-    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" if value >= 0.01 else f"{value:.1g}"
+    """Return two digits of a ratio, one of a small one, without an exponent."""
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10.0 else f"{value:.{2 if value >= 0.01 else 1}g}"

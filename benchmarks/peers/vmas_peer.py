@@ -31,9 +31,9 @@ class Discs(BaseScenario):
         return world
 
     def reset_world_at(self, env_index: int | None = None) -> None:
-        """Put the cars within half a metre of their places, in all worlds."""
+        """Put the cars anywhere about their places, in all worlds: from the first tick on, some are about to meet."""
         for agent, start in zip(self.world.agents, self.starts, strict=True):
-            away = torch.rand(self.world.batch_dim, 2) - 0.5
+            away = 2.0 * torch.rand(self.world.batch_dim, 2) - 1.0
             agent.set_pos(torch.tensor(start) + away, env_index)
 
     def observation(self, agent: Agent) -> torch.Tensor:

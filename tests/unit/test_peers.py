@@ -96,11 +96,11 @@ def test_what_cannot_be_installed_is_one_line_and_leaves_nothing(tmp_path):
 
 
 def test_ratios_are_to_ours_with_as_many_cars():
-    own = [Rate(BATCH, 8, 2e6), Rate(MOTION, 8, 4e7), Rate(WORLD, 8, 5e5), Rate(BATCH, 64, 3e6)]
+    own = [Rate(BATCH, 8, 2e6), Rate(MOTION, 8, 4e7), Rate(WORLD, 8, 1234.0), Rate(BATCH, 64, 3e6)]
     found = rows([*own, Rate("A", 8, 1e4), Rate("A", 64, 1e4), Rate("B", 8, None, "not installed")])
     assert [row.figure for row in found[3:]] == [
         "3.00e+06 car-steps/s",
-        "1.00e+04 car-steps/s; ours in times: batch 200, motion 4000, world 50",
+        "1.00e+04 car-steps/s; ours in times: batch 200, motion 4,000, world 0.12",
         "1.00e+04 car-steps/s; ours in times: batch 300",
         "not measured: not installed",
     ]
