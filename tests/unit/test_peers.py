@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from benchmarks import overview, peers
+from benchmarks import ours, overview, peers
 from benchmarks.peers import Peer
 from benchmarks.rates import BATCH, MOTION, WORLD, Rate, rows
 from benchmarks.table import Row
@@ -65,6 +65,14 @@ def test_a_peer_that_is_not_installed_is_one_line(tmp_path, monkeypatch):
     }
     found = peers.rate(Peer("SUMO", "sumo", "drivers"), 8)
     assert (found.per_second, found.why) == (None, "not installed; scripts/peers.sh sumo says why")
+
+
+def test_gazebo_that_is_not_installed_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("DUBINS_TRAFFIC_GAZEBO", str(tmp_path))
+    found = ours.gazebo(8)
+    assert found.per_second is None
+    assert found.why
+    assert "\n" not in found.why
 
 
 def test_a_peer_that_fails_or_hangs_is_one_line(tmp_path, monkeypatch):
