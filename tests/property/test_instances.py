@@ -16,7 +16,7 @@ from dubins_traffic.cars.body import Disc
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
-from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.starts import TIGHT
 from dubins_traffic.roads.network import RoadNetwork
@@ -315,3 +315,29 @@ def test_shipped_configurations_can_be_drawn(name: str) -> None:
         instance = draw(config, 0, trial)
         assert isinstance(instance.problem.car.body, Disc)
         assert instance_from_document(json.loads(json.dumps(instance_to_document(instance)))) == instance
+
+
+GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
+LOOPS = [{"type": "loop", "count": 2}, {"type": "lawful", "parameters": {"goes": "loop"}}, {"type": "wander"}]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"network": GRID, "e-agents": [{"type": "lawful", "count": 6}], "rules": {}},
+        {"network": GRID, "e-agents": LOOPS, "obstacles": [{"disc": {"x": 4.0, "y": 0.3, "radius": 0.2}}]},
+        {"network": {"grid": {"rows": 2, "columns": 2}}, "e-agents": [{"type": "wander", "count": 12}]},
+        {"network": {"random": {"intersections": 7, "segments": 8}}, "e-agents": LOOPS},
+        {"network": GRID, "ego": {"start": [2.0, -0.3, 0.0]}, "e-agents": [{"type": "wander", "count": 4}]},
+        {"network": GRID, "ego": {"start": "origin"}, "goals": [[1, 1]], "duration": 3.0},
+    ],
+    ids=["shared", "loops", "crowded", "own-networks", "given", "all-given"],
+)
+def test_many_instances_drawn_at_once_are_those_drawn_one_by_one(changes: dict[str, Any]) -> None:
+    document = {"version": 1, "problem_domain": "dubins_traffic", "number_trials": 1, **changes}
+    numbers = [*range(20), 2**32 - 2, 5]
+    many = list(draw_many(load_config(document), 2**63 + 1, numbers))
+    assert [instance.trial for instance in many] == numbers
+    for instance in many:
+        alone = draw(load_config(document), 2**63 + 1, instance.trial)
+        assert instance_to_document(instance) == instance_to_document(alone)

@@ -21,7 +21,7 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
-from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.scoring.score import ScoreSheet
@@ -104,7 +104,7 @@ def run_batch(
         if value < 1:
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = _kept(keep, count), _folder(keep, records)
-    instances = (draw(configuration, seed, first + k) for k in range(count))
+    instances = draw_many(configuration, seed, range(first, first + count))
     found: list[Outcome] = []
     for outcome in outcomes(instances, controller, batch=batch, threads=threads):
         if folder is None or not kept(outcome.instance.trial - first, outcome):

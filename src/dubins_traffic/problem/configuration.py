@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,11 @@ class Configuration:
     network: RoadNetwork | None
     agents: tuple[PlannedAgent, ...]
     file: str | None = None
+    kept: dict[str, object] = field(default_factory=dict[str, object], init=False, repr=False, compare=False)
+    """What has been worked out of the rest once; not part of it, and left behind when it is pickled."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Configuration, (self.document, self.settings, self.network, self.agents, self.file)
 
     @staticmethod
     def from_document(

@@ -12,21 +12,21 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import PlannedAgent, check_goal, plan_agents, pose_of
 from dubins_traffic.problem.demands import check_demands
-from dubins_traffic.problem.draw import (
-    Stream,
-    agent_wishes,
-    check_numbers,
-    complete_agents,
-    draw_duration,
-    origin_start,
-)
+from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import Kind, detect, parse_json, plain, read_source
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.parts import CarModel, ObstacleModel
+from dubins_traffic.problem.pieces import (
+    Stream,
+    agent_wishes,
+    complete_agents,
+    draw_duration,
+    origin_start,
+)
 from dubins_traffic.problem.settings import INSTANCE_0_KEYS, InstanceModel, InstanceModel0
-from dubins_traffic.problem.starts import Ground, Wish, draw_starts
+from dubins_traffic.problem.starts import Ground, Wish, areas_of, check_given, draw_starts
 from dubins_traffic.problem.versions import version_of
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -160,12 +160,13 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
     planned, ego = _placed(model, network, planned)
     wishes = [ego, *agent_wishes(network, planned, agents)]
     ground = Ground(network, car, model.radius, problem.obstacles)
+    check_given(ground, names, wishes)
     duration = model.duration
     if duration is None:
         duration = draw_duration(DURATION_BOUNDS, Draws(seed, trial, Stream.DURATION))
     return Instance(
         problem=problem,
-        starts=tuple(draw_starts(ground, names, wishes, Draws(seed, trial, Stream.STARTS))),
+        starts=tuple(draw_starts(areas_of(ground), ground, wishes, Draws(seed, trial, Stream.STARTS))),
         duration=duration,
         e_agents=agents,
         seed=seed,

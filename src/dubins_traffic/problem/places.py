@@ -121,6 +121,10 @@ class Places:
         k = int(np.argmin(order[lane]))
         return int(lane[k]), float(low[k])
 
+    def tables(self) -> tuple[Floats, Intervals]:
+        """Return start and direction of each right lane's centre line, (L, 4), and the free intervals."""
+        return np.ascontiguousarray(np.stack(self._lines, axis=-1)), self._free
+
     def pose(self, lane: int, along: float) -> Pose:
         """Return the pose `along` metres down a right lane, headed with it."""
         return self._lines.pose(lane, along)

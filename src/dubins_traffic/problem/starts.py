@@ -41,7 +41,24 @@ class Ground(NamedTuple):
     obstacles: tuple[Obstacle, ...]
 
 
-def draw_starts(ground: Ground, names: Sequence[str], wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
+class Areas(NamedTuple):
+    """Where cars may stand: clear of obstacles, and of these places those outside the discs of intersections."""
+
+    free: Places
+    outside: Places
+
+
+def areas_of(ground: Ground) -> Areas:
+    """Return the areas of a ground."""
+    free = Places(ground.network, ground.car.w)
+    for obstacle in ground.obstacles:
+        free.block_shape(obstacle_shape(obstacle), ground.car.body.reach)
+    outside = free.copy()
+    outside.block_intersections(ground.intersection_radius + ground.car.body.reach)
+    return Areas(free, outside)
+
+
+def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
     """Return the start poses of all cars.
 
     Those not given are drawn uniformly over the right lanes' centre lines, headed with the lane, bodies clear of
@@ -51,22 +68,17 @@ def draw_starts(ground: Ground, names: Sequence[str], wishes: Sequence[Wish], dr
     Raises
     ------
     InputError
-        If given starts overlap, or if the cars don't fit; says how many do.
+        If the cars don't fit; says how many do.
     """
-    _check_given(ground, names, wishes)
     poses = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
     if len(poses) == len(wishes):
         return [poses[n] for n in range(len(wishes))]
-    free = Places(ground.network, ground.car.w)
-    for obstacle in ground.obstacles:
-        free.block_shape(obstacle_shape(obstacle), ground.car.body.reach)
-    outside = free.copy()
-    outside.block_intersections(ground.intersection_radius + ground.car.body.reach)
+    free, outside = areas
     best = 0
-    for areas in ((outside,), (outside, free)):
-        for gap in (ROOMY, TIGHT) if len(areas) == 1 else (TIGHT,):
+    for some in ((outside,), (outside, free)):
+        for gap in (ROOMY, TIGHT) if len(some) == 1 else (TIGHT,):
             for packed in (False, True):
-                found = _attempt(areas, gap, packed, ground.car, wishes, draws)
+                found = _attempt(some, gap, packed, ground.car, wishes, draws)
                 if len(found) == len(wishes):
                     return [found[n] for n in range(len(wishes))]
                 best = max(best, len(found))
@@ -78,12 +90,17 @@ def draw_starts(ground: Ground, names: Sequence[str], wishes: Sequence[Wish], dr
     )
 
 
+def gap_radius(car: Car, gap: float = ROOMY) -> float:
+    """Return how far the centres of two cars are apart at least, metres, so that a gap is left between the bodies."""
+    return 2.0 * car.body.reach + gap * (car.w / 0.3)
+
+
 def _attempt(
     areas: Sequence[Places], gap: float, packed: bool, car: Car, wishes: Sequence[Wish], draws: Draws
 ) -> dict[int, Pose]:
     """Place cars in turn, in the first area that has room for each, until one finds none."""
     own = [area.copy() for area in areas]
-    radius = 2.0 * car.body.reach + gap * (car.w / 0.3)
+    radius = gap_radius(car, gap)
     order = np.array(draws.shuffled(areas[0].count), dtype=np.int64) if packed else None
     found = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
     for pose in found.values():
@@ -102,7 +119,7 @@ def _attempt(
     return found
 
 
-def _check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
+def check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
     """Refuse given starts in which a body overlaps another or an obstacle."""
     given = [
         (name, wish, body_shape(ground.car.body, wish.pose))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 from dubins_traffic.errors import InputError
@@ -113,15 +114,28 @@ class RuleParameters:
         InputError
             If a name is none of ours, or a value is refused (above).
         """
-        known = {field.name for field in fields(cls)}
-        for name in rules:
-            if name not in known:
-                raise InputError("no parameter of the rules", field=name, expected=f"one of {sorted(known)}")
-        return cls(**rules)
+        values = tuple(rules.values())
+        if all(type(value) in (int, float) for value in values):
+            return _checked(tuple(rules), values, tuple(map(type, values)))
+        return _made(rules)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return all parameters by name, in the order of their definition."""
         return asdict(self)
+
+
+@lru_cache(maxsize=256)
+def _checked(names: tuple[str, ...], values: tuple[float, ...], _types: tuple[type, ...]) -> RuleParameters:
+    """Return the parameters of these names and values; trials share them, and checking all takes its time."""
+    return _made(dict(zip(names, values, strict=True)))
+
+
+def _made(rules: Mapping[str, Any]) -> RuleParameters:
+    known = {field.name for field in fields(RuleParameters)}
+    for name in rules:
+        if name not in known:
+            raise InputError("no parameter of the rules", field=name, expected=f"one of {sorted(known)}")
+    return RuleParameters(**rules)
 
 
 def _check(name: str, value: object, *, whole: bool) -> None:

@@ -1,0 +1,80 @@
+"""What is drawn for an instance, piece by piece; each piece has a stream of random numbers of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.problem.configuration import PlannedAgent
+from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
+from dubins_traffic.problem.instance import EAgent
+from dubins_traffic.problem.kinds import loops
+from dubins_traffic.problem.starts import Wish
+from dubins_traffic.roads.network import RoadNetwork
+
+
+class Stream(IntEnum):
+    """Streams of random numbers, one a purpose: what is drawn for one never shifts another."""
+
+    NETWORK = 1
+    GOALS = 2
+    DURATION = 3
+    STARTS = 4
+    CYCLES = 5
+
+
+def draw_goals(network: RoadNetwork, bounds: tuple[int, int], draws: Draws) -> tuple[tuple[int, int], ...]:
+    """Return goals, as many as drawn from `bounds` (both included), distinct while there are intersections."""
+    count = draws.between(*bounds)
+    places = len(network.intersections)
+    picks = draws.sample(min(count, places), places)
+    picks += [draws.below(places) for _ in range(count - places)]
+    return tuple(network.intersections[v] for v in picks)
+
+
+def draw_duration(bounds: tuple[int, int], draws: Draws) -> float:
+    """Return a duration of whole seconds, uniform over `bounds`, both included."""
+    return float(draws.between(*bounds))
+
+
+def origin_start(network: RoadNetwork, w: float) -> Pose | None:
+    """Return the ego's start of 2016, the world's origin with heading 0, or None if that is off the road."""
+    on_road = bool(network.on_road([0.0, 0.0], 2.0 * w))
+    return Pose(0.0, 0.0, 1.0, 0.0) if on_road else None
+
+
+def drawn_cycle(agent: EAgent) -> bool:
+    """Tell whether the cycle of a planned e-agent is drawn."""
+    return loops(agent.kind, agent.parameters) and agent.parameters["cycle"] is None
+
+
+def complete_agents(
+    network: RoadNetwork, planned: Sequence[PlannedAgent], draws: Draws
+) -> tuple[EAgent, ...]:
+    """Return the e-agents with everything about them drawn."""
+    agents: list[EAgent] = []
+    for agent in (plan.agent for plan in planned):
+        parameters = dict(agent.parameters)
+        if drawn_cycle(agent):
+            parameters["cycle"] = draw_cycle(network, draws)
+        agents.append(EAgent(agent.kind, agent.name, agent.type, parameters))
+    return tuple(agents)
+
+
+def agent_wishes(
+    network: RoadNetwork, planned: Sequence[PlannedAgent], agents: Sequence[EAgent]
+) -> list[Wish]:
+    """Return where each e-agent is to start: as planned, else drawn; a loop on its cycle."""
+    wishes: list[Wish] = []
+    for plan, agent in zip(planned, agents, strict=True):
+        lanes = None
+        if loops(agent.kind, agent.parameters):
+            try:
+                lanes = cycle_lanes(network, agent.parameters["cycle"])
+            except InputError as error:
+                raise error.within(field=f"{plan.field}.parameters") from None
+        wishes.append(Wish(plan.start, lanes, f"{plan.field}.start"))
+    return wishes
