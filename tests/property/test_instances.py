@@ -318,7 +318,11 @@ def test_shipped_configurations_can_be_drawn(name: str) -> None:
 
 
 GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
-LOOPS = [{"type": "loop", "count": 2}, {"type": "lawful", "parameters": {"goes": "loop"}}, {"type": "wander"}]
+LOOPS = [
+    {"type": "loop", "name": "loop", "count": 2},
+    {"type": "lawful", "name": "round", "parameters": {"goes": "loop"}},
+    {"type": "wander", "name": "agent"},
+]
 
 
 @pytest.mark.parametrize(
