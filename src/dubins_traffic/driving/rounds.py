@@ -14,26 +14,26 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
 
+def round_time(problem: Problem) -> float:
+    """Return the seconds of a round through all goals in free flow (`driving.free_flow`); inf if there is none."""
+    found = find_round(lane_graph(problem.network), problem.goal_vertices)
+    return inf if found is None else found.length / problem.car.bounds.speed
+
+
 def stages(problem: Problem) -> tuple[Ints, Floats]:
     """Return the goals in the order of the round (M,), and the metres from the start of each lane to each (M, L).
 
     M is 0 without goals that can be reached.
     """
     graph = lane_graph(problem.network)
-    goals = tuple(dict.fromkeys(problem.goal_vertices))
-    found = find_round(graph, goals) if goals else None
+    found = find_round(graph, problem.goal_vertices)
     if found is None:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-    rows: list[list[float]] = []
-    stage: list[int] = []
-    for place in found.arrivals:
-        target = found.lanes[place]
-        to_target = graph.distances(target)
-        rows.append(
-            [far + own if far < inf else inf for far, own in zip(to_target, graph.length, strict=True)]
-        )
-        stage.append(graph.end[target])
-    return np.array(stage, dtype=np.int64), np.array(rows)
+    if found not in graph.stages:
+        targets = [found.lanes[place] for place in found.arrivals]
+        distance = np.stack([graph.metres_to(target) for target in targets]) + np.array(graph.length)
+        graph.stages[found] = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
+    return graph.stages[found]
 
 
 def nearest_stage(distance: Floats, lane: int, segment: int) -> int:

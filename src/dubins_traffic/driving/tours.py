@@ -9,14 +9,15 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from functools import cached_property
+from itertools import chain
 from math import inf
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.driving.round_search import LaneTables, metres_to, room, shortest_round
+from dubins_traffic.kernels.arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -24,8 +25,10 @@ if TYPE_CHECKING:
 EXACT = 7
 """Up to so many goals the shortest of all rounds is found; more are taken each time nearest first."""
 
+MOST_KEPT, FEWEST_KEPT = 1 << 19, 8
+"""So many numbers, about, are kept of rounds that have been found on a network, and so many rounds at least."""
+
 TurnCost = Callable[[int, int], float]
-_GRAPHS: WeakKeyDictionary[RoadNetwork, LaneGraph] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,23 @@ class LaneGraph:
         self.into: list[list[int]] = [[] for _ in range(len(network.intersections))]
         for lane, v in enumerate(self.end):
             self.into[v].append(lane)
+        self.rounds: dict[tuple[int, ...], Round | None] = {}
+        self.stages: dict[Round, tuple[Ints, Floats]] = {}
+
+    @cached_property
+    def tables(self) -> LaneTables:
+        """The graph as arrays."""
+        after = _offsets(self.after), *_columns(self.after)
+        before = _offsets(self.before), *_columns(self.before)
+        into = np.fromiter(chain.from_iterable(self.into), dtype=np.int64)
+        return LaneTables(*after, *before, _offsets(self.into), into)
+
+    def metres_to(self, target: int) -> Floats:
+        """Return what `distances` does, without penalties, as an array."""
+        far = np.empty(self.count)
+        work = np.empty((2, self.count), dtype=np.int64)
+        metres_to(target, self.tables, far, work[0], work[1])
+        return far
 
     def distances(self, target: int, penalty: TurnCost | None = None) -> list[float]:
         """Return metres from the end of each lane to the end of the lane `target`, driving on from there."""
@@ -108,10 +128,20 @@ class LaneGraph:
 
 def lane_graph(network: RoadNetwork) -> LaneGraph:
     """Return the graph of a network's lanes in which turning is free; made once for each network."""
-    graph = _GRAPHS.get(network)
-    if graph is None:
-        graph = _GRAPHS[network] = LaneGraph(network)
+    graph = network.known.get(LaneGraph)
+    if not isinstance(graph, LaneGraph):
+        graph = network.known[LaneGraph] = LaneGraph(network)
     return graph
+
+
+def _offsets(rows: Sequence[Sequence[object]]) -> Ints:
+    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
+
+
+def _columns(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Ints, Floats]:
+    flat = list(chain.from_iterable(rows))
+    lanes = np.array([lane for lane, _ in flat], dtype=np.int64)
+    return lanes, np.array([cost for _, cost in flat], dtype=np.float64)
 
 
 def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
@@ -124,65 +154,21 @@ def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     distinct = tuple(dict.fromkeys(goals))
     if not distinct:
         return None
-    if len(distinct) > EXACT:
-        return _nearest_first(graph, distinct)
-    tables = [[graph.distances(lane) for lane in graph.into[goal]] for goal in distinct]
-    legs = {
-        (a, b): _leg(graph, graph.into[distinct[a]], tables[b])
-        for a in range(len(distinct))
-        for b in range(len(distinct))
-        if a != b or len(distinct) == 1
-    }
-    best, least = None, inf
-    for rest in permutations(range(1, len(distinct))):
-        order = (0, *rest)
-        whole = _chain(order, legs)
-        closing = np.diagonal(whole)
-        if float(closing.min()) < least:
-            best, least = order, float(closing.min())
-    if best is None:
+    if distinct not in graph.rounds:
+        if len(graph.rounds) >= max(FEWEST_KEPT, MOST_KEPT // graph.count):
+            graph.rounds.clear()
+            graph.stages.clear()
+        shortest = len(distinct) <= EXACT
+        graph.rounds[distinct] = _shortest(graph, distinct) if shortest else _nearest_first(graph, distinct)
+    return graph.rounds[distinct]
+
+
+def _shortest(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
+    own = room(len(goals), graph.count)
+    lanes, length = shortest_round(np.array(goals, dtype=np.int64), graph.tables, own)
+    if not lanes:
         return None
-    return _trace(graph, distinct, best, legs, tables, least)
-
-
-def _leg(graph: LaneGraph, sources: Sequence[int], tables: Sequence[Sequence[float]]) -> Floats:
-    return np.array([[graph.step(lane, table)[1] for table in tables] for lane in sources])
-
-
-def _chain(order: tuple[int, ...], legs: dict[tuple[int, int], Floats]) -> Floats:
-    total: Floats | None = None
-    for a, b in zip(order, order[1:] + order[:1], strict=True):
-        leg = legs[a, b]
-        total = leg if total is None else np.min(total[:, :, None] + leg[None, :, :], axis=1)
-    assert total is not None
-    return total
-
-
-def _trace(
-    graph: LaneGraph,
-    goals: tuple[int, ...],
-    order: tuple[int, ...],
-    legs: dict[tuple[int, int], Floats],
-    tables: Sequence[Sequence[Sequence[float]]],
-    length: float,
-) -> Round:
-    """Drive the best round of an order and note its lanes, from the first goal to itself."""
-    closed = (*order, order[0])
-    start = int(np.argmin(np.diagonal(_chain(order, legs))))
-    to_go: list[Floats] = [np.where(np.arange(len(graph.into[goals[order[0]]])) == start, 0.0, inf)]
-    for a, b in reversed(list(pairwise(closed))):
-        to_go.append(np.min(legs[a, b] + to_go[-1][None, :], axis=1))
-    to_go.reverse()
-    lanes: list[int] = []
-    arrivals: list[int] = []
-    at = start
-    for k, (a, b) in enumerate(pairwise(closed)):
-        following = int(np.argmin(legs[a, b][at] + to_go[k + 1]))
-        target = graph.into[goals[b]][following]
-        lanes += graph.route(graph.into[goals[a]][at], target, tables[b][following])
-        arrivals.append(len(lanes) - 1)
-        at = following
-    return Round(tuple(lanes), tuple(arrivals), length)
+    return Round(tuple(own.lane[:lanes].tolist()), tuple(own.arrival.tolist()), length)
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:

@@ -234,6 +234,11 @@ class RoadNetwork:
         return ends, np.repeat(self.lengths, 2).tolist(), before
 
     @cached_property
+    def known(self) -> dict[object, object]:
+        """What the rooms above have worked out about this network and keep with it, each under a key of its own."""
+        return {}
+
+    @cached_property
     def _routes(self) -> dict[int, Routes]:
         return {}
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.driving.free_flow import free_flow
+from dubins_traffic.driving.rounds import round_time
 from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
@@ -266,7 +266,7 @@ def reach_verdict(
     own = [breach for breach in breaches if breach.car == EGO]
     fall = first_fall(breaches, rules, rate)
     gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
-    limit = rules.gap_rounds * free_flow(instance).round_time
+    limit = rules.gap_rounds * round_time(instance.problem)
     excuse = None
     if not own:
         done = visits.visited == 1.0 and (gap is None or gap <= limit)

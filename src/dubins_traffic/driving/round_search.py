@@ -1,0 +1,248 @@
+"""The shortest round through some goals, compiled: over all cyclic orders, and all lanes by which each is reached."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.compile import jit
+
+INFINITE = float("inf")
+ARMS = 4
+"""Most lanes that end in one intersection."""
+
+
+class LaneTables(NamedTuple):
+    """The graph of lanes as arrays.
+
+    What may follow lane a are ``after[after_off[a]]`` to ``after[after_off[a + 1] - 1]``, each with the metres
+    `after_cost` that it takes; in the same way `before`, `before_cost`: what a lane may follow. `into`, by `into_off`:
+    the lanes that end in an intersection.
+    """
+
+    after_off: Ints
+    after: Ints
+    after_cost: Floats
+    before_off: Ints
+    before: Ints
+    before_cost: Floats
+    into_off: Ints
+    into: Ints
+
+
+class Search(NamedTuple):
+    """Room for the search through n goals on L lanes.
+
+    `far` (4 n, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
+    from the lanes into one goal to those into another; `total`, `other` (4, 4) and `to_go` (n + 1, 4): what is reckoned
+    with; `order`, `best` (n,): orders of the goals; `queue`, `waits` (L,); and what is found: `lane` (n L,), `arrival`
+    (n,).
+    """
+
+    far: Floats
+    leg: Floats
+    total: Floats
+    other: Floats
+    to_go: Floats
+    order: Ints
+    best: Ints
+    queue: Ints
+    waits: Ints
+    lane: Ints
+    arrival: Ints
+
+
+def room(goals: int, lanes: int) -> Search:
+    """Return room for a search."""
+    return Search(
+        far=np.zeros((ARMS * goals, lanes)),
+        leg=np.full((goals, goals, ARMS, ARMS), np.inf),
+        total=np.zeros((ARMS, ARMS)),
+        other=np.zeros((ARMS, ARMS)),
+        to_go=np.zeros((goals + 1, ARMS)),
+        order=np.zeros(goals, dtype=np.int64),
+        best=np.zeros(goals, dtype=np.int64),
+        queue=np.zeros(lanes, dtype=np.int64),
+        waits=np.zeros(lanes, dtype=np.int64),
+        lane=np.zeros(goals * lanes, dtype=np.int64),
+        arrival=np.zeros(goals, dtype=np.int64),
+    )
+
+
+@jit
+def metres_to(target: int, g: LaneTables, far: Floats, queue: Ints, waits: Ints) -> None:
+    """Write the metres from the end of each lane to the end of the lane `target` into `far` (L,)."""
+    lanes = far.shape[0]
+    for lane in range(lanes):
+        far[lane] = INFINITE
+        waits[lane] = 0
+    far[target] = 0.0
+    queue[0] = target
+    first = 0
+    count = 1
+    while count > 0:
+        lane = queue[first]
+        first = first + 1 if first + 1 < lanes else 0
+        count -= 1
+        waits[lane] = 0
+        for k in range(g.before_off[lane], g.before_off[lane + 1]):
+            total = far[lane] + g.before_cost[k]
+            other = g.before[k]
+            if total < far[other]:
+                far[other] = total
+                if waits[other] == 0:
+                    waits[other] = 1
+                    place = first + count
+                    queue[place if place < lanes else place - lanes] = other
+                    count += 1
+
+
+@jit
+def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]:
+    """Find the shortest round through the distinct intersections `goals`.
+
+    Its lanes are in `own.lane`, the places in it of those that end in a goal as it is reached in `own.arrival`.
+
+    Returns
+    -------
+    lanes, metres
+        How many lanes it has, 0 if there is no round, and how long it is.
+    """
+    count = goals.shape[0]
+    _fill_legs(goals, g, own)
+    for k in range(count):
+        own.order[k] = k
+    least = INFINITE
+    more = True
+    while more:
+        arms = _chain(goals, g, own, own.order)
+        for i in range(arms):
+            if own.total[i, i] < least:
+                least = own.total[i, i]
+                for k in range(count):
+                    own.best[k] = own.order[k]
+        more = _next_order(own.order)
+    if least == INFINITE:
+        return 0, least
+    return _trace(goals, g, own), least
+
+
+@jit
+def _arms(goals: Ints, g: LaneTables, k: int) -> int:
+    return g.into_off[goals[k] + 1] - g.into_off[goals[k]]
+
+
+@jit
+def _fill_legs(goals: Ints, g: LaneTables, own: Search) -> None:
+    count = goals.shape[0]
+    for b in range(count):
+        for j in range(_arms(goals, g, b)):
+            far = own.far[ARMS * b + j]
+            metres_to(g.into[g.into_off[goals[b]] + j], g, far, own.queue, own.waits)
+            for a in range(count):
+                if a == b and count > 1:
+                    continue
+                for i in range(_arms(goals, g, a)):
+                    _, own.leg[a, b, i, j] = _step(g.into[g.into_off[goals[a]] + i], g, far)
+
+
+@jit
+def _step(lane: int, g: LaneTables, far: Floats) -> tuple[int, float]:
+    """Return the next lane toward the target of `far`, and the metres to it by way of that lane (or -1, inf)."""
+    best = -1
+    least = INFINITE
+    for k in range(g.after_off[lane], g.after_off[lane + 1]):
+        total = g.after_cost[k] + far[g.after[k]]
+        if total < least:
+            best = g.after[k]
+            least = total
+    return best, least
+
+
+@jit
+def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> int:
+    """Write the metres once round, in an order, from each lane into its first goal to each into `own.total`."""
+    count = goals.shape[0]
+    head = _arms(goals, g, order[0])
+    for i in range(head):
+        for j in range(_arms(goals, g, order[1 % count])):
+            own.total[i, j] = own.leg[order[0], order[1 % count], i, j]
+    for k in range(1, count):
+        a = order[k]
+        b = order[(k + 1) % count]
+        for i in range(head):
+            for j in range(_arms(goals, g, b)):
+                least = INFINITE
+                for m in range(_arms(goals, g, a)):
+                    least = min(least, own.total[i, m] + own.leg[a, b, m, j])
+                own.other[i, j] = least
+        for i in range(head):
+            for j in range(_arms(goals, g, b)):
+                own.total[i, j] = own.other[i, j]
+    return head
+
+
+@jit
+def _next_order(order: Ints) -> bool:
+    """Go on to the next order that begins with the same goal; False after the last."""
+    k = order.shape[0] - 2
+    while k >= 1 and order[k] > order[k + 1]:
+        k -= 1
+    if k < 1:
+        return False
+    other = order.shape[0] - 1
+    while order[other] < order[k]:
+        other -= 1
+    order[k], order[other] = order[other], order[k]
+    low = k + 1
+    high = order.shape[0] - 1
+    while low < high:
+        order[low], order[high] = order[high], order[low]
+        low += 1
+        high -= 1
+    return True
+
+
+@jit
+def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
+    """Drive the best round of the best order, from its first goal to itself; return how many lanes it has."""
+    count = goals.shape[0]
+    arms = _chain(goals, g, own, own.best)
+    start = 0
+    for i in range(arms):
+        if own.total[i, i] < own.total[start, start]:
+            start = i
+    for i in range(arms):
+        own.to_go[count, i] = 0.0 if i == start else INFINITE
+    for k in range(count - 1, -1, -1):
+        a = own.best[k]
+        b = own.best[(k + 1) % count]
+        for i in range(_arms(goals, g, a)):
+            least = INFINITE
+            for j in range(_arms(goals, g, b)):
+                least = min(least, own.leg[a, b, i, j] + own.to_go[k + 1, j])
+            own.to_go[k, i] = least
+    done = 0
+    at = start
+    for k in range(count):
+        a = own.best[k]
+        b = own.best[(k + 1) % count]
+        following = 0
+        least = INFINITE
+        for j in range(_arms(goals, g, b)):
+            far = own.leg[a, b, at, j] + own.to_go[k + 1, j]
+            if far < least:
+                following = j
+                least = far
+        lane = g.into[g.into_off[goals[a]] + at]
+        target = g.into[g.into_off[goals[b]] + following]
+        begin = done
+        while done == begin or lane != target:
+            lane, _ = _step(lane, g, own.far[ARMS * b + following])
+            own.lane[done] = lane
+            done += 1
+        own.arrival[k] = done - 1
+        at = following
+    return done
