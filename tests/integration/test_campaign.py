@@ -92,7 +92,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path, table: bytes) -> None:
     assert status == 1
     said = re.search(rf"(\d+) of {TRIALS} trials are kept, --resume goes on", told)
     assert said is not None
-    assert int(said[1]) <= finished  # a worker may have kept some more meanwhile
+    assert int(said[1]) == finished
     assert 6 <= finished < TRIALS
     data = succeed(file, out, "--resume")
     assert parquet.read_table(out / "results.parquet").num_rows == TRIALS

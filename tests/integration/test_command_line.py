@@ -356,3 +356,20 @@ def test_ctrl_c_keeps_finished_trials(jobs, place):
     assert {trial["end"] for trial in kept} == {"duration"}
     assert len(TrialData.read("data.json").instances) == len(kept)
     assert main(["score", *(trial["record"] for trial in kept)]) == 0
+
+
+def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
+    ask = ["batch", CONFIG, "--trials", "200", "--batch", "2", "--keep", "all", "--records", "out", "--json"]
+    process = subprocess.Popen(
+        [COMMAND, *ask], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    until = time.monotonic() + 120
+    while len(list(place.glob("out/*.wall.json"))) < 3 and time.monotonic() < until:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    kept = [trial["trial"] for trial in json.loads(out)["trials"]]
+    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
+    assert 2 <= len(kept) < 200
+    assert kept == list(range(len(kept)))

@@ -205,7 +205,7 @@ def test_room_for_pairs_contacts_and_breaches_is_found_when_it_is_needed(monkeyp
     def results() -> list[Mapping[str, Any]]:
         own = Group(instances, keeps_rules=True)
         own.finish()
-        return [plain(own.outcome(b, "rules").score) for b in range(3)]
+        return [plain(outcome.score) for outcome in own.outcomes(range(3), "rules")]
 
     roomy = results()
     monkeypatch.setattr(group, "PAIRS", 1)

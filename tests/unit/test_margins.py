@@ -20,6 +20,9 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
 from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.score import score
+from dubins_traffic.spec.logic.formula import always, eventually, implies, negation, prop
+from dubins_traffic.spec.logic.robustness import robustness
+from dubins_traffic.spec.propositions import LEFT, ON_ROAD, OVERTAKING
 from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
 from tests.recordings import blocks
 from tests.rules_scripts import Frame, label, on_lane
@@ -67,6 +70,34 @@ def test_of_one_that_comes_back(frames: int, margin: float) -> None:
     assert found["2.return"] == pytest.approx(-RHO)
     short = margins(case(GRID, 1, left_time=2.0), script)["2.return"]
     assert short == pytest.approx(margin)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_against_the_robustness_of_the_formulas(seed: int) -> None:
+    """Scripts at random: the same numbers as from the formulas of rule 2 over whole signals."""
+    draws = np.random.default_rng(seed)
+    made = case(GRID, 1, left_time=0.7)
+    lane, count = lanes_in(GRID)[0], 90
+    left = np.cumsum(draws.normal(0.0, 0.04, count)) - 0.2
+    script = [[on_lane(GRID, lane, 1.5 + 0.01 * k, float(left[k]))] for k in range(count)]
+    frames = frames_of(script, made.problem.rate)
+    bits = np.where(left + RHO > 0.05, LEFT, 0) | ON_ROAD
+    bits |= np.where(draws.random(count) < 0.3, OVERTAKING, 0)
+    lanes = np.where(draws.random(count) < 0.1, -1, lane)
+    frames = replace(frames, lane=lanes[:, None], bits=bits[:, None].astype(np.uint32))
+    found = of(made, frames, 11)
+    beyond = left + RHO - np.where(bits & LEFT, 0.0, 0.05)
+    signals = {
+        "left": np.where(lanes >= 0, beyond, -np.inf),
+        "overtaking": np.where(bits & OVERTAKING, np.inf, -np.inf),
+    }
+    line, period = prop("left"), made.problem.period
+    for rule, then in (
+        ("2.left", prop("overtaking")),
+        ("2.return", eventually(negation(line), (0.0, 0.7))),
+    ):
+        value = float(robustness(always(implies(line, then)), signals, period)[0])
+        assert found[rule] == pytest.approx(value, abs=1e-12), rule
 
 
 def test_of_what_is_near() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -32,13 +33,13 @@ from dubins_traffic.driving.law_tables import (
     build_of,
     desk,
 )
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import Instance, Problem
 
 
 class Lawful:
@@ -79,9 +80,10 @@ def pack_drivers(
     rounds
         What `driving.rounds.stages` returns for each trial whose ego keeps the rules; by default no ego does.
     """
-    trials = len(instances)
-    whole, real = blank(cars)
-    ints, floats = np.repeat(whole[None], trials, axis=0), np.repeat(real[None], trials, axis=0)
+    fleets, whose = distinct([(id(own.e_agents), id(own.problem.car)) for own in instances])
+    rows = [_fleet(instances[b], cars) for b in fleets]
+    ints = np.stack([own.ints for own in rows])[whose]
+    floats = np.stack([own.floats for own in rows])[whose]
     stage: list[int] = []
     for b, (own, _) in enumerate(rounds):
         if len(own):
@@ -94,12 +96,9 @@ def pack_drivers(
     for own, far in rounds:
         distance[done : done + len(own), : far.shape[1]] = far
         done += len(own)
-    defaults = {kind: parameters_of(kind, {}) for kind in KEEP_RULES}
-    for b, instance in enumerate(instances):
-        for n, agent in enumerate(instance.e_agents, start=1):
-            if agent.kind in KEEP_RULES:
-                given = {**defaults[agent.kind], **agent.parameters}
-                _describe(instance, agent.kind, given, ints[b, n], floats[b, n], stage)
+    numbers: list[int] = whose.tolist()
+    for b, (instance, number) in enumerate(zip(instances, numbers, strict=True)):
+        _add_stages(instance.problem, rows[number], ints[b], stage)
     return Drivers(
         active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
         net=net,
@@ -113,20 +112,50 @@ def pack_drivers(
     )
 
 
-def _describe(
-    instance: Instance, kind: str, given: Mapping[str, Any], ints: Ints, floats: Floats, stage: list[int]
-) -> None:
-    """Fill the rows of a car, and put its loop or the goals it may park at into `stage`."""
-    problem = instance.problem
-    floats[SPEED] = min(given["speed"], problem.car.bounds.speed)
+class _Fleet(NamedTuple):
+    """The cars of a trial that keep the rules: their rows, which of them go to goals, and the cycles of the others."""
+
+    ints: Ints
+    floats: Floats
+    goers: list[int]
+    loops: list[tuple[int, Sequence[Sequence[int]]]]
+
+
+def _fleet(instance: Instance, cars: int) -> _Fleet:
+    own = _Fleet(*blank(cars), [], [])
+    for n, agent in enumerate(instance.e_agents, start=1):
+        if agent.kind in KEEP_RULES:
+            given = {**_defaults(agent.kind), **agent.parameters}
+            _describe(agent.kind, given, instance.problem.car.bounds.speed, own.ints[n], own.floats[n])
+            if own.ints[n, KIND] == LOOP:
+                own.loops.append((n, given["cycle"]))
+            else:
+                own.goers.append(n)
+    return own
+
+
+@cache
+def _defaults(kind: str) -> Mapping[str, Any]:
+    return parameters_of(kind, {})
+
+
+def _describe(kind: str, given: Mapping[str, Any], fastest: float, ints: Ints, floats: Floats) -> None:
+    """Fill the rows of a car but for its stages."""
+    floats[SPEED] = min(given["speed"], fastest)
     ints[KIND] = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
-    ints[FIRST] = len(stage)
-    stage += (
-        cycle_lanes(problem.network, given["cycle"])
-        if ints[KIND] == LOOP
-        else dict.fromkeys(problem.goal_vertices)
-    )
-    ints[LAST] = len(stage)
     if kind == "lawful":
         shares = ("rolls", "left", "blocks", "tailgates", "parks", "parks_for")
         floats[[ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME]] = [given[name] for name in shares]
+
+
+def _add_stages(problem: Problem, own: _Fleet, ints: Ints, stage: list[int]) -> None:
+    """Put the goals of a trial, at which cars may park, and the lanes of its loops into `stage`."""
+    if own.goers:
+        first = len(stage)
+        stage += dict.fromkeys(problem.goal_vertices)
+        ints[own.goers, FIRST] = first
+        ints[own.goers, LAST] = len(stage)
+    for n, cycle in own.loops:
+        ints[n, FIRST] = len(stage)
+        stage += cycle_lanes(problem.network, cycle)
+        ints[n, LAST] = len(stage)

@@ -18,6 +18,7 @@ from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.protocols import Controller, End, Reports
 from dubins_traffic.record.sink import SHIELD
+from dubins_traffic.record.wall import summary
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import checked_command
 from dubins_traffic.trial.run import close
@@ -79,7 +80,8 @@ class _Seats:
         self._views = [self._of_trial(b) for b in range(len(instances))]
         self._drivers: list[Controller] = []
         self._answer: object = None
-        self._begin: list[float | None] = [None] * len(instances)
+        self._begin: dict[int, float | None] = {}
+        self._latencies: list[list[float]] = [[] for _ in instances]
         self._told = np.zeros(len(instances), dtype=bool)
         self._reports: list[Callable[[], Sequence[tuple[str, str]]] | None] = []
         self._interventions = [0] * len(instances)
@@ -103,8 +105,13 @@ class _Seats:
             tick = int(group.ticks[b])
             seen = self._senses[b].observe(tick, *self._views[b])
             driver = self._drivers[b]
-            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)) or not self._listen(b):
+            started = perf_counter()
+            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)):
                 continue
+            elapsed = perf_counter() - started
+            if not self._listen(b):
+                continue
+            self._latencies[b].append(elapsed)
             if self._answer is None:
                 group.end(b, End.GAVE_UP, f"the controller gave up at tick {tick}")
                 continue
@@ -161,14 +168,17 @@ class _Seats:
     def step(self, controller: str) -> Iterator[Outcome]:
         """Take all trials to their next frame; yield what came of those that have ended."""
         self.group.advance()
-        for b in np.flatnonzero(~self._told & [ending is not None for ending in self.group.endings]).tolist():
+        ended: list[int] = np.flatnonzero(
+            ~self._told & [ending is not None for ending in self.group.endings]
+        ).tolist()
+        for b in ended:
             self._told[b] = True
             ending = self.group.endings[b]
             if self._drivers and ending is not None:
                 self.group.endings[b] = close(self._drivers[b], ending)
-            outcome = self.group.outcome(b, controller, self._begin[b])
+        for b, outcome in zip(ended, self.group.outcomes(ended, controller, self._begin), strict=True):
             score = replace(outcome.score, interventions=self._interventions[b])
-            yield replace(outcome, score=score)
+            yield replace(outcome, score=score, act_s=summary(self._latencies[b]))
 
     def _of_trial(self, b: int) -> tuple[State, Labels]:
         """Return the state and labels of trial b alone; they follow those of the group."""
@@ -188,8 +198,16 @@ class _Seats:
         return True
 
 
-def ask(instances: Iterable[Instance], make: Maker, controller: str, batch: int) -> Iterator[Outcome]:
+def ask(
+    instances: Iterable[Instance],
+    make: Maker,
+    controller: str,
+    batch: int,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Iterator[Outcome]:
     """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
+
+    When `cancelled`, which is asked in every tick, it raises KeyboardInterrupt.
 
     Parameters
     ----------
@@ -207,6 +225,8 @@ def ask(instances: Iterable[Instance], make: Maker, controller: str, batch: int)
     waiting = iter(instances)
     seats: list[_Seats] = []
     while True:
+        if cancelled():
+            raise KeyboardInterrupt
         free = batch - sum(len(own.group.active) for own in seats)
         taken = list(islice(waiting, free)) if 8 * free >= batch else []
         for own in grouped(taken):

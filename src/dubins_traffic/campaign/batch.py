@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 COMPILED = "rules"
 """The controller that is compiled: no Python runs between two ticks of its trials."""
+ASKED = 16
+"""So many trials of a campaign's chunk run at a time where a controller is asked in every tick."""
 KEEP = "none, all, failures or sample:K"
 Progress = Callable[[int], object]
 
@@ -97,6 +99,35 @@ def run_batch(
     InputError
         If anything of this is wrong, or an instance can't be drawn.
     """
+    found: list[Outcome] = []
+    for outcome in run_each(
+        configuration, controller, trials=trials, first=first, seed=seed, batch=batch, threads=threads, keep=keep,
+        records=records,
+    ):  # fmt: skip
+        found.append(outcome)
+        if progress is not None:
+            progress(len(found))
+    return in_order(found)
+
+
+def in_order(found: Iterable[Outcome]) -> Batch:
+    """Return what came of some trials as a batch."""
+    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
+
+
+def run_each(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    *,
+    trials: int | None = None,
+    first: int = 0,
+    seed: int = 0,
+    batch: int = 64,
+    threads: int = 1,
+    keep: str = "none",
+    records: str | os.PathLike[str] | None = None,
+) -> Iterator[Outcome]:
+    """Do as `run_batch`, and yield what came of each trial as it ends; nothing is kept of it here."""
     if not isinstance(configuration, Configuration):
         configuration = load_config(configuration)
     count = configuration.number_trials if trials is None else trials
@@ -105,15 +136,11 @@ def run_batch(
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = _kept(keep, count), _folder(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
-    found: list[Outcome] = []
     for outcome in outcomes(instances, controller, batch=batch, threads=threads):
         if folder is None or not kept(outcome.instance.trial - first, outcome):
-            found.append(outcome)
+            yield outcome
         else:
-            found.append(_recorded(outcome, controller, folder))
-        if progress is not None:
-            progress(len(found))
-    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
+            yield _recorded(outcome, controller, folder)
 
 
 def outcomes(
@@ -137,7 +164,7 @@ def outcomes(
         try:
             while True:
                 while len(waiting) <= threads and (taken := list(islice(source, batch))):
-                    waiting.append(pool.submit(_compiled, taken, cancelled))
+                    waiting.append(pool.submit(_compiled_or_alone, taken, cancelled))
                 if not waiting:
                     return
                 yield from waiting.popleft().result()
@@ -145,23 +172,59 @@ def outcomes(
             cancelled.set()
 
 
-def _compiled(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
+def run_together(
+    instances: Sequence[Instance], controller: str, cancelled: Callable[[], bool]
+) -> Iterator[Outcome]:
+    """Run the trials of those instances that can be stepped together, and yield what came of each.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When `cancelled`, which is asked every now and then.
+    """
+    fit = _fitness()
+    able = [own for own in instances if _can_share(own) and (controller != COMPILED or fit(own))]
+    if controller == COMPILED:
+        yield from _compiled(able, cancelled)
+    else:
+        yield from ask(able, partial(controllers.load, controller), controller, ASKED, cancelled)
+    if cancelled():
+        raise KeyboardInterrupt
+
+
+def _compiled_or_alone(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
     """Run the trials of instances whose egos keep the rules."""
-    found: list[Outcome] = []
-    together: list[Instance] = []
-    asked: list[Instance] = []
-    for instance in instances:
-        if not _can_share(instance) or not _is_fit(instance):
-            found.append(_alone(instance, COMPILED))
-        else:
-            (together if _undisturbed(instance) else asked).append(instance)
-    for own in grouped(together):
+    fit = _fitness()
+    able = [_can_share(instance) and fit(instance) for instance in instances]
+    alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
+    together = [own for own, shares in zip(instances, able, strict=True) if shares]
+    return [*(_alone(own, COMPILED) for own in alone), *_compiled(together, cancelled.is_set)]
+
+
+def _compiled(instances: Sequence[Instance], cancelled: Callable[[], bool]) -> Iterator[Outcome]:
+    for own in grouped([instance for instance in instances if _undisturbed(instance)]):
         group = Group(own, keeps_rules=True)
-        group.finish(cancelled.is_set)
-        if not cancelled.is_set():
-            found += [group.outcome(b, COMPILED) for b in range(len(own))]
-    make = partial(controllers.load, COMPILED)
-    return found + list(ask(asked, make, COMPILED, max(1, len(asked))))
+        group.finish(cancelled)
+        if not cancelled():
+            yield from group.outcomes(range(len(own)), COMPILED)
+    asked = [instance for instance in instances if not _undisturbed(instance)]
+    if asked:
+        yield from ask(asked, partial(controllers.load, COMPILED), COMPILED, len(asked), cancelled)
+
+
+def _fitness() -> Callable[[Instance], bool]:
+    """Return a function that does as `_is_fit`, and looks at trials that are alike in this once."""
+    known: dict[tuple[float, ...], bool] = {}
+
+    def fit(instance: Instance) -> bool:
+        problem = instance.problem
+        own = problem.network, problem.rules, problem.car, instance.e_agents
+        key = *map(id, own), problem.intersection_radius
+        if key not in known:
+            known[key] = _is_fit(instance)
+        return known[key]
+
+    return fit
 
 
 def _apart(

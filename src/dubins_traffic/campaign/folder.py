@@ -92,6 +92,11 @@ def parts(folder: Path) -> list[tuple[int, int, Path]]:
     return [(int(match[1]), int(match[2]) + 1, path) for match, path in matches if match]
 
 
+def kept(folder: Path) -> int:
+    """Return how many trials of an unfinished campaign have their rows in its folder."""
+    return sum(end - first for first, end, _ in parts(folder))
+
+
 def remaining(chunks: Iterable[Chunk], done: list[tuple[int, int]]) -> Iterator[Chunk]:
     """Return what is left of `chunks` (in order) beside the trials that are done (in order, not overlapping)."""
     k = 0

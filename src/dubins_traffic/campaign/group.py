@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,17 +33,21 @@ from dubins_traffic.cars.state import EGO, Contact, Labels, State
 from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
 from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
 from dubins_traffic.driving.rounds import nearest_stage, stages
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending
-from dubins_traffic.scoring.outcome import score_of
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.scoring.margins_kernel import margin_table
+from dubins_traffic.scoring.outcome import Tallied
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
 from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
 from dubins_traffic.spec.docket import OF_TRIAL, Docket
 from dubins_traffic.spec.fault import with_fault_by
 from dubins_traffic.spec.judge import Breach, breach_of, running, terms_of
+from dubins_traffic.spec.judged import kinds_of
 from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.tables import NET
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 
@@ -58,11 +62,12 @@ WORK = 500_000
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a trial of a group."""
+    """What came of a trial of a group; `act_s` sums up the latencies of its controller's `act`, where there is one."""
 
     instance: Instance
     ending: Ending
     score: Score
+    act_s: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
 
 
 class Group:
@@ -108,6 +113,12 @@ class Group:
             pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
             new_tally(instances, net, places), self._course(len(work.contact), len(docket.row)),
         )  # fmt: skip
+        kinds, index = kinds_of(problems)
+        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+        frames = self._world.tally.pose.shape[1]
+        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
+        numbers: list[int] = index.tolist()
+        self._rules = [rules[k] for k in numbers]
         self.labels: Labels = labeller.labels
         self.commands: Floats = np.zeros((trials, places, 2))
         self.endings: list[Ending | None] = [None] * trials
@@ -143,24 +154,34 @@ class Group:
         self.endings[b] = Ending(end, int(self.ticks[b]), detail)
         self._going[b] = False
 
-    def outcome(self, b: int, controller: str, time_to_begin: float | None = None) -> Outcome:
-        """Return what came of trial b, which has ended."""
-        instance, ending, world = self.instances[b], self.endings[b], self._world
-        assert ending is not None
-        hanging = running(b, world.terms, world.docket)
-        score = score_of(
-            instance, b, world.tally, self._contacts[b], self._breaches[b], hanging, ending, controller,
-            time_to_begin,
-        )  # fmt: skip
-        return Outcome(instance, ending, score)
+    def outcomes(
+        self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
+    ) -> list[Outcome]:
+        """Return what came of some trials, which have ended; `begin` tells their times to begin, where measured."""
+        if not trials:
+            return []
+        world, begin, name = self._world, begin or {}, bare_name(controller)
+        rows = np.array(trials, dtype=np.int64)
+        endings = [ending for b in trials if (ending := self.endings[b]) is not None]
+        frames = np.array([ending.ticks + 1 for ending in endings])
+        tallied = Tallied(rows, frames, world.tally, self._margins, world.roads, world.cars)
+        found: list[Outcome] = []
+        for b, ending, hanging in zip(trials, endings, running(rows, world.terms, world.docket), strict=True):
+            score = tallied.score(
+                self.instances[b], b, self._contacts[b], self._breaches[b], hanging, ending, self._rules[b],
+                name, begin.get(b),
+            )  # fmt: skip
+            found.append(Outcome(self.instances[b], ending, score))
+        return found
 
     def _course(self, contacts: int, breaches: int) -> Course:
         ints = np.zeros((len(self.instances), COURSE), dtype=np.int64)
         ints[:, TICK] = -1
-        for b, instance in enumerate(self.instances):
-            kinds = {agent.kind for agent in instance.e_agents}
-            others = not kinds <= KEEP_RULES | {REMOTE}
-            ints[b, [LAST, OTHERS, ENDS]] = max(1, instance.ticks), others, instance.end_on_collision
+        ints[:, LAST] = [max(1, instance.ticks) for instance in self.instances]
+        ints[:, ENDS] = [instance.end_on_collision for instance in self.instances]
+        fleets, whose = distinct([id(instance.e_agents) for instance in self.instances])
+        kinds = [{agent.kind for agent in self.instances[b].e_agents} for b in fleets]
+        ints[:, OTHERS] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         radii = np.array([instance.problem.sensing_radius for instance in self.instances])
         places = np.zeros((breaches, 2))
         return Course(ints, radii * radii, np.zeros((contacts, 3), dtype=np.int64), places)

@@ -8,9 +8,8 @@ from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.record.wall import Wall
+from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, assumption_of
 
@@ -108,27 +107,23 @@ SCORES: Mapping[str, tuple[str, Callable[[Score], Any]]] = {
 }
 """What is kept of a score: column, its type in Arrow, and its value; null where a score has none."""
 
-WALL: Mapping[str, Callable[[Wall], float | None]] = {
-    "time_to_begin_s": lambda wall: wall.time_to_begin_s,
-    "act_mean_s": lambda wall: wall.act_s.get("mean"),
-    "act_p99_s": lambda wall: wall.act_s.get("p99"),
-    "act_max_s": lambda wall: wall.act_s.get("max"),
-}
+_ACTS = {"act_mean_s": "mean", "act_p99_s": "p99", "act_max_s": "max"}
+WALL = ("time_to_begin_s", *_ACTS)
 """What was measured on a wall clock, kept in a table of its own."""
 
 RESULT = ("number", "end", "reason", *SCORES)
 """Columns of the table of results that come from running a trial."""
 
 
-def row(number: int, result: Result) -> Row:
-    """Return the row of a trial that was run and scored."""
-    ending = result.ending
+def row(number: int, ending: Ending, score: Score, act_s: Mapping[str, float]) -> Row:
+    """Return the row of a trial that was run and scored, and of which `act_s` sums up the latencies of `act`."""
     return {
         "number": number,
         "end": ending.end.value,
         "reason": ending.detail[:LONGEST_REASON] or None,
-        **{name: value(result.score) for name, (_, value) in SCORES.items()},
-        **{name: value(result.wall) for name, value in WALL.items()},
+        **{name: value(score) for name, (_, value) in SCORES.items()},
+        "time_to_begin_s": score.time_to_begin_s,
+        **{name: act_s.get(figure) for name, figure in _ACTS.items()},
     }
 
 

@@ -61,12 +61,10 @@ def rows(cars: CarTable, n: int, dt: float) -> Rows:
 
 
 def _alike(columns: Floats) -> Ints:
-    trials = columns.shape[1]
-    alike = np.ones(trials, dtype=np.int64)
-    for b in range(trials - 2, -1, -1):
-        if (columns[:, b] == columns[:, b + 1]).all():
-            alike[b] = min(alike[b + 1] + 1, RUN)
-    return alike
+    alike = [1]
+    for same in reversed((columns[:, :-1] == columns[:, 1:]).all(axis=0).tolist()):
+        alike.append(min(alike[-1] + 1, RUN) if same else 1)
+    return np.array(alike[::-1], dtype=np.int64)
 
 
 @jit

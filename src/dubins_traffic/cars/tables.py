@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.body import Car, Disc, DiscObstacle, Obstacle
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 
 
 class CarTable(NamedTuple):
@@ -44,12 +44,16 @@ class ObstacleTable(NamedTuple):
 
 def pack_cars(cars: Sequence[Car]) -> CarTable:
     """Return the table of one car per trial."""
-    rows = [_car_row(car) for car in cars]
-    return CarTable(*(np.array(column, dtype=np.float64) for column in zip(*rows, strict=True)))
+    first, index = distinct([id(car) for car in cars])
+    rows = np.array([_car_row(cars[k]) for k in first], dtype=np.float64)
+    return CarTable(*np.ascontiguousarray(rows[index].T))
 
 
 def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     """Return the table of one sequence of obstacles per trial."""
+    if not any(obstacles):
+        nothing = np.zeros(len(obstacles) + 1, dtype=np.int64)
+        return ObstacleTable(nothing, np.zeros((0, 8)), np.zeros(0, dtype=np.int64))
     off = [0]
     parts: list[tuple[float, ...]] = []
     owners: list[int] = []

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.progress import progress
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.group import Outcome
 
 EXAMPLES = options.examples(
     "batch town --trials 1000",
@@ -52,8 +55,11 @@ def batch(
     shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
-    """Run many trials together and score them: the same scores as of [b]run[/b], much sooner."""
-    from dubins_traffic.campaign.batch import run_batch
+    """Run many trials together and score them: the same scores as of [b]run[/b], much sooner.
+
+    Ctrl-C keeps the scores of all finished trials.
+    """
+    from dubins_traffic.campaign.batch import in_order, run_each
     from dubins_traffic.cli.tables import show
     from dubins_traffic.controllers.registry import shielded
     from dubins_traffic.problem.configuration import load_config
@@ -61,20 +67,29 @@ def batch(
 
     drawn = load_config(configuration)
     count = drawn.number_trials if trials is None else trials
-    with progress(count) as tell:
-        done = run_batch(
-            drawn,
-            shielded(controller) if shield else controller,
-            trials=trials,
-            seed=seed,
-            batch=together,
-            threads=threads,
-            keep=keep,
-            records=records,
-            progress=lambda done: tell(done, count),
-        )
-    show(done.sheet, json=json)
-    failed = [outcome for outcome in done.outcomes if outcome.ending.end in FAULTS]
+    done: list[Outcome] = []
+    each = run_each(
+        drawn,
+        shielded(controller) if shield else controller,
+        trials=trials,
+        seed=seed,
+        batch=together,
+        threads=threads,
+        keep=keep,
+        records=records,
+    )
+    try:
+        with progress(count) as tell:
+            for outcome in each:
+                done.append(outcome)
+                tell(len(done), count)
+    except KeyboardInterrupt:
+        faults.tell(f"interrupted after {len(done)} of {count} trials")
+        raise
+    finally:
+        if done:
+            show(in_order(done).sheet, json=json)
+    failed = [outcome for outcome in in_order(done).outcomes if outcome.ending.end in FAULTS]
     for outcome in failed:
         faults.tell(f"trial {outcome.instance.trial}: {outcome.ending.end}: {outcome.ending.detail}")
     if failed:

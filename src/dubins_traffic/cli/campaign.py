@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -66,14 +67,15 @@ def run(
 ) -> None:
     """Run a campaign, or what is left of it. Whatever ends it, finished trials are kept."""
     from dubins_traffic.campaign.conduct import run_campaign
+    from dubins_traffic.campaign.folder import kept
     from dubins_traffic.cli.progress import progress
 
-    come = (0, 0)
+    total = 0
 
-    def tell(done: int, total: int) -> None:
-        nonlocal come
-        come = (done, total)
-        show(done, total)
+    def tell(done: int, count: int) -> None:
+        nonlocal total
+        total = count
+        show(done, count)
 
     try:
         with progress() as show:
@@ -82,7 +84,7 @@ def run(
             )
     except (KeyboardInterrupt, ClusterLostError) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-        faults.tell(f"{why}; {come[0]} of {come[1]} trials are kept, --resume goes on")
+        faults.tell(f"{why}; {kept(Path(folder))} of {total} trials are kept, --resume goes on")
         raise typer.Exit(faults.FAILED) from None
     _conclude(ran)
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.spec.judged import kinds_of
 from dubins_traffic.spec.parameters import RuleParameters
 
 if TYPE_CHECKING:
@@ -120,6 +121,11 @@ def through_speed(problem: Problem) -> float:
 
 def build_of(problems: Sequence[Problem]) -> Floats:
     """Return `Drivers.build`."""
+    kinds, index = kinds_of(problems)
+    return _build_of(kinds)[index]
+
+
+def _build_of(problems: Sequence[Problem]) -> Floats:
     cars = pack_cars([problem.car for problem in problems])
     rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
     columns = (
@@ -142,4 +148,4 @@ def build_of(problems: Sequence[Problem]) -> Floats:
         np.array([own.overtaking_ahead for own in rules]),
         np.array([own.blocked_gap for own in rules]) + 2.0 * (cars.half_width + cars.rounding),
     )
-    return np.ascontiguousarray(np.stack([column.astype(np.float64) for column in columns], axis=1))
+    return np.stack([column.astype(np.float64) for column in columns], axis=1)

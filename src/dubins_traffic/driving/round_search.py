@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,7 @@ def room(goals: int, lanes: int) -> Search:
 
 
 @jit
-def metres_to(target: int, g: LaneTables, far: Floats, queue: Ints, waits: Ints) -> None:
+def metres_to(target: Any, g: LaneTables, far: Floats, queue: Ints, waits: Ints) -> None:
     """Write the metres from the end of each lane to the end of the lane `target` into `far` (L,)."""
     lanes = far.shape[0]
     for lane in range(lanes):
@@ -130,7 +130,7 @@ def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]
 
 
 @jit
-def _arms(goals: Ints, g: LaneTables, k: int) -> int:
+def _arms(goals: Ints, g: LaneTables, k: Any) -> Any:
     return g.into_off[goals[k] + 1] - g.into_off[goals[k]]
 
 
@@ -149,7 +149,7 @@ def _fill_legs(goals: Ints, g: LaneTables, own: Search) -> None:
 
 
 @jit
-def _step(lane: int, g: LaneTables, far: Floats) -> tuple[int, float]:
+def _step(lane: Any, g: LaneTables, far: Floats) -> tuple[Any, Any]:
     """Return the next lane toward the target of `far`, and the metres to it by way of that lane (or -1, inf)."""
     best = -1
     least = INFINITE
@@ -162,7 +162,7 @@ def _step(lane: int, g: LaneTables, far: Floats) -> tuple[int, float]:
 
 
 @jit
-def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> int:
+def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> Any:
     """Write the metres once round, in an order, from each lane into its first goal to each into `own.total`."""
     count = goals.shape[0]
     head = _arms(goals, g, order[0])

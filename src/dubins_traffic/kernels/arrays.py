@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -10,3 +11,14 @@ import numpy.typing as npt
 Floats: TypeAlias = npt.NDArray[np.float64]
 Ints: TypeAlias = npt.NDArray[np.int64]
 Bits: TypeAlias = npt.NDArray[np.uint32]
+
+
+def distinct(keys: Sequence[Hashable]) -> tuple[list[int], Ints]:
+    """Return where each distinct key stands first, and the number of each key among these, (B,).
+
+    What many trials of a batch have in common is worked out once, and spread with the second array.
+    """
+    numbers: dict[Hashable, int] = {}
+    index = [numbers.setdefault(key, len(numbers)) for key in keys]
+    first = [index.index(number) for number in range(len(numbers))] if len(numbers) < len(index) else index
+    return first, np.array(index, dtype=np.int64)

@@ -77,7 +77,7 @@ class Problem:
     @property
     def goal_vertices(self) -> tuple[int, ...]:
         """Numbers of the goals' intersections."""
-        return tuple(self.network.vertex(goal) for goal in self.goals)
+        return self.network.vertices(self.goals)
 
     @property
     def period(self) -> float:

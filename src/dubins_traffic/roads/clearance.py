@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -88,7 +88,9 @@ def clearance_faults(
     if radius < LEAST_RADIUS * w - ROUNDING:
         expected = f"at least {LEAST_RADIUS} w = {LEAST_RADIUS * w:.6g} m"
         faults.append(InputError("too small", field="intersection_radius", value=radius, expected=expected))
-    found = tight(points, ends, least)
+    if least not in network.known:
+        network.known[least] = tight(points, ends, least)
+    found = cast(Tight, network.known[least])
     for s in found.short.tolist():
         faults.append(_fault("too short", s, float(network.lengths[s]), least.length))
     for v, other in _couples(found.close):

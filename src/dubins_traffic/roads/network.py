@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -160,6 +160,11 @@ class RoadNetwork:
             expected = "the lattice point [x, y] of an intersection"
             raise InputError("not an intersection of the network", value=list(point), expected=expected)
         return number
+
+    def vertices(self, points: Sequence[tuple[int, int]]) -> tuple[int, ...]:
+        """Return the numbers of the intersections at lattice points; InputError if there is none at one of them."""
+        numbers = self._numbers
+        return tuple([numbers[point] if point in numbers else self.vertex(point) for point in points])
 
     @cached_property
     def points(self) -> Floats:

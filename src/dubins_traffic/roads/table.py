@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -92,27 +92,45 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     if not networks or len(networks) != len(half_widths):
         expected = "one half width for each of at least one network"
         raise InputError("can't pack networks", value=(len(networks), len(half_widths)), expected=expected)
-    paving = [pave(network.surface, width) for network, width in zip(networks, half_widths, strict=True)]
-    cells = [network.surface.cells for network in networks]
-    return RoadTable(
-        half_width=np.array(half_widths, dtype=np.float64),
-        seg_off=_offsets([len(network.segments) for network in networks]),
-        seg=np.concatenate([_segments(network) for network in networks]),
-        ends=np.concatenate([network.ends for network in networks]),
-        vert_off=_offsets([len(network.points) for network in networks]),
-        vert=np.concatenate([network.points for network in networks]),
-        arms=np.concatenate([_arms(network) for network in networks]),
-        degree=np.concatenate([network.degrees for network in networks]),
-        cell_box=np.array([[own.x0, own.y0, own.scale] for own in cells], dtype=np.float64),
-        cell_dim=_dimensions([(own.nx, own.ny) for own in cells]),
-        seg_start=_starts([own.seg_start for own in cells]),
-        seg_item=np.concatenate([own.seg_item for own in cells]),
-        vert_start=_starts([own.vert_start for own in cells]),
-        vert_item=np.concatenate([own.vert_item for own in cells]),
-        pave_scale=np.array([own.scale for own in paving], dtype=np.float64),
-        pave_dim=_dimensions([(own.nx, own.ny) for own in paving]),
-        pave=np.concatenate([own.pave for own in paving]),
+    tables = [_table(network, width) for network, width in zip(networks, half_widths, strict=True)]
+    if len(tables) == 1:
+        return tables[0]
+    joined = RoadTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
+    return joined._replace(
+        seg_off=_offsets([len(table.seg) for table in tables]),
+        vert_off=_offsets([len(table.vert) for table in tables]),
+        cell_dim=_dimensions(joined.cell_dim),
+        seg_start=_starts([table.seg_start for table in tables]),
+        vert_start=_starts([table.vert_start for table in tables]),
+        pave_dim=_dimensions(joined.pave_dim),
     )
+
+
+def _table(network: RoadNetwork, half_width: float) -> RoadTable:
+    """Return the table of one network (kept for next time, never to be written to)."""
+    key = RoadTable, half_width
+    if key not in network.known:
+        paving, cells = pave(network.surface, half_width), network.surface.cells
+        network.known[key] = RoadTable(
+            half_width=np.array([half_width], dtype=np.float64),
+            seg_off=_offsets([len(network.segments)]),
+            seg=_segments(network),
+            ends=network.ends.copy(),
+            vert_off=_offsets([len(network.points)]),
+            vert=network.points.copy(),
+            arms=_arms(network),
+            degree=network.degrees.copy(),
+            cell_box=np.array([[cells.x0, cells.y0, cells.scale]], dtype=np.float64),
+            cell_dim=np.array([[cells.nx, cells.ny, 0]], dtype=np.int64),
+            seg_start=cells.seg_start,
+            seg_item=cells.seg_item,
+            vert_start=cells.vert_start,
+            vert_item=cells.vert_item,
+            pave_scale=np.array([paving.scale], dtype=np.float64),
+            pave_dim=np.array([[paving.nx, paving.ny, 0]], dtype=np.int64),
+            pave=paving.pave,
+        )
+    return cast(RoadTable, network.known[key])
 
 
 def _segments(network: RoadNetwork) -> Floats:
@@ -128,14 +146,13 @@ def _arms(network: RoadNetwork) -> Ints:
     return rows
 
 
-def _offsets(counts: Sequence[int]) -> Ints:
+def _offsets(counts: Sequence[int] | Ints) -> Ints:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
-def _dimensions(sizes: Sequence[tuple[int, int]]) -> Ints:
-    size = np.array(sizes, dtype=np.int64)
-    first = _offsets([nx * ny for nx, ny in sizes])[:-1]
-    return np.concatenate([size, first[:, None]], axis=1)
+def _dimensions(sizes: Ints) -> Ints:
+    """Return columns and rows of cells with the number of the first."""
+    return np.concatenate([sizes[:, :2], _offsets(sizes[:, 0] * sizes[:, 1])[:-1, None]], axis=1)
 
 
 def _starts(starts: Sequence[npt.NDArray[np.int64]]) -> Ints:

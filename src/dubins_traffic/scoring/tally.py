@@ -10,10 +10,11 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
+from dubins_traffic.spec.judged import kinds_of
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.propositions import LEFT, ON_ROAD
 
@@ -75,14 +76,19 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     counts = np.zeros((trials, cars), dtype=np.int64)
     offsets = np.zeros(trials, dtype=np.int64)
     goals: list[int] = []
+    kinds, index = kinds_of([instance.problem for instance in instances])
+    rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+    sizes = [
+        (own.still_speed / kind.rate, kind.intersection_radius, kind.sensing_radius * kind.sensing_radius)
+        for own, kind in zip(rules, kinds, strict=True)
+    ]
+    floats[:, [STILL, RADIUS, SIGHT2]] = np.array(sizes)[index]
+    fleets, whose = distinct([id(instance.e_agents) for instance in instances])
+    for number, b in enumerate(fleets):
+        names: list[bool] = [agent.name.startswith("agent") for agent in instances[b].e_agents]
+        counts[whose == number, 1 : 1 + len(names)] = names
     for b, instance in enumerate(instances):
-        problem = instance.problem
-        still = RuleParameters.from_mapping(problem.rules).still_speed / problem.rate
-        sight2 = problem.sensing_radius * problem.sensing_radius
-        floats[b, [STILL, RADIUS, SIGHT2]] = still, problem.intersection_radius, sight2
-        for n, agent in enumerate(instance.e_agents, start=1):
-            counts[b, n] = agent.name.startswith("agent")
-        own = dict.fromkeys(problem.goal_vertices)
+        own = dict.fromkeys(instance.problem.goal_vertices)
         offsets[b] = len(goals)
         ints[b, GOALS] = len(own)
         goals += own

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 EGO_RULES = ("1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear")
 """The rules of the ego that a finite run can break."""
 ASSUMPTIONS = ("E1", "E2", "E3", "E4", "E5", "E6")
+_SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
 
 class Ruling(StrEnum):
@@ -264,7 +265,7 @@ def reach_verdict(
     rate = instance.problem.rate
     violations = tuple(_violation(instance, breach) for breach in breaches)
     own = [breach for breach in breaches if breach.car == EGO]
-    fall = first_fall(breaches, rules, rate)
+    fall = first_fall(breaches, rules, rate) if breaches else None
     gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
     limit = rules.gap_rounds * round_time(instance.problem)
     excuse = None
@@ -317,11 +318,10 @@ def _formulas(
     for goal, there in zip(visits.goals, at_goal, strict=True):
         found[f"1.goal {goal.goal[0]} {goal.goal[1]}"] = _status(False, not there)
     pending = {assumption_of(rule) for rule in running.others}
+    others = [breach for breach in breaches if breach.car != EGO]
     for assumption in assumed(rules):
-        of_it = [
-            breach for breach in breaches if breach.car != EGO and assumption_of(breach.rule) == assumption
-        ]
-        fell = first_fall(of_it, rules, rate) is not None
+        of_it = [breach for breach in others if assumption_of(breach.rule) == assumption]
+        fell = bool(of_it) and first_fall(of_it, rules, rate) is not None
         found[assumption] = _status(fell, assumption in pending)
     return found
 
@@ -333,7 +333,7 @@ def assumption_of(rule: str) -> str:
 
 def assumed(rules: RuleParameters) -> tuple[str, ...]:
     """Return the parts of the assumption that a problem makes."""
-    return tuple(name for name in ASSUMPTIONS if getattr(rules, f"assume_{name.lower()}"))
+    return tuple(name for name, switch in _SWITCHES if getattr(rules, switch))
 
 
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:

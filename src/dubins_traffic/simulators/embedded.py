@@ -43,12 +43,12 @@ class Embedded:
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         counts = [len(instance.starts) for instance in instances]
         state = State.zeros(len(instances), max(counts))
-        for b, instance in enumerate(instances):
-            state.count[b] = counts[b]
-            for n, pose in enumerate(instance.starts):
-                state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n] = pose
-            for n in range(counts[b], max(counts)):
-                state.x[b, n] = ABSENT * (n + 1)
+        state.count[:] = counts
+        state.x[:] = ABSENT * np.arange(1, max(counts) + 1)
+        present = np.arange(max(counts)) < state.count[:, None]
+        starts = np.array([pose for instance in instances for pose in instance.starts])
+        for k, array in enumerate((state.x, state.y, state.c, state.s)):
+            array[present] = starts[:, k]
         self.state = state
         self._work = workspace(len(instances), max(counts))
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)

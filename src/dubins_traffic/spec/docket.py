@@ -157,10 +157,9 @@ def pack_terms(
     judged: Sequence[bool],
     radii: Sequence[float],
     rates: Sequence[float],
-    goals: Sequence[Sequence[int]],
     cars: CarTable,
-) -> Terms:
-    """Return the terms of each trial.
+) -> tuple[Floats, Ints]:
+    """Return `Terms.real` and `Terms.whole` of each trial.
 
     Parameters
     ----------
@@ -168,14 +167,11 @@ def pack_terms(
         The parameters of the rules, and whether the trial is judged by them.
     radii, rates
         Intersection radius R (m) and control rate (Hz).
-    goals
-        Vertices of the goals.
     cars
         The car of each trial.
     """
     real = np.zeros((len(parameters), REALS))
     whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
-    goal_off, goal = [0], list[int]()
     for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
         reach = radius + own.exit_gap + float(cars.rounding[b])
         far = float(cars.reach[b] - cars.rounding[b])
@@ -191,6 +187,4 @@ def pack_terms(
         whole[b, EXIT_TICKS] = ticks(own.exit_time, rate)
         whole[b, REST_TICKS] = ticks(own.rest_time, rate)
         whole[b, GOAL_TICKS] = ticks(own.goal_time, rate)
-        goal += dict.fromkeys(goals[b]) if judged[b] else ()
-        goal_off.append(len(goal))
-    return Terms(real, whole, np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64))
+    return real, whole

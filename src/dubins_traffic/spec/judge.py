@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.kernels.arrays import Bits
+from dubins_traffic.kernels.arrays import Bits, Ints
 from dubins_traffic.spec.docket import (
     AT_TICK,
     AT_VERTEX,
@@ -34,10 +34,12 @@ from dubins_traffic.spec.docket import (
 )
 from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.judge_kernel import judge_frame, judge_frames
-from dubins_traffic.spec.labeller import Judged, Labeller, Posed
+from dubins_traffic.spec.judged import Judged, Posed, kinds_of
+from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.parameters import RuleParameters
 
 _PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_SINCE), ("E5", REST_SINCE))
+_CLOCKS = [clock for _, clock in _PENDING]
 _ROOMY = 64
 """For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
 
@@ -168,7 +170,7 @@ class Referee:
     @property
     def running(self) -> Sequence[Running]:
         """What hangs over the cars of each trial."""
-        return [running(b, self._terms, self._docket) for b in range(len(self._judged))]
+        return running(np.arange(len(self._judged)), self._terms, self._docket)
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:
@@ -252,24 +254,39 @@ class Referee:
 
 def terms_of(problems: Sequence[WithGoals]) -> Terms:
     """Return the terms by which the trials of some problems are judged."""
-    return pack_terms(
-        [RuleParameters.from_mapping(problem.rules) for problem in problems],
-        [bool(problem.rules) for problem in problems],
-        [problem.intersection_radius for problem in problems],
-        [problem.rate for problem in problems],
-        [problem.goal_vertices if problem.rules else () for problem in problems],
-        pack_cars([problem.car for problem in problems]),
+    kinds, index = kinds_of(problems)
+    real, whole = pack_terms(
+        [RuleParameters.from_mapping(problem.rules) for problem in kinds],
+        [bool(problem.rules) for problem in kinds],
+        [problem.intersection_radius for problem in kinds],
+        [problem.rate for problem in kinds],
+        pack_cars([problem.car for problem in kinds]),
+    )
+    goal_off, goal = [0], list[int]()
+    for problem in problems:
+        goal += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
+        goal_off.append(len(goal))
+    return Terms(
+        real[index], whole[index], np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64)
     )
 
 
-def running(b: int, terms: Terms, docket: Docket) -> Running:
-    """Return what hangs over the cars of trial b."""
-    clock = (docket.clock[b] >= 0).tolist()
-    ego = frozenset(rule for rule, k in _PENDING if clock[EGO][k])
-    others = {rule for rule, k in _PENDING if any(own[k] for own in clock[EGO + 1 :])}
-    if (docket.goal_clock[terms.goal_off[b] : terms.goal_off[b + 1]] >= 0).any():
-        others.add("E6")
-    return Running(ego, frozenset(others))
+def running(trials: Ints, terms: Terms, docket: Docket) -> list[Running]:
+    """Return what hangs over the cars of some trials."""
+    runs = docket.clock[trials][:, :, _CLOCKS] >= 0
+    goal: list[bool] = (docket.goal_clock >= 0).tolist()
+    off: list[int] = terms.goal_off.tolist()
+    taken = [any(goal[off[b] : off[b + 1]]) for b in trials.tolist()]
+    egos: list[list[bool]] = runs[:, EGO].tolist()
+    others: list[list[bool]] = np.logical_or.reduce(runs[:, EGO + 1 :], axis=1).tolist()
+    return [
+        Running(_named(ego), _named(other) | {"E6"} if goal_taken else _named(other))
+        for ego, other, goal_taken in zip(egos, others, taken, strict=True)
+    ]
+
+
+def _named(runs: Sequence[bool]) -> frozenset[str]:
+    return frozenset(rule for (rule, _), run in zip(_PENDING, runs, strict=True) if run)
 
 
 def breach_of(row: Sequence[int], x: float, y: float) -> Breach:

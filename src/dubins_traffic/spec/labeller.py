@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Sequence
 
 import numpy as np
 
-from dubins_traffic.cars.body import Car, Obstacle
-from dubins_traffic.cars.state import NONE, Contact, Labels, Pose, State
+from dubins_traffic.cars.state import NONE, Contact, Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.clearance import clearance_faults
-from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import RoadTable, pack_distinct
 from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.frame import label_frame
+from dubins_traffic.spec.judged import Judged, Posed, kinds_of
 from dubins_traffic.spec.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.propositions import STOPPED
 from dubins_traffic.spec.tables import (
     FORFEITS,
+    JUDGED3,
     LATERAL,
+    NET,
     PROGRESS,
     RANK,
     REACH,
@@ -35,59 +35,6 @@ from dubins_traffic.spec.tables import (
 
 SLACK = 1e-9
 """Metres by which rounding may fall short of a demand on the roads."""
-
-
-class Judged(Protocol):
-    """What the labeller asks of a problem (`problem.instance.Problem`)."""
-
-    @property
-    def network(self) -> RoadNetwork:
-        """The roads."""
-        ...
-
-    @property
-    def intersection_radius(self) -> float:
-        """R, metres."""
-        ...
-
-    @property
-    def car(self) -> Car:
-        """The car that all drive."""
-        ...
-
-    @property
-    def rate(self) -> float:
-        """Control rate, Hz."""
-        ...
-
-    @property
-    def sensing_radius(self) -> float:
-        """Metres."""
-        ...
-
-    @property
-    def obstacles(self) -> Sequence[Obstacle]:
-        """Static obstacles."""
-        ...
-
-    @property
-    def rules(self) -> Mapping[str, Any]:
-        """Parameters by name; empty if not judged."""
-        ...
-
-
-class Posed(Protocol):
-    """What the labeller asks of an instance (`problem.instance.Instance`)."""
-
-    @property
-    def problem(self) -> Judged:
-        """What is judged."""
-        ...
-
-    @property
-    def starts(self) -> Sequence[Pose]:
-        """One pose per car."""
-        ...
 
 
 class Labeller:
@@ -115,16 +62,18 @@ class Labeller:
     def __init__(self, instances: Sequence[Posed]) -> None:
         problems = [instance.problem for instance in instances]
         networks = [problem.network for problem in problems]
-        cars = pack_cars([problem.car for problem in problems])
         self._roads, nets = pack_distinct(networks, [problem.car.lane_width for problem in problems])
-        self._rules = pack_rules(
-            [RuleParameters.from_mapping(problem.rules) for problem in problems],
-            [problem.intersection_radius for problem in problems],
-            [problem.rate for problem in problems],
-            nets.tolist(),
-            _judged3(problems),
-            cars,
+        kinds, index = kinds_of(problems)
+        parameters = [RuleParameters.from_mapping(problem.rules) for problem in kinds]
+        table = pack_rules(
+            parameters,
+            [problem.intersection_radius for problem in kinds],
+            [problem.rate for problem in kinds],
+            pack_cars([problem.car for problem in kinds]),
         )
+        self._rules = RuleTable(table.real[index], table.whole[index])
+        self._rules.whole[:, NET] = nets
+        self._rules.whole[:, JUDGED3] = _judged3(problems, parameters, index)
         obstacles = pack_obstacles([problem.obstacles for problem in problems])
         self._obstacles = place_obstacles(obstacles, self._roads, nets)
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
@@ -206,19 +155,22 @@ class Labeller:
         label_frame(self._tick, *state, *self._arrays)
 
 
-def _judged3(problems: Sequence[Judged]) -> list[bool]:
+def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:
     """Tell of each problem whether it asks for the rules and rule 3 is defined there (RULES, *Ground*)."""
-    known: dict[tuple[int, float, float, float, float], bool] = {}
+    known: dict[tuple[int, int], bool] = {}
     judged: list[bool] = []
-    for problem in problems:
-        if not problem.rules:
-            judged.append(False)
-            continue
-        parameters = RuleParameters.from_mapping(problem.rules)
-        radius, reach = problem.intersection_radius, problem.car.body.reach
-        key = (id(problem.network), radius, reach, problem.car.w, parameters.segment_slack)
+    kinds: list[int] = index.tolist()
+    for problem, kind in zip(problems, kinds, strict=True):
+        key = kind, id(problem.network)
         if key not in known:
-            known[key] = not clearance_faults(problem.network, *key[1:])
-        sees = problem.sensing_radius >= 2.0 * (radius + reach + parameters.sensing_slack) - SLACK
-        judged.append(known[key] and sees)
+            known[key] = bool(problem.rules) and _defined3(problem, parameters[kind])
+        judged.append(known[key])
     return judged
+
+
+def _defined3(problem: Judged, own: RuleParameters) -> bool:
+    """Tell whether rule 3 is defined on the roads of a problem."""
+    radius, reach = problem.intersection_radius, problem.car.body.reach
+    if problem.sensing_radius < 2.0 * (radius + reach + own.sensing_slack) - SLACK:
+        return False
+    return not clearance_faults(problem.network, radius, reach, problem.car.w, own.segment_slack)

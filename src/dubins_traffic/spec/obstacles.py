@@ -36,6 +36,9 @@ class ObstacleLanes(NamedTuple):
 
 def place_obstacles(table: ObstacleTable, roads: RoadTable, nets: Ints) -> ObstacleLanes:
     """Return the parts of obstacles beside each segment, of those obstacles that reach 2w of its centre line."""
+    if not len(table.part):
+        none = np.full(len(nets), -1, dtype=np.int64)
+        return ObstacleLanes(none, np.zeros(1, np.int64), np.zeros((0, 5)), np.zeros(0, np.int64))
     base: list[int] = []
     start: list[int] = [0]
     parts: list[Floats] = []

@@ -140,20 +140,14 @@ def pack_rules(
     parameters: Sequence[RuleParameters],
     radii: Sequence[float],
     rates: Sequence[float],
-    nets: Sequence[int],
-    judged3: Sequence[bool],
     cars: CarTable,
 ) -> RuleTable:
-    """Return the rules of each trial as a table.
+    """Return the rules of each trial as a table; `NET` and `JUDGED3` are left to fill in.
 
     Parameters
     ----------
     parameters, radii, rates
         The parameters, the intersection radius R (m) and the control rate (Hz) of each trial.
-    nets
-        Number of each trial's network in the road table.
-    judged3
-        Whether an entry against rule 3 counts as a breach there.
     cars
         The car of each trial.
     """
@@ -185,11 +179,9 @@ def pack_rules(
         real[b, BLOCKED_AHEAD] = own.blocked_ahead
         real[b, OVERTAKING_BEHIND] = own.overtaking_behind
         real[b, OVERTAKING_AHEAD] = own.overtaking_ahead
-        whole[b, NET] = nets[b]
         whole[b, STOP_TICKS] = ticks(own.stop_time, rate)
         whole[b, STAND_TICKS] = ticks(own.stand_time, rate)
         whole[b, GROUP_TICKS] = ticks(own.group_time, rate)
         whole[b, FORFEIT_TICKS] = ticks(own.forfeit_time, rate)
         whole[b, CROSSING_DEGREE] = own.crossing_degree
-        whole[b, JUDGED3] = judged3[b]
     return RuleTable(real, whole)

@@ -159,4 +159,4 @@ def _replay(chunk: Chunk, row: Mapping[str, Any], page: Path) -> rows.Row:
     marks = () if verdict is None else breach_marks(found.instance, verdict.violations)
     summary = {"controller": row["controller"], **{name: row[name] for name in SUMMARY}}
     write_replay(page, found.instance, found.frames, found.ending, summary, marks)
-    return rows.row(chunk.number, result)
+    return rows.row(chunk.number, result.ending, result.score, result.wall.act_s)
