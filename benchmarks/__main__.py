@@ -1,7 +1,8 @@
 """All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
 
 `overview` is the table of all speeds beside those of other simulators, which it installs first where they are missing:
-two minutes more. Its parts `queries`, `generation` and `peers` are run by themselves only if they are named.
+two minutes more. Its parts `queries`, `generation` and `peers` are run by themselves only if they are named, and so is
+`million`, which takes some minutes.
 
 `motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`: about a minute;
 `ros1`: three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each; `synthesis` solves its
@@ -36,7 +37,7 @@ NAMES = (
     "campaign",
     "overview",
 )
-PARTS = ("queries", "generation", "peers")
+PARTS = ("queries", "generation", "peers", "million")
 
 
 def main(names: list[str]) -> int:
