@@ -33,6 +33,7 @@ NAMES = (
     "ros1",
     "synthesis",
     "synthesized",
+    "counter",
     "gazebo",
     "campaign",
     "overview",

@@ -112,10 +112,16 @@ class Closes(Protocol):
 
 @runtime_checkable
 class Reports(Protocol):
-    """A controller that has something to say of what it does; it stands in the record as events of the ego."""
+    """A controller or driver that has something to say of what it does; it stands in the record as events.
+
+    Those of a controller are events of the ego, those of a driver of no car.
+    """
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return kind and detail of what has happened since the last call, which is made after every `act`."""
+        """Return kind and detail of what has happened since the last call.
+
+        It is made after every `act` or `decide`, of drivers also after `reset`.
+        """
         ...
 
 

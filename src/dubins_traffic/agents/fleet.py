@@ -45,11 +45,12 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import REMOTE, parameters_of
+from dubins_traffic.problem.kinds import COUNTER, REMOTE, parameters_of
 from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
+    from dubins_traffic.agents.counter import CounterTeam
     from dubins_traffic.problem.instance import EAgent, Instance
 
 AS_FAR_AS_2016 = 3.5
@@ -88,7 +89,10 @@ class Fleet:
         self._lawful = _lawful() if kinds & KEEP_RULES else None
         if self._lawful is not None:
             self._lawful.reset(instances, state)
-        elsewhere = KEEP_RULES | {REMOTE}
+        self._counter = _counter() if COUNTER in kinds else None
+        if self._counter is not None:
+            self._counter.reset(instances, state)
+        elsewhere = KEEP_RULES | {COUNTER, REMOTE}
         self._others = not kinds <= elsewhere
         self._roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
@@ -108,6 +112,12 @@ class Fleet:
             self._decide_others(tick, state, commands)
         if self._lawful is not None:
             self._lawful.decide(tick, state, labels, commands)
+        if self._counter is not None:
+            self._counter.decide(tick, state, labels, commands)
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what the cars that play a counterstrategy have to say."""
+        return () if self._counter is None else self._counter.report()
 
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
@@ -134,7 +144,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     script: list[tuple[float, float, float]] = []
     for b, instance in enumerate(instances):
         for n, agent in enumerate(instance.e_agents, start=1):
-            if agent.kind in KEEP_RULES or agent.kind == REMOTE:
+            if agent.kind in KEEP_RULES | {COUNTER, REMOTE}:
                 continue
             given = _parameters(agent)
             floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
@@ -160,6 +170,13 @@ def _lawful() -> Driver:
     from dubins_traffic.agents.lawful import Lawful
 
     return Lawful()
+
+
+def _counter() -> CounterTeam:
+    """Return the driver of the cars that play a counterstrategy."""
+    from dubins_traffic.agents.counter import CounterTeam
+
+    return CounterTeam()
 
 
 @cache

@@ -22,7 +22,7 @@ from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
-from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.problem.kinds import COUNTER, REMOTE
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.scoring.verdict import Ruling
@@ -248,8 +248,8 @@ def _apart(
 
 
 def _can_share(instance: Instance) -> bool:
-    remote = any(agent.kind == REMOTE for agent in instance.e_agents)
-    return instance.simulator == "embedded" and not instance.problem.formulas and not remote
+    apart = any(agent.kind in (COUNTER, REMOTE) for agent in instance.e_agents)
+    return instance.simulator == "embedded" and not instance.problem.formulas and not apart
 
 
 def _is_fit(instance: Instance) -> bool:

@@ -138,10 +138,21 @@ class Nemesis(Strict):
     speed: Speed = Field(default=0.7, description="speed while the ego is not behind it, m/s")
 
 
+class Counter(Strict):
+    """Keeps the ego from a goal for ever where the assumption is too weak to forbid it: plays the counterstrategy."""
+
+    assume: str | None = Field(
+        default=None,
+        description="what it keeps, as `synth --assume` takes it, such as E1,E2,E4,E5,E6; null: as the problem says",
+    )
+    speed: Speed = Field(default=0.7, description="speed, m/s")
+
+
 class Remote(Strict):
     """Is driven by a program of its own, over a transport."""
 
 
+COUNTER = "counter"
 REMOTE = "remote"
 KINDS: Mapping[str, type[Strict]] = {
     "wander": Wander,
@@ -151,6 +162,7 @@ KINDS: Mapping[str, type[Strict]] = {
     "scripted": Scripted,
     "lawful": Lawful,
     "nemesis": Nemesis,
+    COUNTER: Counter,
     REMOTE: Remote,
 }
 """Kinds by name, each with the model of its parameters."""

@@ -118,7 +118,7 @@ class AgentEntry(Careful):
     """One e-agent, or `count` of them."""
 
     type: str = Field(
-        description="what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, "
+        description="what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, counter, "
         '"wander/wander", or remote or package/executable: a program elsewhere'
     )
     name: str = Field(

@@ -39,11 +39,14 @@ class Terms:
         How far from an intersection a car in its disc may be, metres.
     look : int
         Ticks after which it is asked again where unseen cars may be.
+    assume_ego : bool
+        Whether a place is assumed for the ego, too, while it is behind another car in its cell.
     """
 
     sight: float
     margin: float
     look: int
+    assume_ego: bool = False
 
 
 class MoveList:
@@ -84,7 +87,7 @@ class RoadPlay:
     Attributes
     ----------
     position : int or None
-        Where the play is; None while the ego is behind another car in its cell.
+        Where the play is; None while the ego is behind another car in its cell and no place is assumed for it.
     cells : list of int
         Of all cars, the ego's first, shown or assumed.
     moves : MoveList
@@ -168,14 +171,14 @@ class RoadPlay:
     def _assume(self, shown: dict[int, int]) -> None:
         """Find places for the cars that are not shown, where those that are shown have been and are not in the way."""
         taken = set(self._shown.values()) | set(shown.values())
-        if EGO_CAR not in shown:
+        if EGO_CAR not in shown and not self._terms.assume_ego:
             taken.add(self.cells[EGO_CAR])
         ego = self.cells[EGO_CAR]
         avoided = set(self._board.arena.following(ego)) if ego != NOWHERE else set[int]()
         for cell in tuple(avoided):
             avoided.update(self._board.arena.following(cell))
         nodes = len(self._board.arena.nodes)
-        for car in range(1, len(self.cells)):
+        for car in range(0 if self._terms.assume_ego else 1, len(self.cells)):
             if car in self._shown:
                 continue
             cell = self.cells[car]
@@ -243,7 +246,7 @@ class RoadPlay:
         for car, cell in shown.items():
             if self.cells[car] != cell or car not in self._shown:
                 self._put(car, cell)
-        if EGO_CAR not in shown and cells[EGO_CAR] != NOWHERE:
+        if EGO_CAR not in shown and cells[EGO_CAR] != NOWHERE and not self._terms.assume_ego:
             self._put(EGO_CAR, cells[EGO_CAR])
         self._shown = shown
 

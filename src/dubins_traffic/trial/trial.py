@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Contact, Event, Observation
+from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
-from dubins_traffic.protocols import Driver, End, Ending, Scans, Simulator, Sink, Watcher
+from dubins_traffic.protocols import Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
@@ -69,6 +69,8 @@ class Trial:
         self._buffer = FrameBuffer(instance, sinks)
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0
+        self._tellers = [agent for agent in self._agents if isinstance(agent, Reports)]
+        self._note_agents()
         self._observation: Observation | None = None
         for watcher in self._watchers:
             watcher.begin(instance)
@@ -111,6 +113,7 @@ class Trial:
         commands = self._commands
         for agent in self._agents:
             agent.decide(self._tick, self._state, self._labels, commands)
+        self._note_agents()
         commands[0, EGO, 0] = speed
         commands[0, EGO, 1] = yaw
         if not all_finite(commands):
@@ -156,6 +159,12 @@ class Trial:
         if self._observation is None:
             self._observation = self._senses.observe(self._tick, self._state, self._labels)
         return self._observation
+
+    def _note_agents(self) -> None:
+        """Put what the e-agents have to say into the record."""
+        for agent in self._tellers:
+            for kind, detail in agent.report():
+                self._buffer.note(Event(self._tick, kind, NONE, detail))
 
     def _agent_fault(self) -> Sequence[Contact]:
         self.end(End.AGENT_FAULT, agent_fault(self.instance, self._commands[0]))

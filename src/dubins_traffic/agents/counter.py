@@ -1,0 +1,251 @@
+"""The e-agents `counter`: one team that plays the counterstrategy of the game of cells on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
+from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.driving.fitness import check_fit
+from dubins_traffic.driving.gates import MARGIN
+from dubins_traffic.driving.law import decide
+from dubins_traffic.driving.law_tables import (
+    FIRST,
+    KIND,
+    LANE,
+    LAST,
+    MOOD,
+    NEXT,
+    PLACE,
+    ROLLING,
+    ROUND,
+    SPEED,
+    Drivers,
+    blank,
+    build_of,
+    desk,
+)
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.kinds import COUNTER
+from dubins_traffic.roads.table import pack
+from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.propositions import CLEAR
+from dubins_traffic.synthesis.assumption import Assumption, Order
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.road_play import RoadPlay, Terms
+from dubins_traffic.synthesis.sightings import Sighting
+from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.story import Moment, followed, moment_of, told
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance, Problem
+
+NO_GOAL: Final = -2
+"""The vertex of the stages that the law is given: at no intersection, since the strategy sends the cars."""
+NOT_LIKED: Final = 100.0
+"""What an exit counts that the strategy does not take, metres."""
+BEFORE_LINE: Final = 0.2
+"""How far from the place where it could take its place in the order a car stands that is to have none, metres."""
+COMMITTED: Final = 0.85
+"""A car this near to the middle of a disc, in units of R, has begun its way to an exit and keeps to it."""
+EVERYWHERE: Final = 1e9
+COUNTERSTRATEGY: Final = "counterstrategy"
+"""Kind of the events that tell how the ego is kept from a goal."""
+
+
+class CounterTeam:
+    """Drives all e-agents of a trial, which are of kind `counter` (a `protocols.Driver`).
+
+    They hold places and make way as the counterstrategy says, by the law of the road where that is assumed of them.
+    Where the ego wins the game they drive about.
+    """
+
+    def reset(self, instances: Sequence[Instance], state: State) -> None:
+        """Solve the game; InputError unless one trial is begun, and all its e-agents are of this kind."""
+        if len(instances) != 1 or any(agent.kind != COUNTER for agent in instances[0].e_agents):
+            raise InputError(
+                "these play together and alone",
+                field="type",
+                value=COUNTER,
+                expected="e-agents of no other kind",
+            )
+        (instance,) = instances
+        problem = instance.problem
+        check_fit(problem, owes=False)
+        self._roads = pack([problem.network], [problem.car.lane_width])
+        self._obstacles = pack_obstacles([problem.obstacles])
+        self._drivers = _drivers(instance)
+        self._desk = desk(state.x.shape[1], len(problem.network.segments))
+        self._points: list[list[float]] = problem.network.points.tolist()
+        rules = RuleParameters.from_mapping(problem.rules)
+        self._radius, self._reach = problem.intersection_radius, problem.car.body.reach
+        self._line = rules.approach_distance + BEFORE_LINE
+        self._period = problem.period
+        board = Board(arena_of(problem), _assumed(instance), len(instance.e_agents))
+        self._board = board
+        self._strategy = Counterstrategy(solve(build(board)))
+        terms = Terms(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
+        self._play = RoadPlay(board, terms, instance.names)
+        self._targets = [-1] * len(instance.starts)
+        self._jumps = board.assumption.order is not Order.KEPT
+        self._times = [round(own * problem.rate) for own in _times(board, rules)]
+        self._since: dict[int, int] = {}
+        self._reports = [(COUNTERSTRATEGY, f"assumed: {board.assumption}")]
+        self._is_told = False
+
+    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
+        """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
+        cars = [_sighting(n, state, labels) for n in range(int(state.count[0]))]
+        if self._play.follow(tick, cars):
+            self._choose(tick, cars)
+        if self._jumps:
+            self._jump(cars)
+        decide(tick, state, labels, self._roads, self._obstacles, self._drivers, self._desk, commands)
+        for car in cars[1:]:
+            if self._targets[car.car] == self._play.cells[car.car]:
+                self._hold(car, commands[0, car.car])
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return, once, how the ego is kept from a goal."""
+        if not self._reports:
+            return ()
+        found, self._reports = self._reports, []
+        return found
+
+    def _choose(self, tick: int, cars: Sequence[Sighting]) -> None:
+        """Choose the cells to which the cars go in this turn, and prepare the law for it."""
+        play, position = self._play, self._play.position
+        self._targets = [-1] * len(play.cells)
+        if position is None or not any(loss.lost[position] for loss in self._strategy.solution.losses):
+            return
+        if not self._is_told:
+            self._is_told = True
+            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in told(self._strategy, position)]
+        after, _ = self._strategy.choose(position, self._most_urgent(tick, position))
+        if after == self._strategy.solution.game.positions:
+            return
+        before = Moment(tuple(play.cells), {})
+        self._targets = list(followed(self._board, before, moment_of(self._board, after)).cells)
+        for car in cars[1:]:
+            self._send(car)
+
+    def _most_urgent(self, tick: int, position: int) -> int:
+        """Return which of the debts of a position has to be paid first, by when it has come up and the time it has."""
+        owed = self._strategy.debts(position)
+        self._since = {debt: self._since.get(debt, tick) for debt in owed}
+        return min(owed, key=lambda debt: (self._since[debt] + self._times[debt], debt), default=0)
+
+    def _jump(self, cars: Sequence[Sighting]) -> None:
+        """Let the cars that are sent into an intersection enter it when it is clear, in whatever order."""
+        for car in cars[1:]:
+            enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
+            clear = car.propositions.bits & CLEAR != 0
+            self._drivers.ints[0, car.car, MOOD] = ROLLING if enters and clear else 0
+
+    def _send(self, car: Sighting) -> None:
+        """Let the law take a car to its target."""
+        arena, cells = self._board.arena, self._play.cells
+        nodes = len(arena.nodes)
+        target, own = self._targets[car.car], cells[car.car]
+        ints = self._drivers.ints[0, car.car]
+        prices = self._drivers.distance[car.car]
+        if target < nodes and own >= nodes:
+            free = [lane for lane in arena.nodes[target].exits if nodes + lane not in cells]
+            liked = free or list(arena.nodes[target].exits)
+        elif target >= nodes and own < nodes and not self._is_turning(car, own):
+            liked = [target - nodes]
+        else:
+            return
+        prices[:] = NOT_LIKED
+        prices[liked] = 0.0
+        v = arena.nodes[target if target < nodes else own].vertex
+        if ints[LANE] >= 0 and arena.network.lane_ends(int(ints[LANE]))[1] == v:
+            ints[NEXT] = liked[0]
+
+    def _is_turning(self, car: Sighting, node: int) -> bool:
+        """Say whether a car has begun its way through a disc; who stands in one has stopped at its edge."""
+        return self._distance(car, node) < COMMITTED * self._radius
+
+    def _distance(self, car: Sighting, node: int) -> float:
+        x, y = self._points[self._board.arena.nodes[node].vertex]
+        return hypot(x - car.pose.x, y - car.pose.y)
+
+    def _hold(self, car: Sighting, command: Floats) -> None:
+        """Let a car stand: in the disc that its centre is in, before the one ahead, or farther back without a place."""
+        arena, cell = self._board.arena, self._play.cells[car.car]
+        nodes = len(arena.nodes)
+        if cell < nodes:
+            if car.propositions.at == arena.nodes[cell].vertex and not self._is_turning(car, cell):
+                command[:] = 0.0
+            return
+        if car.propositions.crosses >= 0 or car.propositions.lane != cell - nodes:
+            return
+        node, slot = arena.lane_end[cell - nodes]
+        position = self._play.position
+        parked = position is not None and slot in self._board.scenes(position)[node].parked
+        edge = self._radius + self._reach + (self._line if parked else MARGIN)
+        room = max(0.0, self._distance(car, node) - edge)
+        if command[0] * self._period > room:
+            command[:] = room / self._period, 0.0
+
+
+def _times(board: Board, rules: RuleParameters) -> list[float]:
+    """Return how much time the rules allow for each debt, seconds: of nodes, lanes and goals."""
+    arena = board.arena
+    lanes = [
+        rules.enter_time if arena.nodes[node].crossing else rules.rest_time for node, _ in arena.lane_end
+    ]
+    return [*[rules.exit_time] * len(arena.nodes), *lanes, *[rules.goal_time] * len(arena.goals)]
+
+
+def _assumed(instance: Instance) -> Assumption:
+    """Return what the team keeps: what its cars say, or the problem."""
+    words = {agent.parameters["assume"] for agent in instance.e_agents}
+    if len(words) > 1:
+        raise InputError(
+            "one team, one assumption",
+            field="assume",
+            value=sorted(map(str, words)),
+            expected="the same for all",
+        )
+    (own,) = words
+    assumed = assumption_of(instance.problem) if own is None else Assumption.parse(own.split(","))
+    if not assumed.yields:
+        raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2, and others")
+    return assumed
+
+
+def _sighting(n: int, state: State, labels: Labels) -> Sighting:
+    pose = Pose(*(float(array[0, n]) for array in (state.x, state.y, state.c, state.s)))
+    seen: Any = [int(array[0, n]) for array in labels]
+    return Sighting(n, pose, Propositions(*seen))
+
+
+def _drivers(instance: Instance) -> Drivers:
+    """Return the team as the law drives it: each car on a round of its own, without goals, at prices of its own."""
+    problem: Problem = instance.problem
+    cars = len(instance.starts)
+    ints, floats = blank(cars)
+    for n, agent in enumerate(instance.e_agents, start=1):
+        ints[n, [KIND, FIRST, LAST, PLACE]] = ROUND, n, n + 1, n
+        floats[n, SPEED] = min(agent.parameters["speed"], problem.car.bounds.speed)
+    ints[EGO, KIND] = 0
+    return Drivers(
+        active=np.ones(1, dtype=np.int64),
+        net=np.zeros(1, dtype=np.int64),
+        seed=np.array([instance.seed], dtype=np.uint64),
+        trial=np.array([instance.trial], dtype=np.int64),
+        build=build_of([problem]),
+        ints=ints[None].copy(),
+        floats=floats[None].copy(),
+        stage=np.full(cars, NO_GOAL, dtype=np.int64),
+        distance=np.zeros((cars, problem.network.lanes)),
+    )
