@@ -15,7 +15,8 @@ from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.record.reader import read
 from dubins_traffic.viewer.marks import event_marks
 
-FAIRNESS, NO_E4, NO_E3, _ = CASES
+FAIRNESS, NO_E4, NO_E3 = CASES
+NO_E5 = Case(3, 3, 3, ("E1", "E2", "E3", "E4", "E6"))
 WON = Case(2, 2, 2, ("E1", "E2", "E3", "E4", "E5", "E6"))
 
 
@@ -26,6 +27,13 @@ def test_the_ego_is_kept_from_a_goal_and_nothing_assumed_is_broken(case: Case, c
     assert found.gap >= 120.0
     assert found.own == ()
     assert found.others.isdisjoint(case.assumed)
+
+
+def test_cars_that_park_in_their_lanes_keep_the_ego_from_a_goal() -> None:
+    """It passes none of them: they stand where it could not be back in its lane in time."""
+    found = drive(NO_E5, "rules", 1, 200.0)
+    assert found.gap >= 120.0
+    assert (found.own, found.others) == ((), {"E5"})
 
 
 def test_where_the_ego_wins_the_team_keeps_it_from_nothing() -> None:

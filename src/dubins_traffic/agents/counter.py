@@ -40,6 +40,7 @@ from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.queues import Scene
 from dubins_traffic.synthesis.road_play import RoadPlay, Terms
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
@@ -95,6 +96,7 @@ class CounterTeam:
         terms = Terms(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
         self._play = RoadPlay(board, terms, instance.names)
         self._targets = [-1] * len(instance.starts)
+        self._scenes: list[Scene] = []
         self._jumps = board.assumption.order is not Order.KEPT
         self._times = [round(own * problem.rate) for own in _times(board, rules)]
         self._since: dict[int, int] = {}
@@ -132,6 +134,7 @@ class CounterTeam:
         after, _ = self._strategy.choose(position, self._most_urgent(tick, position))
         if after == self._strategy.solution.game.positions:
             return
+        self._scenes = self._board.scenes(after)
         before = Moment(tuple(play.cells), {})
         self._targets = list(followed(self._board, before, moment_of(self._board, after)).cells)
         for car in cars[1:]:
@@ -189,9 +192,7 @@ class CounterTeam:
         if car.propositions.crosses >= 0 or car.propositions.lane != cell - nodes:
             return
         node, slot = arena.lane_end[cell - nodes]
-        position = self._play.position
-        parked = position is not None and slot in self._board.scenes(position)[node].parked
-        edge = self._radius + self._reach + (self._line if parked else MARGIN)
+        edge = self._radius + self._reach + (self._line if slot in self._scenes[node].parked else MARGIN)
         room = max(0.0, self._distance(car, node) - edge)
         if command[0] * self._period > room:
             command[:] = room / self._period, 0.0
