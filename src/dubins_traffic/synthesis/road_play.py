@@ -170,7 +170,8 @@ class RoadPlay:
 
     def _assume(self, shown: dict[int, int]) -> None:
         """Find places for the cars that are not shown, where those that are shown have been and are not in the way."""
-        taken = set(self._shown.values()) | set(shown.values())
+        now = set(shown.values())
+        taken = set(self._shown.values()) | now
         if EGO_CAR not in shown and not self._terms.assume_ego:
             taken.add(self.cells[EGO_CAR])
         ego = self.cells[EGO_CAR]
@@ -179,9 +180,9 @@ class RoadPlay:
             avoided.update(self._board.arena.following(cell))
         nodes = len(self._board.arena.nodes)
         for car in range(0 if self._terms.assume_ego else 1, len(self.cells)):
-            if car in self._shown:
-                continue
             cell = self.cells[car]
+            if car in self._shown and (car in shown or cell not in now):
+                continue
             unseen = car not in self._seen
             if cell < nodes or cell in taken or (unseen and self._would_be_seen(cell)):
                 cell = self._elsewhere(car, cell, taken, avoided)
