@@ -27,11 +27,11 @@ class Controller:
         self.requests = self.graph.writer("rq/dubins_traffic_maestro/modeRequest", m.ModeRequest)
         maestro = "dubins_traffic_maestro"
         self.readers = [
-            (self.graph.reader(topic, kind), kind, take)
-            for topic, kind, take in (
-                (f"rt/{maestro}/probleminstance_JSON", m.ProblemInstanceJSON, self.begin),
-                (f"rr/{maestro}/modeReply", m.ModeReply, self.answered),
-                ("rt/gazebo/model_states", m.ModelStates, self.drive),
+            (self.graph.reader(topic, kind, latched=latched), kind, take)
+            for topic, kind, take, latched in (
+                (f"rt/{maestro}/probleminstance_JSON", m.ProblemInstanceJSON, self.begin, True),
+                (f"rr/{maestro}/modeReply", m.ModeReply, self.answered, False),
+                ("rt/gazebo/model_states", m.ModelStates, self.drive, False),
             )
         ]
 

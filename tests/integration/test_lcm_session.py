@@ -167,48 +167,51 @@ def test_a_second_session_and_an_interrupted_one() -> None:
     assert "interrupted after 0 trials" in err
 
 
-def logged(folder: Path) -> tuple[Path, Path]:
-    """Run a trial beside lcm-logger; return the log and the record."""
+def logged(folder: Path) -> tuple[Path, list[Path]]:
+    """Run two sessions of one and two trials beside lcm-logger; return the log and the records."""
     logger = str(Path(library.__file__).parents[1] / "bin" / "lcm-logger")
     log, config = folder / "trial.log", folder / "short.json"
-    config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [4, 4]}))
+    config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [2, 2]}))
     url = os.environ["LCM_DEFAULT_URL"]
     with running(logger, "-l", url, "--quiet", str(log)) as logging, running(*PYTHON):
         time.sleep(0.5)
-        options = ("--lockstep", "--trials", "1", "--records", str(folder))
-        with running(COMMAND, "lcm", "run", str(config), "--seed", "1", *options) as session:
-            assert ended(session)[0] == 0
+        for trials in ("1", "2"):
+            options = ("--lockstep", "--trials", trials, "--records", str(folder / trials))
+            with running(COMMAND, "lcm", "run", str(config), "--seed", trials, *options) as session:
+                assert ended(session)[0] == 0
         time.sleep(0.3)
         logging.send_signal(signal.SIGINT)
         logging.wait(10)
-    return log, folder / "trial-0000.mcap"
+    return log, sorted(folder.glob("?/*.mcap"))
 
 
-def converted(folder: Path, made: Path, tries: int = 4) -> tuple[Path, Path]:
-    """Log and convert a trial. On a busy machine the logger may miss a datagram; then the log is refused."""
+def converted(folder: Path, made: Path, tries: int = 4) -> tuple[Path, list[Path]]:
+    """Log and convert trials. On a busy machine the logger may miss a datagram; then the log is refused."""
     folder = folder / str(tries)
     folder.mkdir()
-    log, record = logged(folder)
+    log, records = logged(folder)
     done = subprocess.run([COMMAND, "convert", str(log), "-o", str(made)], check=False, capture_output=True)
     if done.returncode == 0 or tries == 1:
         assert done.returncode == 0
-        return log, record
+        return log, records
     assert b"frames are missing" in done.stderr
     return converted(folder, made, tries - 1)
 
 
-def test_a_log_of_a_trial_becomes_its_record(tmp_path: Path) -> None:
-    made = tmp_path / "made.mcap"
-    log, record = converted(tmp_path, made)
-    assert frames(made) == frames(record)
-    there, here = dt.load_record(made), dt.load_record(record)
+def test_a_log_becomes_the_records_of_its_trials(tmp_path: Path) -> None:
+    first = tmp_path / "made.mcap"
+    log, records = converted(tmp_path, first)
+    made = [first, tmp_path / "made-1.mcap", tmp_path / "made-2.mcap"]
+    assert sorted(tmp_path.glob("made*.mcap")) == sorted(made)
+    assert [frames(path) for path in made] == [frames(path) for path in records]
+    there, here = dt.load_record(made[2]), dt.load_record(records[2])
     for column in ("segment", "at", "crosses", "lane", "bits", "command_speed", "command_yaw_rate"):
         assert getattr(there.frames, column).tolist() == getattr(here.frames, column).tolist(), column
     assert there.ending == here.ending
     assert there.instance.problem == here.instance.problem
     (tmp_path / "cut.log").write_bytes(log.read_bytes()[:200])
     done = subprocess.run(
-        [COMMAND, "convert", tmp_path / "cut.log", "-o", made], check=False, capture_output=True, text=True
+        [COMMAND, "convert", tmp_path / "cut.log", "-o", first], check=False, capture_output=True, text=True
     )
     assert done.returncode == 2
     assert "cut.log" in done.stderr

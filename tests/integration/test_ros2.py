@@ -21,13 +21,12 @@ import dubins_traffic as dt
 from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.graph import Graph
 from tests.conformance.transport import frames
+from tests.ros2_client import READY, RESET, RESTART, START, Client, law
 from tests.tools import program
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-READY, START, RESET, RESTART = 4, 5, 0, 1
 DOMAINS = itertools.count(20 + 20 * (os.getpid() % 10))
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
 
@@ -40,10 +39,6 @@ class Law:
 
     def act(self, observation: dt.Observation) -> tuple[float, float]:
         return law(observation.pose.x, observation.pose.y)
-
-
-def law(x: float, y: float) -> tuple[float, float]:
-    return 0.25 + 0.01 * x, 0.3 * y
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -76,67 +71,6 @@ def running(*command: str) -> Iterator[subprocess.Popen[str]]:
         if process.poll() is None:
             process.kill()
         process.communicate(timeout=20)
-
-
-class Client:
-    """The maestro's client and the ego's driver, from names and types alone."""
-
-    def __init__(self, domain: int) -> None:
-        self.graph = Graph(domain)
-        maestro = "dubins_traffic_maestro"
-        self.requests = self.graph.writer(f"rq/{maestro}/modeRequest", m.ModeRequest)
-        self.replies = self.graph.reader(f"rr/{maestro}/modeReply", m.ModeReply)
-        self.instances = self.graph.reader(f"rt/{maestro}/probleminstance_JSON", m.ProblemInstanceJSON)
-        self.labels = self.graph.reader("rt/loutput", m.LabelStamped)
-        self.scans = self.graph.reader("rt/agent0/scan", m.LaserScan)
-        self.states = self.graph.reader("rt/gazebo/model_states", m.ModelStates)
-        self.commands = self.graph.writer("rt/ego/mobile_base/commands/velocity", m.Twist)
-        self.number = 0
-        self.seen: set[str] = set()
-
-    def ask(self, mode: int) -> bool | None:
-        """Return what the maestro says, None if nothing within a second."""
-        self.number += 1
-        self.requests.write(m.ModeRequest(1234, self.number, mode))
-        until = time.monotonic() + 1.0
-        while time.monotonic() < until:
-            for reply in self.graph.take(self.replies, m.ModeReply, 10):
-                if (reply.guid, reply.seq) == (1234, self.number):
-                    return reply.result
-            self.graph.wait(0.05)
-        return None
-
-    def until(self, mode: int) -> None:
-        """Ask until it is granted."""
-        end = time.monotonic() + 120
-        while not self.ask(mode):
-            assert time.monotonic() < end
-
-    def instance(self) -> str:
-        """Wait for the next problem, or for the empty one that ends a trial."""
-        end = time.monotonic() + 20
-        while time.monotonic() < end:
-            for message in self.graph.take(self.instances, m.ProblemInstanceJSON, 1):
-                return message.problemjson
-            self.graph.wait(0.05)
-        raise AssertionError("no instance")
-
-    def drive(self, most: int | None = None) -> int:
-        """Answer frames until the trial is over, or some; return how many."""
-        answered, last = 0, time.monotonic()
-        while most is None or answered < most:
-            for states in self.graph.take(self.states, m.ModelStates, 100):
-                position = states.pose[states.name.index("ego")].position
-                speed, yaw_rate = law(position.x, position.y)
-                self.commands.write(m.Twist(m.Vector3(speed), m.Vector3(z=yaw_rate)))
-                answered, last = answered + 1, time.monotonic()
-            for message in self.graph.take(self.labels, m.LabelStamped, 10):
-                self.seen |= set(message.label)
-            if self.graph.take(self.instances, m.ProblemInstanceJSON, 1):
-                return answered
-            assert time.monotonic() - last < 20
-            self.graph.wait(0.01)
-        return answered
 
 
 def reference(config: str, tmp_path: Path) -> tuple[bytes, Any]:
@@ -248,6 +182,76 @@ def test_a_bad_peer_ends_its_trial_by_name(bad: float | None, end: str, domain: 
         client.graph.close()
     assert json.loads(out)["trials"][0]["end"] == end
     assert session.returncode == 1
+
+
+def test_faulty_clients_end_their_trials_and_the_session_goes_on(
+    domain: int, config: str, tmp_path: Path
+) -> None:
+    arguments = (
+        "ros2",
+        "run",
+        config,
+        "--silence",
+        "1",
+        "--trials",
+        "5",
+        "--records",
+        str(tmp_path),
+        "--json",
+    )
+    with running(COMMAND, *arguments) as session:
+        for number, action in enumerate(("die", "stop", "flood", "nan", "reset")):
+            with running(sys.executable, "-m", "tests.ros2_client", str(domain), action):
+                await_end(tmp_path / f"trial-{number:04d}.wall.json")
+        out, err = session.communicate(timeout=20)
+    assert session.returncode == 1, err
+    ends = [trial["end"] for trial in json.loads(out)["trials"]]
+    assert ends == ["peer_silent", "peer_silent", "peer_flood", "controller_fault", "reset"]
+
+
+def await_end(sidecar: Path) -> None:
+    """Wait until a trial is over."""
+    until = time.monotonic() + 30
+    while not sidecar.exists():
+        assert time.monotonic() < until, "the trial does not end"
+        time.sleep(0.05)
+
+
+def test_time_transforms_pausing_and_placing(domain: int, config: str, tmp_path: Path) -> None:
+    arguments = ("ros2", "run", config, "--clock", "--trials", "1", "--records", str(tmp_path))
+    with running(COMMAND, *arguments) as session:
+        client = Client(domain)
+        clocks = client.graph.reader("rt/clock", m.Clock)
+        transforms = client.graph.reader("rt/tf", m.TFMessage)
+        client.until(READY)
+        client.place(1.25, -0.3)
+        client.until(START)
+        client.instance()
+        client.drive(20)
+        client.call("gazebo/pause_physics")
+        client.watch(0.2)
+        seen = client.watch(0.5)
+        assert len(set(seen)) == 1
+        assert len(seen) >= 30
+        client.call("gazebo/unpause_physics")
+        client.drive()
+        _, err = session.communicate(timeout=20)
+        times = [
+            message.clock.sec + 1e-9 * message.clock.nanosec
+            for message in client.graph.take(clocks, m.Clock, 1000)
+        ]
+        told = client.graph.take(transforms, m.TFMessage, 1000)
+        client.graph.close()
+    assert session.returncode == 0, err
+    record = dt.load_record(tmp_path / "trial-0000.mcap")
+    assert (record.instance.starts[0].x, record.instance.starts[0].y) == (1.25, -0.3)
+    assert times == sorted(times)
+    assert 4.0 < times[-1] < 60.0
+    frames = {(each.header.frame_id, each.child_frame_id) for each in told[-1].transforms}
+    assert {("map", "ego/odom"), ("ego/odom", "ego/base_footprint")} <= frames
+    assert ("agent1/base_footprint", "agent1/base_link") in frames
+    moved = next(each for each in told[-1].transforms if each.child_frame_id == "ego/base_footprint")
+    assert moved.transform.translation.x == pytest.approx(float(record.frames.x[-1, 0]), abs=0.2)
 
 
 def test_an_interrupted_session_and_no_domain(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:

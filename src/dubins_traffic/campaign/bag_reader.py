@@ -22,8 +22,8 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending, Sink
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.transports.quaternion import heading
 from dubins_traffic.transports.ros1.transport import COMMANDS
-from dubins_traffic.transports.ros1.world import heading
 from dubins_traffic.trial.buffer import FrameBuffer
 
 SLACK = 1_000

@@ -24,9 +24,9 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.spec.labels import words
+from dubins_traffic.transports.quaternion import half
 from dubins_traffic.transports.ros1.messages import definitions
 from dubins_traffic.transports.ros1.transport import COMMANDS
-from dubins_traffic.transports.ros1.world import half
 
 STATES = "/gazebo/model_states"
 LABELS = "/loutput"

@@ -11,7 +11,9 @@ from dubins_traffic.protocols import Transport
 from dubins_traffic.transports.maestro import Maestro
 
 
-def make_transport(domain: int | None, maestro: Maestro | None, *, here: bool = True) -> Transport:
+def make_transport(
+    domain: int | None, maestro: Maestro | None, *, here: bool = True, clock: bool = False
+) -> Transport:
     """Return the transport.
 
     Raises
@@ -23,11 +25,16 @@ def make_transport(domain: int | None, maestro: Maestro | None, *, here: bool = 
         from dubins_traffic.transports.ros2.transport import Ros2
     except ImportError as error:
         raise MissingExtraError("ROS 2", "ros2") from error
-    return Ros2(domain, maestro=maestro, here=here)
+    return Ros2(domain, maestro=maestro, here=here, clock=clock)
 
 
 def run_over_ros2(
-    programme: Programme, pace: Pace, *, domain: int | None = None, here: bool = True
+    programme: Programme,
+    pace: Pace,
+    *,
+    domain: int | None = None,
+    here: bool = True,
+    clock: bool = False,
 ) -> Iterator[Result]:
     """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
 
@@ -41,6 +48,8 @@ def run_over_ros2(
         Number of the DDS domain; by default that of ``ROS_DOMAIN_ID``, else 0.
     here : bool
         Whether nothing leaves this machine.
+    clock : bool
+        Whether `/clock` is published, and messages are stamped with simulated time.
 
     Raises
     ------
@@ -52,4 +61,4 @@ def run_over_ros2(
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
     maestro = Maestro() if programme.controller is None else None
-    yield from programme.run(make_transport(domain, maestro, here=here), pace, maestro)
+    yield from programme.run(make_transport(domain, maestro, here=here, clock=clock), pace, maestro)

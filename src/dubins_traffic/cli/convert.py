@@ -47,12 +47,12 @@ def convert(
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
-    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`); beside a bag stands the trial data of 2016,
-    `.trial.json`.
+    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of a log another one (`-1.mcap`,
+    ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.campaign.bag_reader import bag_to_record, is_bag
     from dubins_traffic.campaign.bags import write_bag
-    from dubins_traffic.campaign.lcm_log import is_log, log_to_record
+    from dubins_traffic.campaign.lcm_log import is_log, log_to_records
     from dubins_traffic.campaign.sources import load
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
@@ -65,7 +65,12 @@ def convert(
             raise InputError(
                 "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
             )
-        (bag_to_record if is_bag(file) else log_to_record)(file, output, overwrite=True)
+        if is_bag(file):
+            bag_to_record(file, output, overwrite=True)
+            return
+        records = log_to_records(file, output, overwrite=True)
+        if len(records) > 1:
+            options.tell("\n".join(map(str, records)))
         return
     found = load(file)
     suffix = Path(output).suffix.lower()

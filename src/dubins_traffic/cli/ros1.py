@@ -38,9 +38,7 @@ def run(
     deadline: session.Deadline = 5.0,
     begin: session.Begin = 60.0,
     silence: session.Silence = 5.0,
-    clock: Annotated[
-        bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
-    ] = False,
+    clock: session.Clock = False,
     simulator: Annotated[
         str | None,
         typer.Option(

@@ -40,6 +40,7 @@ def run(
     deadline: session.Deadline = 5.0,
     begin: session.Begin = 60.0,
     silence: session.Silence = 5.0,
+    clock: session.Clock = False,
     seed: options.Seed = 0,
     rnd: options.Network = None,
     data: options.Data = None,
@@ -56,4 +57,4 @@ def run(
         records=records, shield=shield,
     )  # fmt: skip
     pace = session.pace(lockstep, factor, deadline, begin, silence)
-    session.conduct(todo, run_over_ros2(todo, pace, domain=domain, here=not wide), json=json)
+    session.conduct(todo, run_over_ros2(todo, pace, domain=domain, here=not wide, clock=clock), json=json)

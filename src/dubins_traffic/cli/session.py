@@ -48,6 +48,10 @@ Silence = Annotated[
     float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
 ]
 
+Clock = Annotated[
+    bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
+]
+
 
 def programme(
     source: str,

@@ -47,6 +47,7 @@ class Inbox:
         self.condition = Condition()
         self.paused = False
         self.unknown = 0
+        self.returned = 0
         self._flood = flood
         self._slots: dict[str, Slot] = {}
         self._peers: dict[str, int] = {}
@@ -110,6 +111,7 @@ class Inbox:
             if slot is not None and slot.gone_since is not None:
                 slot.gone_since = None
                 slot.reconnections += 1
+                self.returned += 1
             self.condition.notify_all()
 
     def left(self, car: str) -> None:

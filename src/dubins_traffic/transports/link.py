@@ -25,6 +25,7 @@ IDLE = 0.1
 """Seconds between two looks at what has arrived, and two views of a world that stands still."""
 AGAIN = 1.0
 """Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
+NEVER_BY_ITSELF = 1e9
 SIGHT = 1e150
 
 
@@ -135,6 +136,8 @@ class Link:
         answered = self._wait(lambda: self._answers_frame(slot, tick), until, car)
         if answered and slot.arrived is not None:
             self._answers[car].append(max(0.0, slot.arrived - self._sent))
+            if self._repeated:
+                self._settle()
         elif self.clock.lockstep:
             raise PeerError(
                 End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
@@ -191,13 +194,9 @@ class Link:
         return slot.tick is None or slot.tick == tick or not self.clock.lockstep
 
     def _first_command(self, slot: Slot) -> None:
-        until = self._announced + self._patience.begin
-        repeat = AGAIN if self.transport.tagged else IDLE
-        while not self._wait(lambda: slot.fresh, min(until, monotonic() + repeat), EGO_NAME):
-            if monotonic() >= until:
-                detail = f"no command within {self._patience.begin:g} s of the announcement"
-                raise PeerError(End.PEER_SILENT.value, detail)
-            self._send_again()
+        if not self._wait(lambda: slot.fresh, self._announced + self._patience.begin, EGO_NAME):
+            detail = f"no command within {self._patience.begin:g} s of the announcement"
+            raise PeerError(End.PEER_SILENT.value, detail)
         self._begun = (slot.arrived or self._announced) - self._announced
         self._settle()
 
@@ -213,7 +212,8 @@ class Link:
     def _wait(self, done: Callable[[], bool], until: float, car: str | None, *, still: bool = False) -> bool:
         """Wait for `done` until then, streaming in between; return whether it came. Faults of `car` end it."""
         inbox = self.inbox
-        sent_again = monotonic() + AGAIN
+        again = math.inf if still else self._repeats()
+        sent_again = monotonic() + again
         while True:
             with inbox.condition:
                 self._check(car)
@@ -230,9 +230,21 @@ class Link:
                 return False
             if self._streams(still) and now >= self._next_view:
                 self._show(onward(self._state, self._elapsed(now)), self._elapsed(now), now)
-            if now >= sent_again and self._running and self.transport.tagged and self.clock.lockstep:
-                sent_again = now + AGAIN
+            if now >= sent_again or (again < math.inf and inbox.returned > self._returned):
+                sent_again = now + again
+                self._returned, self._repeated = inbox.returned, True
                 self._send_again()
+
+    def _repeats(self) -> float:
+        """Return after how many seconds a frame that is waited for is sent again; who comes back is sent it at once.
+
+        Where answers say not what they answer that is frame 0 alone, for those who were not listening yet.
+        """
+        if not self._running or (self._moving and not self.clock.lockstep):
+            return math.inf
+        if self.transport.tagged:
+            return AGAIN
+        return IDLE if self._tick == 0 else NEVER_BY_ITSELF
 
     def _check(self, car: str | None) -> None:
         stopped = self.inbox.stopped
@@ -265,6 +277,7 @@ class Link:
 
     def _settle(self) -> None:
         """Let further answers to what has been shown more than once arrive, where they say not what they answer."""
+        self._repeated = False
         if self.clock.lockstep and not self.transport.tagged:
             self._wait(lambda: False, monotonic() + self._patience.settle, None, still=True)
 
@@ -309,6 +322,7 @@ class Link:
 
     def _send(self) -> None:
         self.inbox.stale()
+        self._returned, self._repeated = self.inbox.returned, False
         self._sent = monotonic()
         self._send_again()
 

@@ -6,7 +6,7 @@ import os
 import struct
 from collections.abc import Callable, Sequence
 from select import select
-from time import monotonic
+from time import monotonic, time_ns
 from typing import TYPE_CHECKING
 
 from dubins_traffic.errors import TransportError
@@ -58,7 +58,7 @@ class Lcm:
         self._cars: list[tuple[str, int]] = []
         self._subscriptions: list[LCMSubscription] = []
         self._trial = NO_TRIAL
-        self._trials = 0
+        self._next = time_ns() // 1_000_000  # so that no program takes a new session's trial for an old one's
         self._announced = b""
         self._open = False
 
@@ -88,8 +88,8 @@ class Lcm:
 
     def announce(self, instance: Instance) -> None:
         """Begin a trial; the problem is sent with frame 0."""
-        self._trial = self._trials
-        self._trials += 1
+        self._trial = self._next
+        self._next += 1
         self._announced = encoding.problem_to_message(instance.problem, self._trial).encode()
 
     def frame(self, view: View) -> None:

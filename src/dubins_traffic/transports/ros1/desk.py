@@ -6,17 +6,15 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.body import Rectangle
-from dubins_traffic.cars.state import Pose
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import Mailbox
 from dubins_traffic.transports.maestro import Maestro, Mode
+from dubins_traffic.transports.quaternion import placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME
-from dubins_traffic.transports.ros1.world import heading
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -127,9 +125,9 @@ class Desk:
 
     def _place(self, message: Any) -> None:
         position, turn = message.pose.position, message.pose.orientation
-        if turn.z == turn.w == 0.0 or not all(map(isfinite, (position.x, position.y, turn.z, turn.w))):
-            return
-        self._mailbox.place(message.model_name, Pose(position.x, position.y, *heading(turn.z, turn.w)))
+        pose = placed(position.x, position.y, turn.z, turn.w)
+        if pose is not None:
+            self._mailbox.place(message.model_name, pose)
 
 
 def robot_description(instance: Instance) -> str:

@@ -16,9 +16,9 @@ from dubins_traffic.errors import ControllerError, InputError, TransportError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Capabilities, End
+from dubins_traffic.transports.quaternion import placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.transport import COMMANDS
-from dubins_traffic.transports.ros1.world import heading
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -149,11 +149,10 @@ class ExternalWorld:
         self._note(name, message.pose)
 
     def _note(self, name: str, pose: Any) -> None:
-        z, w = pose.orientation.z, pose.orientation.w
-        numbers = (pose.position.x, pose.position.y, z, w)
-        if not all(map(math.isfinite, numbers)) or z == w == 0.0:
+        position, turn = pose.position, pose.orientation
+        now, new = monotonic(), placed(position.x, position.y, turn.z, turn.w)
+        if new is None:
             return
-        now, new = monotonic(), Pose(*numbers[:2], *heading(z, w))
         with self._lock:
             old = self._seen.get(name)
             same = old.same_since if old is not None and old.pose == new else now

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from time import time
 from typing import TYPE_CHECKING, Any
 from xmlrpc.client import Error as XmlRpcError
 
@@ -15,6 +14,7 @@ from dubins_traffic.transports.ros1.desk import Desk, Told
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import Watch, abandon, join
 from dubins_traffic.transports.ros1.world import Topics, World
+from dubins_traffic.transports.stamps import Stamps
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -59,13 +59,12 @@ class Ros1:
     ) -> None:
         self.interval = 1.0 / rate
         self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
+        self._stamps = Stamps(self.interval, clock=clock)
         self._simulated_here = simulated
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: set[str] = set()
         self._open = self._lost = False
-        self._simulated = 0.0
-        self._shown = 0.0
 
     @property
     def rospy(self) -> Any:
@@ -88,13 +87,12 @@ class Ros1:
             self._world = World(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
             self._desk.describe(instance)
             self._listen(remote)
-        self._simulated += self._shown
-        self._shown = 0.0
+        self._stamps.begin()
 
     def announce(self, instance: Instance) -> None:
         """Publish the problem instance."""
         with self._guarded():
-            self._desk.announce(instance, self._stamp())
+            self._desk.announce(instance, self._stamps.now())
 
     def frame(self, view: View) -> None:
         """Publish a frame."""
@@ -107,7 +105,7 @@ class Ros1:
     def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
         """Publish the empty instance that ends a trial."""
         with self._guarded():
-            self._desk.end(self._stamp())
+            self._desk.end(self._stamps.now())
 
     def close(self) -> None:
         """Take back what this session has put into the graph; the node itself stays until the process ends."""
@@ -147,17 +145,10 @@ class Ros1:
         abandon(self._rospy, detail)
 
     def _publish(self, view: View, *, frame: bool) -> None:
-        """Publish; simulated time goes on over all trials, and while the world is only shown."""
-        if view.running and view.time > 0.0:
-            self._shown = max(self._shown, view.time)
-        else:
-            self._simulated += self.interval
+        self._stamps.see(view)
         if self._world is not None and not self._lost:
             with self._guarded():
-                self._world.publish(view, self._stamp(), frame=frame)
-
-    def _stamp(self) -> float:
-        return self._simulated + self._shown if self._clock else time()
+                self._world.publish(view, self._stamps.now(), self._stamps.simulated, frame=frame)
 
     def _heard(self, car: str, message: Any) -> None:
         self._mailbox.command(car, message.linear.x, message.angular.z)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import State
@@ -12,6 +11,7 @@ from dubins_traffic.driving.senses import Senses
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.protocols import View
 from dubins_traffic.spec.labels import Caption
+from dubins_traffic.transports.quaternion import half
 from dubins_traffic.transports.ros1.messages import load
 
 if TYPE_CHECKING:
@@ -102,8 +102,11 @@ class World:
         self._cars = [self._car(instance, n, name) for n, name in enumerate(instance.names)]
         self._odometry_at = -1.0
 
-    def publish(self, view: View, stamp: float, *, frame: bool) -> None:
-        """Publish `view`, stamped so (seconds); poses last. `frame`: it is a frame, and everything is sent."""
+    def publish(self, view: View, stamp: float, simulated: float, *, frame: bool) -> None:
+        """Publish `view`, stamped so (seconds); poses last. `frame`: it is a frame, and everything is sent.
+
+        Lasers sweep by the time `simulated`, so that who drives in lockstep gets the sweeps of real time.
+        """
         time = self._rospy.Time.from_sec(stamp)
         if not self._simulated:
             self._put_labels(view, time)
@@ -115,7 +118,7 @@ class World:
             self._odometry_at = stamp
             self._put_odometry(view, time)
         for car in self._cars:
-            self._put_scan(car, view, stamp, time)
+            self._put_scan(car, view, simulated, time)
         if self._models.get_num_connections():
             self._fill_states(view.state)
             self._models.publish(self._states)
@@ -190,9 +193,9 @@ class World:
                 transform.header.stamp = time
             self._transforms.publish(every)
 
-    def _put_scan(self, car: _Car, view: View, stamp: float, time: Any) -> None:
+    def _put_scan(self, car: _Car, view: View, simulated: float, time: Any) -> None:
         """Publish a scan when the laser's next sweep is due, if someone listens."""
-        sweep = int(stamp / car.scan_message.scan_time + 1e-6)
+        sweep = int(simulated / car.scan_message.scan_time + 1e-6)
         if sweep == car.swept or not car.scan.get_num_connections():
             return
         car.swept = sweep
@@ -216,21 +219,3 @@ def _put_pose(message: Any, x: float, y: float, c: float, s: float) -> None:
     message.position.x, message.position.y = x, y
     z, w = half(c, s)
     message.orientation.z, message.orientation.w = z, w
-
-
-def half(c: float, s: float) -> tuple[float, float]:
-    """Return z and w of the quaternion that turns the x axis to (c, s).
-
-    By the larger of the two half-angle formulas, so that no digits are lost near half a turn.
-    """
-    if c >= 0.0:
-        w = sqrt(0.5 * (1.0 + c))
-        return 0.5 * s / w, w
-    z = sqrt(0.5 * (1.0 - c))
-    return (z, 0.5 * s / z) if s >= 0.0 else (-z, -0.5 * s / z)
-
-
-def heading(z: float, w: float) -> tuple[float, float]:
-    """Return the unit vector to which the quaternion (0, 0, z, w), of any length but 0, turns the x axis."""
-    length = w * w + z * z
-    return (w * w - z * z) / length, 2.0 * w * z / length

@@ -69,12 +69,13 @@ class Graph:
 
     def writer(self, topic: str, kind: Any, *, latched: bool = False) -> Any:
         """Return a writer of messages of type `kind`."""
-        qos = quality(latched=latched)
+        qos = quality(latched=latched, depth=1 if latched else DEPTH)
         return DataWriter(self._publisher, Topic(self._participant, topic, kind), qos=qos)
 
-    def reader(self, topic: str, kind: Any) -> Any:
-        """Return a reader of messages of type `kind`, whose arrival ends a `wait`."""
-        reader: Any = DataReader(self._subscriber, Topic(self._participant, topic, kind), qos=quality())
+    def reader(self, topic: str, kind: Any, *, latched: bool = False) -> Any:
+        """Return a reader of messages of type `kind`, whose arrival ends a `wait`; latched: of the last one too."""
+        qos = quality(latched=latched, depth=DEPTH)
+        reader: Any = DataReader(self._subscriber, Topic(self._participant, topic, kind), qos=qos)
         fresh = ReadCondition(reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
         self._waitset.attach(fresh)
         self._conditions[id(reader)] = fresh
@@ -85,10 +86,19 @@ class Graph:
         self._waitset.detach(self._conditions.pop(id(reader)))
         reader.__del__()
 
+    def heard(self, writer: Any) -> bool:
+        """Whether somebody reads what is written."""
+        return bool(writer.get_matched_subscriptions())
+
     def put(self, writer: Any, message: Any) -> None:
         """Write a message; one that can't be written at once is dropped, since nobody is waited for."""
         with suppress(DDSException):
             writer.write(message)
+
+    def lift(self, writer: Any, kind: Any) -> None:
+        """Take back what a writer has latched: who comes from here on is not given it."""
+        with suppress(DDSException):
+            writer.dispose(kind())
 
     def take(self, reader: Any, kind: type[Message], most: int) -> list[Message]:
         """Take what has come for `reader`, oldest first."""
@@ -104,9 +114,9 @@ class Graph:
         del self._waitset, self._subscriber, self._publisher, self._participant, self._domain
 
 
-def quality(*, latched: bool = False) -> Qos:
-    """Return ROS 2's default quality of service; latched: who comes late is given the last message."""
+def quality(*, latched: bool, depth: int) -> Qos:
+    """Return ROS 2's quality of service with a history of `depth`; latched: who comes late is given the last ones."""
     policies: Any = Policy.Durability
     durability = policies.TransientLocal if latched else policies.Volatile
-    history = Policy.History.KeepLast(1 if latched else DEPTH)
+    history = Policy.History.KeepLast(depth)
     return Qos(Policy.Reliability.Reliable(duration(milliseconds=1)), durability, history)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, int16, int32, int64, sequence, uint32, uint64
+from cyclonedds.idl.types import array, float32, int16, int32, int64, sequence, uint8, uint32, uint64
 
 if TYPE_CHECKING:
     Covariance = list[float]
@@ -126,12 +126,55 @@ class LaserScan(IdlStruct, typename="sensor_msgs::msg::dds_::LaserScan_"):
     intensities: Ranges = field(default_factory=list[float])
 
 
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    """Where one frame of reference lies in another."""
+
+    translation: Vector3 = field(default_factory=Vector3)
+    rotation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    """The same, with when, and of which frames."""
+
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    transform: Transform = field(default_factory=Transform)
+
+
+@dataclass
+class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
+    """Simulated time."""
+
+    clock: Time = field(default_factory=Time)
+
+
 if TYPE_CHECKING:
     Poses = list[Pose]
     Twists = list[Twist]
+    Transforms = list[TransformStamped]
 else:
     Poses = sequence[Pose]
     Twists = sequence[Twist]
+    Transforms = sequence[TransformStamped]
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    """Transforms."""
+
+    transforms: Transforms = field(default_factory=list[TransformStamped])
+
+
+@dataclass
+class ModelState(IdlStruct, typename="gazebo_msgs::msg::dds_::ModelState_"):
+    """Where a car shall be."""
+
+    model_name: str = ""
+    pose: Pose = field(default_factory=Pose)
+    twist: Twist = field(default_factory=Twist)
+    reference_frame: str = ""
 
 
 @dataclass
@@ -175,3 +218,21 @@ class ModeReply(IdlStruct, typename="dubins_traffic_msgs::srv::dds_::MMode_Respo
     guid: uint64 = 0
     seq: int64 = 0
     result: bool = False
+
+
+@dataclass
+class EmptyRequest(IdlStruct, typename="std_srvs::srv::dds_::Empty_Request_"):
+    """A request that says nothing; ROS 2 gives every message that is empty a byte."""
+
+    guid: uint64 = 0
+    seq: int64 = 0
+    structure_needs_at_least_one_member: uint8 = 0
+
+
+@dataclass
+class EmptyReply(IdlStruct, typename="std_srvs::srv::dds_::Empty_Response_"):
+    """The reply to it."""
+
+    guid: uint64 = 0
+    seq: int64 = 0
+    structure_needs_at_least_one_member: uint8 = 0

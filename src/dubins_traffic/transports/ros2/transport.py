@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from time import monotonic, time_ns
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import Ending, Mailbox, View
-from dubins_traffic.transports.maestro import Maestro, Mode
+from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros2 import messages as m
+from dubins_traffic.transports.ros2.desk import AT_ONCE, Desk
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
-from dubins_traffic.transports.ros2.world import World
+from dubins_traffic.transports.ros2.world import World, moment
+from dubins_traffic.transports.stamps import Stamps
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-INSTANCE = "rt/dubins_traffic_maestro/probleminstance_JSON"
-REQUESTS = "rq/dubins_traffic_maestro/modeRequest"
-REPLIES = "rr/dubins_traffic_maestro/modeReply"
 COMMANDS = "rt/{}/mobile_base/commands/velocity"
-AT_ONCE = 100
-"""Messages of one topic taken at a time."""
 LOOK = 0.1
 """Seconds between two looks at who is there."""
 
@@ -41,15 +36,27 @@ class Ros2:
         Who grants modes; without one trials start by themselves.
     here : bool
         Whether nothing leaves this machine.
+    clock : bool
+        Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
+    rate : float
+        How many model states a second are published in real time, at least.
     """
 
     name = "ros2"
     tagged = False
 
     def __init__(
-        self, domain: int | None = None, *, maestro: Maestro | None = None, here: bool = True
+        self,
+        domain: int | None = None,
+        *,
+        maestro: Maestro | None = None,
+        here: bool = True,
+        clock: bool = False,
+        rate: float = 120.0,
     ) -> None:
-        self._domain = usual_domain() if domain is None else domain
+        self.interval = 1.0 / rate
+        self._clock, self._stamps = clock, Stamps(self.interval, clock=clock)
+        self.domain = usual_domain() if domain is None else domain
         self._maestro, self._here = maestro, here
         self._readers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
@@ -59,17 +66,15 @@ class Ros2:
     def open(self, mailbox: Mailbox) -> None:
         """Join the domain; TransportError if that can't be."""
         self._mailbox = mailbox
-        self._graph = Graph(self._domain, here=self._here)
+        self._graph = Graph(self.domain, here=self._here)
         self._open = True
-        self._world = World(self._graph)
-        self._problem = self._graph.writer(INSTANCE, m.ProblemInstanceJSON, latched=True)
-        self._requests: Any = None
-        if self._maestro is not None:
-            self._requests = self._graph.reader(REQUESTS, m.ModeRequest)
-            self._replies = self._graph.writer(REPLIES, m.ModeReply)
+        self._world = World(self._graph, clock=self._clock)
+        self._desk = Desk(self._graph, mailbox, self._maestro)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars `remote`."""
+        self._stamps.begin()
+        self._desk.begin()
         self._world.begin(instance)
         for car in [car for car in self._readers if car not in remote]:
             self._graph.drop(self._readers.pop(car))
@@ -80,25 +85,26 @@ class Ros2:
                 self._there[car] = 0
 
     def announce(self, instance: Instance) -> None:
-        """Publish the problem instance, as in 2016."""
-        document = json.dumps(instance_to_document(instance, version=0))
-        self._graph.put(self._problem, m.ProblemInstanceJSON(_now(), document))
+        """Publish the problem instance."""
+        self._desk.announce(instance, moment(self._stamps.now()))
 
     def frame(self, view: View) -> None:
         """Publish a frame."""
-        self._world.publish(view, _now())
+        self._publish(view, frame=True)
+
+    def stream(self, view: View) -> None:
+        """Publish what lies between two frames, or a world that stands still."""
+        self._publish(view, frame=False)
 
     def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
         """Publish the empty instance that ends a trial."""
-        self._graph.put(self._problem, m.ProblemInstanceJSON(_now(), ""))
+        self._desk.end(moment(self._stamps.now()))
 
     def receive(self, seconds: float) -> None:
         """Take what has come, or comes within so long."""
         if seconds > 0.0:
             self._graph.wait(seconds)
-        if self._requests is not None:
-            for request in self._graph.take(self._requests, m.ModeRequest, AT_ONCE):
-                self._reply(request)
+        self._desk.serve()
         for car, reader in self._readers.items():
             for twist in self._graph.take(reader, m.Twist, AT_ONCE):
                 self._mailbox.command(car, twist.linear.x, twist.angular.z)
@@ -113,12 +119,9 @@ class Ros2:
             self._readers.clear()
             self._graph.close()
 
-    def _reply(self, request: m.ModeRequest) -> None:
-        assert self._maestro is not None
-        granted = self._maestro.request(request.mode)
-        if granted and request.mode == Mode.START:
-            self._mailbox.pause(False)
-        self._graph.put(self._replies, m.ModeReply(request.guid, request.seq, granted))
+    def _publish(self, view: View, *, frame: bool) -> None:
+        self._stamps.see(view)
+        self._world.publish(view, self._stamps.now(), self._stamps.simulated, frame=frame)
 
     def _look(self) -> None:
         """Tell the mailbox who has come and gone."""
@@ -129,8 +132,3 @@ class Ros2:
             for _ in range(self._there[car], there):
                 self._mailbox.joined(car)
             self._there[car] = there
-
-
-def _now() -> m.Time:
-    seconds, nanoseconds = divmod(time_ns(), 1_000_000_000)
-    return m.Time(seconds, nanoseconds)

@@ -1,7 +1,8 @@
-"""What a session publishes of its cars over ROS 2: model states, odometry, scans, labels."""
+"""What a session publishes of its cars over ROS 2: model states, odometry, transforms, scans, labels, time."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +10,9 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.protocols import View
-from dubins_traffic.spec.labels import words
-from dubins_traffic.transports.ros1.world import half
+from dubins_traffic.spec.labels import Caption
+from dubins_traffic.transports.quaternion import half
+from dubins_traffic.transports.ros1.world import BASE, ODOMETRY
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 
@@ -19,51 +21,91 @@ if TYPE_CHECKING:
 
 MODEL_STATES = "rt/gazebo/model_states"
 LABELS = "rt/loutput"
+CLOCK = "rt/clock"
+TRANSFORMS = "rt/tf"
 
 
 class World:
-    """Publishes the cars of one instance; the writers outlive it, so that who listens stays matched."""
+    """Publishes the cars of one instance; only what someone listens to is made.
 
-    def __init__(self, graph: Graph) -> None:
-        self._graph = graph
+    The writers outlive an instance, so that who listens stays matched.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where.
+    clock : bool
+        Whether `/clock` is published.
+    """
+
+    def __init__(self, graph: Graph, *, clock: bool) -> None:
+        self._graph, self._clock = graph, clock
         self._writers: dict[str, Any] = {}
+        self._odometry_at = -1.0
 
     def begin(self, instance: Instance) -> None:
         """Take the cars of `instance`."""
         self._names = instance.names
-        self._network = instance.problem.network
+        self._caption = Caption(instance.problem.network, instance.names)
         self._laser = instance.problem.laser or Laser()
         self._senses = [Senses(instance, n, laser=self._laser) for n in range(len(instance.names))]
         self._swept = -1
 
-    def publish(self, view: View, stamp: m.Time) -> None:
-        """Publish `view`; the model states come last."""
-        label = list(words(self._network, self._names, view.labels.segment[0], view.labels.at[0]))
-        self._put(LABELS, m.LabelStamped(m.Header(stamp, "map"), label), latched=True)
-        poses, twists = _poses(view.state, len(self._names)), _twists(view.state, len(self._names))
-        sweep = floor(view.time * self._laser.rate + 1e-6)
-        for n, name in enumerate(self._names):
-            self._put(f"rt/{name}/odom", self._odometry(view, n, poses[n], stamp))
-            if sweep != self._swept:
-                self._put(f"rt/{name}/scan", self._scan(view, n, stamp))
-        self._swept = sweep
-        self._put(MODEL_STATES, m.ModelStates(list(self._names), poses, twists))
+    def publish(self, view: View, stamp: float, simulated: float, *, frame: bool) -> None:
+        """Publish `view`, stamped so (seconds); the model states come last.
 
-    def _put(self, topic: str, message: Any, *, latched: bool = False) -> None:
+        `frame`: it is a frame, and everything is sent. Lasers sweep by the time `simulated`.
+        """
+        time = moment(stamp)
+        if self._clock:
+            self._put(CLOCK, m.Clock, lambda: m.Clock(time))
+        self._caption.update(view.labels)
+        labels = m.LabelStamped(m.Header(time, "map"), self._caption.words)
+        self._put(LABELS, m.LabelStamped, lambda: labels, latched=True)
+        if frame or stamp - self._odometry_at >= ODOMETRY:
+            self._odometry_at = stamp
+            for n, name in enumerate(self._names):
+                self._put(f"rt/{name}/odom", m.Odometry, lambda n=n: self._odometry(view, n, time))
+            self._put(TRANSFORMS, m.TFMessage, lambda: self._transforms(view, time))
+        sweep = floor(simulated * self._laser.rate + 1e-6)
+        if sweep != self._swept:
+            self._swept = sweep
+            for n, name in enumerate(self._names):
+                self._put(f"rt/{name}/scan", m.LaserScan, lambda n=n: self._scan(view, n, time))
+        self._put(MODEL_STATES, m.ModelStates, lambda: self._states(view.state))
+
+    def _put(self, topic: str, kind: Any, make: Callable[[], Any], *, latched: bool = False) -> None:
         if topic not in self._writers:
-            self._writers[topic] = self._graph.writer(topic, type(message), latched=latched)
-        self._graph.put(self._writers[topic], message)
+            self._writers[topic] = self._graph.writer(topic, kind, latched=latched)
+        writer = self._writers[topic]
+        if latched or self._graph.heard(writer):
+            self._graph.put(writer, make())
 
-    def _odometry(self, view: View, n: int, pose: m.Pose, stamp: m.Time) -> m.Odometry:
+    def _states(self, state: State) -> m.ModelStates:
+        count = len(self._names)
+        return m.ModelStates(list(self._names), _poses(state, count), _twists(state, count))
+
+    def _odometry(self, view: View, n: int, stamp: m.Time) -> m.Odometry:
         name = self._names[n]
-        if n == 0:
-            x, y, c, s = view.observe(0).pose
-            pose = _pose(x, y, c, s)
         message = m.Odometry(m.Header(stamp, f"{name}/odom"), f"{name}/base_footprint")
-        message.pose.pose = pose
+        message.pose.pose = _odometric(view, n)
         message.twist.twist.linear.x = float(view.state.speed[0, n])
         message.twist.twist.angular.z = float(view.state.yaw_rate[0, n])
         return message
+
+    def _transforms(self, view: View, stamp: m.Time) -> m.TFMessage:
+        """Return where each car's odometry, footprint and base lie, as a Kobuki tells it."""
+        every: list[m.TransformStamped] = []
+        for n, name in enumerate(self._names):
+            pose = _odometric(view, n)
+            moved = m.Transform(m.Vector3(pose.position.x, pose.position.y), pose.orientation)
+            for parent, child, transform in (
+                ("map", f"{name}/odom", m.Transform()),
+                (f"{name}/odom", f"{name}/base_footprint", moved),
+                (f"{name}/base_footprint", f"{name}/base_link", m.Transform(m.Vector3(z=BASE))),
+            ):
+                every.append(m.TransformStamped(m.Header(stamp, parent), child, transform))
+        return m.TFMessage(every)
 
     def _scan(self, view: View, n: int, stamp: m.Time) -> m.LaserScan:
         laser = self._laser
@@ -77,6 +119,19 @@ class World:
             range_max=laser.range_max,
             ranges=self._senses[n].sweep(view.state).tolist(),
         )
+
+
+def moment(seconds: float) -> m.Time:
+    """Return a time in the form of ROS 2."""
+    whole = floor(seconds)
+    return m.Time(whole, int((seconds - whole) * 1e9))
+
+
+def _odometric(view: View, n: int) -> m.Pose:
+    """Return where car n believes it is; the ego's odometry has the instance's noise."""
+    if n == 0:
+        return _pose(*view.observe(0).pose)
+    return _pose(*(float(row[0, n]) for row in view.state[:4]))
 
 
 def _poses(state: State, count: int) -> list[m.Pose]:

@@ -25,7 +25,7 @@ class instance_t(object):
     def __init__(self):
         self.trial = 0
         """
-        Number of the trial in the session, which commands repeat.
+        Number of the trial, which commands repeat. Two sessions have no number in common.
         LCM Type: int64_t
         """
 

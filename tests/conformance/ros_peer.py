@@ -1,0 +1,92 @@
+"""A peer for transports whose messages carry no tick: it numbers frames by their stamps, in simulated time."""
+
+from __future__ import annotations
+
+import time
+from math import floor
+
+RATE = 30.0
+SEEN = 0.3
+"""Seconds within which a session sees who has come or gone."""
+Odometry = tuple[float, float, float]
+"""Stamp, x and y."""
+
+
+class RosPeer:
+    """Takes the ego's odometry and the problem, one message for each; a subclass carries them.
+
+    A subclass has `open`, `shut`, `heard` (whether its commands have a reader), `put` (sends a command) and `fetch`
+    (returns what comes next: the text of a problem, an odometry, or None after a while).
+    """
+
+    def __init__(self) -> None:
+        self.begun = self.there = False
+        self.answered = -1
+        self.again()
+
+    def again(self) -> None:
+        """Come, or come again: what was seen last has not been answered."""
+        self.answered -= 1
+        self.open()
+        self.there = True
+
+    def hang_up(self) -> None:
+        if self.there:
+            self.there = False
+            self.shut()
+            time.sleep(SEEN)
+
+    def problem(self) -> None:
+        """Wait for the announcement, and until this peer is seen to be there."""
+        while not self.begun:
+            came = self.next()
+            self.begun = isinstance(came, str) and came != ""
+            self.start: tuple[float, float] | None = None
+            self.answered = -1
+        until = time.monotonic() + 10
+        while not self.heard():
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        time.sleep(SEEN)
+
+    def frame(self) -> int | None:
+        """Return the number of the next frame that has none of an earlier message, None when the trial is over."""
+        while True:
+            came = self.next()
+            if came == "":
+                self.begun = False
+                return None
+            if not isinstance(came, str) and (tick := self.number(*came)) > self.answered:
+                self.answered = tick
+                return tick
+
+    def number(self, stamp: float, x: float, y: float) -> int:
+        """Frame 0 is shown until it is answered, and the ego moves in every tick after."""
+        self.start = self.start or (x, y)
+        if (x, y) == self.start:
+            self.zero = stamp
+        return floor((stamp - self.zero) * RATE + 1e-3)
+
+    def send(self, speed: float, yaw_rate: float, tick: int) -> None:  # noqa: ARG002  # the messages carry none
+        self.put(speed, yaw_rate)
+
+    def next(self) -> str | Odometry:
+        until = time.monotonic() + 10
+        while (came := self.fetch()) is None:
+            assert time.monotonic() < until, "nothing comes"
+        return came
+
+    def open(self) -> None:
+        raise NotImplementedError
+
+    def shut(self) -> None:
+        raise NotImplementedError
+
+    def heard(self) -> bool:
+        raise NotImplementedError
+
+    def put(self, speed: float, yaw_rate: float) -> None:
+        raise NotImplementedError
+
+    def fetch(self) -> str | Odometry | None:
+        raise NotImplementedError

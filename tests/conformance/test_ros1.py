@@ -1,0 +1,99 @@
+import gc
+import queue
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from dubins_traffic.campaign.sessions import rehearse
+from dubins_traffic.transports.ros1.master import Master
+from dubins_traffic.transports.ros1.messages import load
+from dubins_traffic.transports.ros1.node import leave
+from dubins_traffic.transports.ros1.transport import Ros1
+from tests.conformance.ros_peer import Odometry, RosPeer
+from tests.conformance.transport import BRIEF, TransportConformance
+from tests.recordings import make_instance
+from tests.ros import need_ros
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # rospy leaves sockets to the collector
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def uri(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A master of this module's own; this process is a node there, session and peer in one."""
+    need_ros()
+    rehearse(make_instance(names=("agent0",)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_IP", "127.0.0.1")
+        patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("log")))
+        master = Master(0)
+        patch.setenv("ROS_MASTER_URI", master.uri)
+        try:
+            yield master.uri
+        finally:
+            leave()
+            master.close()
+            gc.collect()
+
+
+class Ros1Peer(RosPeer):
+    def __init__(self, rospy: Any, car: str) -> None:
+        self.rospy, self.car = rospy, car
+        super().__init__()
+
+    def open(self) -> None:
+        m, self.came = load(), queue.SimpleQueue[str | Odometry]()
+        topics = (
+            ("/ego/odom", m.Odometry, self.move),
+            ("/dubins_traffic_maestro/probleminstance_JSON", m.ProblemInstanceJSON, self.learn),
+        )
+        self.ears = [
+            self.rospy.Subscriber(topic, kind, take, tcp_nodelay=True) for topic, kind, take in topics
+        ]
+        topic = f"/{self.car}/mobile_base/commands/velocity"
+        self.commands = self.rospy.Publisher(topic, m.Twist, queue_size=100, tcp_nodelay=True)
+
+    def shut(self) -> None:
+        for each in (*self.ears, self.commands):
+            each.unregister()
+
+    def move(self, message: Any) -> None:
+        position = message.pose.pose.position
+        self.came.put((message.header.stamp.to_sec(), position.x, position.y))
+
+    def learn(self, message: Any) -> None:
+        self.came.put(message.problemjson)
+
+    def heard(self) -> bool:
+        return self.commands.get_num_connections() > 0
+
+    def put(self, speed: float, yaw_rate: float) -> None:
+        twist = load().Twist()
+        twist.linear.x, twist.angular.z = speed, yaw_rate
+        self.commands.publish(twist)
+
+    def fetch(self) -> str | Odometry | None:
+        try:
+            return self.came.get(timeout=0.05)
+        except queue.Empty:
+            return None
+
+
+class TestRos1(TransportConformance):
+    tagged = untyped = False
+    patience = replace(BRIEF, absence=2.0)
+
+    @pytest.fixture(autouse=True)
+    def _at(self, uri: str) -> None:
+        self.uri = uri
+
+    def make(self) -> Ros1:
+        return Ros1(self.uri, clock=True)
+
+    def connect(self, transport: Ros1, car: str) -> Ros1Peer:
+        return Ros1Peer(transport.rospy, car)
