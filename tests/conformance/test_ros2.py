@@ -15,7 +15,7 @@ from tests.conformance.ros_peer import Odometry, RosPeer
 from tests.conformance.transport import BRIEF, TransportConformance
 from tests.recordings import make_instance
 
-DOMAINS = itertools.count(20 + 20 * (os.getpid() % 10))
+DOMAINS = itertools.count(30 + 20 * (os.getpid() % 10))
 
 
 @pytest.fixture(scope="module", autouse=True)

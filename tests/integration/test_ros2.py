@@ -254,10 +254,16 @@ def test_time_transforms_pausing_and_placing(domain: int, config: str, tmp_path:
     assert moved.transform.translation.x == pytest.approx(float(record.frames.x[-1, 0]), abs=0.2)
 
 
-def test_an_interrupted_session_and_no_domain(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_session_a_second_one_and_no_domain(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with running(COMMAND, "ros2", "run", "demo") as session:
         client = Client(domain)
         client.until(READY)
+        with running(COMMAND, "ros2", "run", "demo") as second:
+            _, err = second.communicate(timeout=20)
+        assert second.returncode == 2
+        assert "another session" in err
         session.send_signal(signal.SIGINT)
         _, err = session.communicate(timeout=20)
         client.graph.close()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from time import monotonic
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
+from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import Ending, Mailbox, View
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.desk import AT_ONCE, Desk
+from dubins_traffic.transports.ros2.desk import AT_ONCE, INSTANCE, Desk
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
 from dubins_traffic.transports.ros2.world import World, moment
 from dubins_traffic.transports.stamps import Stamps
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 COMMANDS = "rt/{}/mobile_base/commands/velocity"
 LOOK = 0.1
 """Seconds between two looks at who is there."""
+MEET = 0.3
+"""Seconds in which another session in the domain would be found."""
 
 
 class Ros2:
@@ -68,6 +71,11 @@ class Ros2:
         self._mailbox = mailbox
         self._graph = Graph(self.domain, here=self._here)
         self._open = True
+        try:
+            self._look_for_others()
+        except TransportError:
+            self.close()
+            raise
         self._world = World(self._graph, clock=self._clock)
         self._desk = Desk(self._graph, mailbox, self._maestro)
 
@@ -118,6 +126,19 @@ class Ros2:
             self._open = False
             self._readers.clear()
             self._graph.close()
+
+    def _look_for_others(self) -> None:
+        """See that nobody else tells problems here: two sessions would answer each other's drivers."""
+        probe = self._graph.reader(INSTANCE, m.ProblemInstanceJSON)
+        until = monotonic() + MEET
+        while monotonic() < until:
+            if probe.get_matched_publications():
+                raise TransportError(
+                    f"another session is running in DDS domain {self.domain}, or was killed some seconds ago: "
+                    "end it, or take another --domain"
+                )
+            sleep(0.02)
+        self._graph.drop(probe)
 
     def _publish(self, view: View, *, frame: bool) -> None:
         self._stamps.see(view)
