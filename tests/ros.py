@@ -132,7 +132,7 @@ def graph(folder: Path, *, core: bool = True) -> Iterator[Graph]:
         made.close()
 
 
-def finish(process: subprocess.Popen[str], seconds: float = 40) -> tuple[int, str, str]:
+def finish(process: subprocess.Popen[str], seconds: float = 90) -> tuple[int, str, str]:
     """Wait for `process` and return its status, output and errors."""
     out, err = process.communicate(timeout=seconds)
     return process.returncode, out, err
