@@ -41,13 +41,13 @@ long it will still stand in the disc ahead, s.
 """
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
-DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED = range(9, 18)
-BUILD = 18
+DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
+BUILD = 19
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
 crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
 place; least speed in a disc, m/s; how far left of the centre line a body may reach, how far behind and ahead what
-stands makes a car overtake, and what must be free of the right lane, metres.
+stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, s.
 """
 
 LONGEST_WAY = 2.21
@@ -147,5 +147,6 @@ def _build_of(problems: Sequence[Problem]) -> Floats:
         np.array([own.overtaking_behind for own in rules]),
         np.array([own.overtaking_ahead for own in rules]),
         np.array([own.blocked_gap for own in rules]) + 2.0 * (cars.half_width + cars.rounding),
+        np.array([own.left_time for own in rules]),
     )
     return np.stack([column.astype(np.float64) for column in columns], axis=1)

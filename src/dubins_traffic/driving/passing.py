@@ -16,6 +16,7 @@ from dubins_traffic.driving.law_tables import (
     HALF_LENGTH,
     HALF_WIDTH,
     LANE,
+    LEFT_TIME,
     MIDDLE,
     NEEDED,
     OVER,
@@ -42,6 +43,8 @@ PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
 BERTH = 0.12
 """What is kept free beside what stands, metres."""
+BESIDE = 0.06
+"""The least that must be free beside an obstacle on the other side, metres."""
 SLIP = 0.25
 """So far past what stands a car begins to return, metres, beyond the length of a rectangle."""
 BACK = 0.4
@@ -56,6 +59,8 @@ SLOW = 0.05
 """A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
 LINE, SURE = 0.002, 0.03
 """What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
+OVERTAKEN = 2.0
+"""Who comes from behind on the left within this is let past first, metres."""
 EDGE = 0.05
 """What the centre keeps from the edge of the road, metres."""
 
@@ -117,17 +122,26 @@ def find_way_past(
     back = until + BACK
     if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
+    net = drivers.net[b]
+    length = roads.seg[roads.seg_off[net] + (drivers.ints[b, n, LANE] >> 1), 4]
+    if length + own < build[DISC] + reach + EDGE:
+        return
     if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, build):
         return
+    if stands_beside(b, own, back, offset, way, obstacles, build):
+        return
     time = (back - own) / (0.8 * build[FASTEST]) + TURNING
+    if time > build[LEFT_TIME]:
+        return
     comes = max(COMES, build[FASTEST]) * time + SPARE
     room = line - back
     j = desk.head[drivers.ints[b, n, LANE] >> 1]
     while j >= 0:
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-        if j != n and key > own - 0.5:
-            stands = labels.bits[b, j] & STANDS != 0
+        stands = labels.bits[b, j] & STANDS != 0
+        passes = labels.bits[b, j] & LEFT != 0 and not stands
+        if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > build[MIDDLE]
             wide = half_width(b, j, way, state, build) + build[HALF_WIDTH] + build[ROUNDING] + 0.1
             if before and abs(left - offset) < wide and key < back + (0.5 if stands else comes):
@@ -139,7 +153,6 @@ def find_way_past(
         j = desk.link[j]
     if room < 0.0:
         return
-    net = drivers.net[b]
     v = lane_end(roads, net, drivers.ints[b, n, LANE])
     row = roads.vert_off[net] + v
     if -line - reach - build[DISC] + (line - back) < comes:
@@ -169,7 +182,9 @@ def extent(
     end = own - 1.0
     offset = -1.0
     reach = build[REACH]
-    for _ in range(3):
+    before = end - 1.0
+    while end > before:
+        before = end
         horizon = max(own, end) + 1.5
         j = desk.head[lane >> 1]
         while j >= 0:
@@ -187,6 +202,22 @@ def extent(
                 end = max(end, key + row[7] - reach)
                 offset = max(offset, left + row[7])
     return end, offset
+
+
+@jit
+def stands_beside(
+    b: int, own: float, back: float, offset: float, way: Way, obstacles: ObstacleTable, build: Any
+) -> bool:
+    """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
+    wide = build[HALF_WIDTH] + build[ROUNDING] + BESIDE
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        key = along(way, row[0], row[1])
+        left = aside(way, row[0], row[1])
+        near = own - build[REACH] - row[7] < key < back + build[REACH] + row[7]
+        if near and left > 0.0 and abs(left - offset) < wide + row[7]:
+            return True
+    return False
 
 
 @jit

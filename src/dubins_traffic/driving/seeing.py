@@ -38,7 +38,7 @@ STANDING_GAP, NEAR_ENOUGH = 0.72, 1.4
 the largest distance between centres, at which it still counts as blocking the lane, metres.
 """
 FACING_GAP = 0.8
-"""Gap kept from a car that comes, metres."""
+"""Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
 CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
 SIDE = 0.04
@@ -202,7 +202,7 @@ def wanted_gap(
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
     if along < -0.3 and labels.crosses[b, who] < 0:
-        return FACING_GAP
+        return FACING_GAP if labels.bits[b, n] & LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
     waits = its & EXCUSED != 0 or its & APPROACH != 0
     if in_disc or waits:
