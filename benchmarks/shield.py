@@ -138,9 +138,9 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         group.advance()
         before, aside = aside, (group.labels.bits[:, EGO] & LEFT) != 0
         passed += aside & ~before
-    for b, one in enumerate(own):
+    for b, outcome in enumerate(group.outcomes(range(count), "shield")):
         told = {REASONS[k]: int(n) for k, n in enumerate(reasons[b]) if k and n}
-        yield _shielded(one.trial, kinds[b], group.outcome(b, kinds[b]).score, told, int(passed[b]))
+        yield _shielded(own[b].trial, kinds[b], outcome.score, told, int(passed[b]))
 
 
 def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0) -> Shielded:
