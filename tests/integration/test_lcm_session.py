@@ -47,7 +47,7 @@ def running(*command: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate(timeout=20)
 
 
-def ended(process: subprocess.Popen[str], seconds: float = 60.0) -> tuple[int, str, str]:
+def ended(process: subprocess.Popen[str], seconds: float = 240.0) -> tuple[int, str, str]:
     out, err = process.communicate(timeout=seconds)
     return process.returncode, out, err
 
