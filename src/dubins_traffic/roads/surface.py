@@ -18,6 +18,8 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 
 CELLS_PER_SEGMENT = 8.0
 POINTS_AT_ONCE = 1 << 15
+FEW = 1 << 14
+"""Up to so many pairs of a cell and an item all are looked at, which is sooner done."""
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.paving import Paving
@@ -174,14 +176,16 @@ def _sieve(
 ) -> tuple[Ints, Ints]:
     """Return (start, item): the items that may be nearest somewhere in each cell.
 
-    One cell that covers the box is halved again and again. Of half diagonal h and with least distance d from its
-    centre, it keeps the items at most d + 2h from the centre: no other is nearest to any of its points.
+    One cell that covers the box is halved again and again, or all cells are looked at where they are few. Of half
+    diagonal h and with least distance d from its centre, a cell keeps the items at most d + 2h from the centre: no
+    other is nearest to any of its points.
     """
     x0, y0, size, nx, ny, slack = box
-    depth = (max(nx, ny) - 1).bit_length()
-    cx = cy = np.zeros(1, dtype=np.int64)
-    item = np.arange(count)
-    start = np.array([0, count])
+    few = nx * ny * count <= FEW
+    depth = 0 if few else (max(nx, ny) - 1).bit_length()
+    cy, cx = np.divmod(np.arange(nx * ny if few else 1), nx)
+    item = np.tile(np.arange(count), len(cx))
+    start = count * np.arange(len(cx) + 1)
     for level in range(depth, -1, -1):
         side = size * (1 << level)
         group = np.repeat(np.arange(len(cx)), np.diff(start))
