@@ -90,6 +90,7 @@ class Synthesized(Rules):
     def start(self, problem: Problem) -> None:
         """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
         super().start(problem)
+        self._course = None
         drivers = self._drivers
         if drivers is None or not problem.e_agents:
             return
@@ -123,7 +124,7 @@ class Synthesized(Rules):
         command = super().act(observation)
         if not course.wins:
             return self._guarded(course, observation, command)
-        return self._waiting(course.advice, observation, command)
+        return self._waiting(course, observation, command)
 
     @property
     def play(self) -> RoadPlay | None:
@@ -190,16 +191,14 @@ class Synthesized(Rules):
             course.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given
 
-    def _waiting(self, advice: Advice | None, seen: Observation, command: Command) -> Command:
+    def _waiting(self, course: _Course, seen: Observation, command: Command) -> Command:
         """Return the command of an ego that waits before the disc ahead, if it is told to and keeps its place."""
-        drivers = self._drivers
+        drivers, advice = self._drivers, course.advice
         if advice is None or advice.enter or seen.propositions.crosses >= 0 or drivers is None:
             return command
         if drivers.ints[0, EGO, TURN] > self._patience:
             return command
-        arena = self._course.strategy.board.arena if self._course else None
-        assert arena is not None
-        x, y = self._points[arena.nodes[advice.node].vertex]
+        x, y = self._points[course.strategy.board.arena.nodes[advice.node].vertex]
         room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)
         if command.speed * self._period <= room:
             return command
