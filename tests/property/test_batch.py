@@ -90,6 +90,19 @@ def test_networks_of_their_own_and_a_batch_of_any_size_and_threads() -> None:
     assert plain(sheets[0].trials[4]) == plain(single.score)
 
 
+def test_a_world_with_so_many_cars_that_they_are_looked_for_in_cells() -> None:
+    config = configuration(
+        network={"grid": {"rows": 4, "columns": 4, "length": 4.0}},
+        **{"e-agents": [{"type": "lawful", "name": "agent", "count": 30, "parameters": {"rolls": 0.3}}]},
+        duration_bounds=[12, 12],
+    )
+    (own,) = run_batch(config, trials=1, seed=SEED).outcomes
+    single = run_trial(draw(config, SEED, 0), "rules")
+    assert own.score.verdict is not None
+    assert own.score.verdict.violations
+    assert plain(own.score) == plain(single.score)
+
+
 class Wheel:
     """Drives in a circle; by itself and for whole batches."""
 

@@ -32,8 +32,10 @@ from dubins_traffic.driving.law_tables import (
     blank,
     build_of,
     desk,
+    no_ways,
 )
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.roads.table import pack_distinct
@@ -57,11 +59,18 @@ class Lawful:
         )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._drivers = pack_drivers(instances, cars, net)
-        self._desk = desk(cars, int(np.diff(self._roads.seg_off).max()))
+        own = desk(cars, int(np.diff(self._roads.seg_off).max()))
+        self._arrays = (*self._roads, *self._obstacles, *self._drivers, *own)
+        self._state: State | None = None
+        self._labels: Labels | None = None
+        self._commands: Floats | None = None
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
-        decide(tick, state, labels, self._roads, self._obstacles, self._drivers, self._desk, commands)
+        if state is not self._state or labels is not self._labels or commands is not self._commands:
+            self._state, self._labels, self._commands = state, labels, commands
+            self._call = bound(decide, (0, commands), (*state, *labels, *self._arrays))
+        self._call(tick, commands)
 
 
 def pack_drivers(
@@ -107,6 +116,7 @@ def pack_drivers(
         build=build_of([instance.problem for instance in instances]),
         ints=ints,
         floats=floats,
+        way=no_ways(len(instances), cars),
         stage=np.array(stage, dtype=np.int64),
         distance=distance,
     )

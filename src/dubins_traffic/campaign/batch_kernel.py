@@ -13,7 +13,9 @@ import numpy as np
 from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.tables import Agents
 from dubins_traffic.agents.tables import Workspace as AgentSpace
-from dubins_traffic.cars.motion import FULL, MOVED, Workspace, step_trial
+from dubins_traffic.cars.motion import FULL, MOVED, step_trial
+from dubins_traffic.cars.near import Spacing, keep_apart, lost
+from dubins_traffic.cars.partners import Workspace
 from dubins_traffic.cars.rows import Rows
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
@@ -78,6 +80,7 @@ class World(NamedTuple):
     space: AgentSpace
     tally: Tally
     course: Course
+    spacing: Spacing
 
 
 @jit
@@ -120,7 +123,10 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
         if own[STATUS] != RUNNING:
             return
         before = world.work.found[0]
-        moved = step_trial(b, dt, world.state, commands, world.cars, world.obstacles, world.rows, world.work)
+        least = world.spacing.least[b] - lost(world.spacing, b, tick)
+        moved = step_trial(
+            b, dt, least, world.state, commands, world.cars, world.obstacles, world.rows, world.work
+        )
         if moved != MOVED:
             own[STATUS] = NO_CONTACTS if moved == FULL else NO_PAIRS
             return
@@ -128,6 +134,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
         if world.work.found[0] > before:
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own[TICK] = tick + 1
+    keep_apart(world.state, b, tick + 1, world.spacing)
     label_trial(b, tick + 1, world.state, world.roads, world.beside, world.rules, world.labels, world.memory)
     _observe(b, tick + 1, world)
     if ego_hit:
@@ -155,14 +162,17 @@ def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> Non
         own[STATUS] = NO_SIGHT
         return
     if own[LAWFUL] != 0:
+        spacing = world.spacing
         decide_lawful(
-            b, tick, world.course.sight2[b], world.state, world.labels, world.roads, world.obstacles,
-            world.drivers, world.desk, commands,
+            b, tick, world.course.sight2[b], spacing.apart[b], lost(spacing, b, tick), world.state, world.labels,
+            world.roads, world.obstacles, world.drivers, world.desk, commands,
         )  # fmt: skip
+    unsound = 0.0
     for n in range(world.state.count[b]):
-        for k in range(2):
-            if commands[b, n, k] - commands[b, n, k] != 0.0:
-                own[STATUS] = FAULTY
+        speed, yaw_rate = commands[b, n, 0], commands[b, n, 1]
+        unsound += (speed - speed) + (yaw_rate - yaw_rate)
+    if unsound != 0.0:
+        own[STATUS] = FAULTY
     own[DECIDED] = 1
 
 
@@ -192,8 +202,8 @@ def _observe(b: int, tick: int, world: World) -> None:
         return
     first = docket.filled[0]
     judge_trial(
-        b, tick, world.state, world.roads, world.beside, world.rules, world.terms, world.labels, world.memory,
-        docket,
+        b, tick, world.spacing, world.state, world.roads, world.beside,
+        world.rules, world.terms, world.labels, world.memory, docket,
     )  # fmt: skip
     for k in range(first, docket.filled[0]):
         n = docket.row[k, OF_CAR]

@@ -29,6 +29,7 @@ from dubins_traffic.campaign.batch_kernel import (
     World,
     run_trials,
 )
+from dubins_traffic.cars.near import Spacing, spacing
 from dubins_traffic.cars.state import EGO, Contact, Labels, State
 from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
 from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
@@ -112,6 +113,7 @@ class Group:
             labeller.memory, docket, pack_drivers(instances, places, net, rounds), desk(places, segments),
             pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
             new_tally(instances, net, places), self._course(len(work.contact), len(docket.row)),
+            spacing(trials, places, rows.far - cars.reach),
         )  # fmt: skip
         kinds, index = kinds_of(problems)
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
@@ -132,6 +134,11 @@ class Group:
     def ticks(self) -> Ints:
         """The present frame of each trial, (B,)."""
         return self._world.course.ints[:, TICK]
+
+    @property
+    def spacing(self) -> Spacing:
+        """How far apart the cars are known to be."""
+        return self._world.spacing
 
     @property
     def active(self) -> Ints:

@@ -5,74 +5,25 @@ Loops over trials and cars; the element functions are in `kernels.trig` and `ker
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from dubins_traffic.cars.near import FEW, candidates
+from dubins_traffic.cars.partners import PARTNERS, VACANT, Workspace, part
 from dubins_traffic.cars.rows import Rows, any_near, clip, look, move
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
 from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.kernels.trig import advance
 
-PARTED = 0.01
-"""Two bodies that touched count as touching until they are this far apart, metres."""
-PARTNERS = 12
 MOVED, FULL, CROWDED = range(3)
-VACANT = -(2**62)
-CONTACT_FIELDS = 12
-
-
-class Workspace(NamedTuple):
-    """What `step` needs beside the state, allocated once.
-
-    `partner` (B, N, PARTNERS): whom a car touches since their contact, VACANT where nobody; held by the lower
-    index, obstacle k as -1 - k. `touching` (B,): number of such pairs. `pair` (P, 2) and `when` (P,): candidate
-    pairs of one trial and their instants of contact. `until` (N,): when each car was fixed. `head`, `link` and
-    `cell`: buckets of the neighbour search. `contact` (C, CONTACT_FIELDS): trial, car, other, time in the tick,
-    point, normal, closing speeds, moved flags. `found` (1,): number of contacts.
-    """
-
-    partner: Ints
-    touching: Ints
-    pair: Ints
-    when: Floats
-    until: Floats
-    head: Ints
-    link: Ints
-    cell: Ints
-    contact: Floats
-    found: Ints
-
 
 # Where each table begins and ends among the arrays of a call.
 STATE_END = len(State._fields)
 CARS_END = STATE_END + len(CarTable._fields)
 OBSTACLES_END = CARS_END + len(ObstacleTable._fields)
 ROWS_END = OBSTACLES_END + len(Rows._fields)
-
-
-def workspace(trials: int, cars: int) -> Workspace:
-    """Return a workspace for a batch of `trials` x `cars`."""
-    buckets = 64
-    while buckets < 2 * cars:
-        buckets *= 2
-    pairs = max(64, 8 * cars)
-    return Workspace(
-        partner=np.full((trials, cars, PARTNERS), VACANT, dtype=np.int64),
-        touching=np.zeros(trials, dtype=np.int64),
-        pair=np.zeros((pairs, 2), dtype=np.int64),
-        when=np.zeros(pairs),
-        until=np.zeros(cars),
-        head=np.zeros(buckets, dtype=np.int64),
-        link=np.zeros(cars, dtype=np.int64),
-        cell=np.zeros((cars, 2), dtype=np.int64),
-        contact=np.zeros((max(1024, 2 * cars), CONTACT_FIELDS)),
-        found=np.zeros(1, dtype=np.int64),
-    )
 
 
 @jit
@@ -143,7 +94,7 @@ def _step(
             if pairs > 0:
                 _pass_on(state, cars, obstacles, dt, work, begin, k)
                 _resolve(state, commands, cars, obstacles, dt, work, k, pairs)
-                _part(state, cars, obstacles, work, k)
+                part(state, cars, obstacles, work, k)
                 begin = k + 1
         _pass_on(state, cars, obstacles, dt, work, begin, last)
         b = last
@@ -154,6 +105,7 @@ def _step(
 def step_trial(
     b: int,
     dt: float,
+    least: float,
     state: State,
     commands: Floats,
     cars: CarTable,
@@ -163,6 +115,7 @@ def step_trial(
 ) -> int:
     """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
 
+    No two cars are nearer to each other than `least`, metres, or nothing is known of that (0).
     Returns MOVED, or what is too small, FULL for the buffer of contacts or CROWDED for that of pairs: then nothing
     has moved.
     """
@@ -172,8 +125,10 @@ def step_trial(
     cars_here = state.count[b]
     clip(r, b, commands[b], state.speed[b], state.yaw_rate[b], 0, cars_here)
     pairs = 0
-    close = n > FEW or obstacles.off[b] != obstacles.off[b + 1]
-    if close or any_near(state.x[b], state.y[b], cars_here, r.near[b]):
+    close = obstacles.off[b] != obstacles.off[b + 1]
+    if not close and least <= 2.0 * r.far[b]:
+        close = n > FEW or any_near(state.x[b], state.y[b], cars_here, r.near[b])
+    if close:
         pairs = candidates(
             state, b, 2.0 * r.far[b], obstacles, r.far[b], work.pair, work.head, work.link, work.cell
         )
@@ -181,13 +136,13 @@ def step_trial(
             return CROWDED
     if pairs > 0:
         _resolve(state, commands, cars, obstacles, dt, work, b, pairs)
-        _part(state, cars, obstacles, work, b)
+        part(state, cars, obstacles, work, b)
         return MOVED
     move(
         state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt, 0, cars_here
     )  # fmt: skip
     if work.touching[b] > 0:
-        _part(state, cars, obstacles, work, b)
+        part(state, cars, obstacles, work, b)
     return MOVED
 
 
@@ -212,7 +167,7 @@ def _pass_on(
     )  # fmt: skip
     for b in range(first, last):
         if work.touching[b] > 0:
-            _part(state, cars, obstacles, work, b)
+            part(state, cars, obstacles, work, b)
 
 
 @jit
@@ -379,36 +334,3 @@ def _note(
     row[10] = _moved(cars, b, commands[b, i, 0], commands[b, i, 1])
     row[11] = moved
     work.found[0] += 1
-
-
-@jit
-def _part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
-    """Forget the pairs of trial b that are PARTED or more apart."""
-    for i in range(state.count[b]):
-        for k in range(PARTNERS):
-            other = work.partner[b, i, k]
-            if other == VACANT:
-                continue
-            if _gap(state, cars, obstacles, b, i, other) >= PARTED:
-                work.partner[b, i, k] = VACANT
-                work.touching[b] -= 1
-
-
-@jit
-def _gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int, other: int) -> float:
-    """Return the gap, metres, between car i and `other`, a car or obstacle -1 - k."""
-    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
-    x, y, c, s = state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i]
-    if other >= 0:
-        best, _, _, _, _ = separation(
-            x, y, c, s, a, h, r,
-            state.x[b, other], state.y[b, other], state.c[b, other], state.s[b, other], a, h, r,
-        )  # fmt: skip
-        return best
-    best = NEVER
-    for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        if obstacles.owner[k] == -1 - other:
-            p = obstacles.part[k]
-            distance, _, _, _, _ = separation(x, y, c, s, a, h, r, p[0], p[1], p[2], p[3], p[4], p[5], p[6])
-            best = min(best, distance)
-    return best

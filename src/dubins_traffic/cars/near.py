@@ -2,15 +2,150 @@
 
 from __future__ import annotations
 
-from math import floor
+from math import floor, sqrt
+from typing import NamedTuple
+
+import numpy as np
 
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.compile import jit, jit_inline
 
 FEW = 24
 """Up to this many cars all pairs are looked at, which is faster."""
+CELL = 4.0
+"""Side of the cells in which the nearest of more cars is looked for, metres; beyond that it does not matter."""
+EVERY = 8
+"""Ticks after which it is looked anew how far cars are apart."""
+
+
+class Spacing(NamedTuple):
+    """How far apart the cars of a batch are, as of frame `since` (B,) of each trial.
+
+    `apart` (B, N): distance from each car's centre to the nearest other one's, metres, or less; `least` (B,): the least
+    of these; `drift` (B,): metres
+    that a car can move in a tick. `head` (B, H), `link` (B, N) and `cell` (B, N, 2): the cars in buckets of cells, with
+    H = 0 where there are few or nothing is known; `near` (N,): scratch.
+    """
+
+    apart: Floats
+    least: Floats
+    since: Ints
+    drift: Floats
+    head: Ints
+    link: Ints
+    cell: Ints
+    near: Ints
+
+
+def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
+    """Return the spacing of `trials` x `cars`, which move up to `drift` (B,) a tick, before their first frame."""
+    buckets = 0
+    if cars > FEW:
+        buckets = 1 << (2 * cars - 1).bit_length()
+    return Spacing(
+        np.zeros((trials, cars)),
+        np.zeros(trials),
+        np.full(trials, -EVERY, dtype=np.int64),
+        drift,
+        np.zeros((trials, buckets), dtype=np.int64),
+        np.zeros((trials, cars), dtype=np.int64),
+        np.zeros((trials, cars, 2), dtype=np.int64),
+        np.zeros(cars, dtype=np.int64),
+    )
+
+
+def unknown(trials: int, cars: int) -> Spacing:
+    """Return the spacing of cars of which nobody knows how they move."""
+    own = spacing(trials, cars, np.zeros(trials))
+    return own._replace(head=np.zeros((trials, 0), dtype=np.int64))
+
+
+@jit_inline
+def lost(own: Spacing, b: int, tick: int) -> float:
+    """Return how much nearer two cars of trial b may be in frame `tick` than `apart` says, metres."""
+    return 2.0 * (tick - own.since[b]) * own.drift[b]
+
+
+@jit_inline
+def keep_apart(state: State, b: int, tick: int, own: Spacing) -> None:
+    """Find how far apart the cars of trial b are in frame `tick`, if that has not been done for a while."""
+    if tick - own.since[b] >= EVERY:
+        _look_round(state, b, tick, own)
+
+
+@jit
+def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
+    n = state.count[b]
+    apart = own.apart[b]
+    own.since[b] = tick
+    for i in range(n):
+        apart[i] = CELL * CELL if own.head.shape[1] > 0 else 1e300
+    if own.head.shape[1] > 0:
+        _nearest_in_cells(state, b, apart, own.head[b], own.link[b], own.cell[b])
+    else:
+        for i in range(1, n):
+            for j in range(i):
+                dx = state.x[b, j] - state.x[b, i]
+                dy = state.y[b, j] - state.y[b, i]
+                d2 = dx * dx + dy * dy
+                apart[i] = min(apart[i], d2)
+                apart[j] = min(apart[j], d2)
+    least = CELL
+    for i in range(n):
+        apart[i] = sqrt(apart[i])
+        least = min(least, apart[i])
+    own.least[b] = least
+
+
+@jit
+def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Ints, cell: Ints) -> None:
+    """Lower `apart` (N,) to the squared distances to the nearest cars, where they are less; fill the buckets."""
+    size = head.shape[0]
+    for k in range(size):
+        head[k] = -1
+    for j in range(state.count[b]):
+        kx = floor(float(state.x[b, j] / CELL))
+        ky = floor(float(state.y[b, j] / CELL))
+        for mx in range(kx - 1, kx + 2):
+            for my in range(ky - 1, ky + 2):
+                i = head[_bucket(mx, my, size)]
+                while i >= 0:
+                    if cell[i, 0] == mx and cell[i, 1] == my:
+                        dx = state.x[b, j] - state.x[b, i]
+                        dy = state.y[b, j] - state.y[b, i]
+                        d2 = dx * dx + dy * dy
+                        apart[i] = min(apart[i], d2)
+                        apart[j] = min(apart[j], d2)
+                    i = link[i]
+        cell[j, 0] = kx
+        cell[j, 1] = ky
+        here = _bucket(kx, ky, size)
+        link[j] = head[here]
+        head[here] = j
+
+
+@jit
+def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, own: Spacing) -> int:
+    """Write all cars of trial b that may be within `far` of a point into `own.near`; return how many."""
+    size = own.head.shape[1]
+    count = 0
+    if size == 0 or far + (tick - own.since[b]) * own.drift[b] > CELL:
+        for n in range(state.count[b]):
+            own.near[n] = n
+        return int(state.count[b])
+    kx = floor(float(x / CELL))
+    ky = floor(float(y / CELL))
+    for mx in range(kx - 1, kx + 2):
+        for my in range(ky - 1, ky + 2):
+            n = own.head[b, _bucket(mx, my, size)]
+            while n >= 0:
+                if own.cell[b, n, 0] == mx and own.cell[b, n, 1] == my:
+                    own.near[count] = n
+                    count += 1
+                n = own.link[b, n]
+    return count
 
 
 @jit

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
@@ -27,7 +28,7 @@ class Rows(NamedTuple):
     `far`: how far from its centre a car may reach in one tick; `near`: square of the distance of the centres within
     which two cars may then meet. `alike` (B,): how many trials
     from this one on have the same constants, at most RUN; `mask` (N, RUN * N): 1 where the car o places on is of
-    the same trial, else 0; `close` (RUN * N,): scratch.
+    the same trial, else 0; `close` (RUN * N,): scratch; both without columns where there are more than FEW cars.
     """
 
     low: Floats
@@ -51,12 +52,12 @@ def rows(cars: CarTable, n: int, dt: float) -> Rows:
     curvature = np.where(free, 0.0, 1.0 / np.where(free, 1.0, cars.turning_radius))
     near = 4.0 * far * far
     constants = (cars.speed_low, cars.speed_high, cars.yaw_rate, slack, curvature, far, near)
-    place = np.arange(RUN * n) % n
+    place = np.arange(RUN * n if n <= FEW else 0) % n
     return Rows(
         *constants,
         alike=_alike(np.stack(constants)),
         mask=np.array([place + shift < n for shift in range(n)], dtype=np.float64),
-        close=np.zeros(RUN * n, dtype=np.int64),
+        close=np.zeros(len(place), dtype=np.int64),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
@@ -20,8 +22,10 @@ from dubins_traffic.driving.law_tables import (
     blank,
     build_of,
     desk,
+    no_ways,
 )
 from dubins_traffic.driving.rounds import nearest_stage, stages
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
 
@@ -64,9 +68,12 @@ class Rules:
             build=build_of([problem]),
             ints=ints[None].copy(),
             floats=floats[None].copy(),
+            way=no_ways(1, cars),
             stage=stage,
             distance=distance,
         )
+        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._desk)
+        self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -86,8 +93,6 @@ class Rules:
             drivers.ints[0, EGO, PLACE] = nearest_stage(
                 drivers.distance, observation.propositions.lane, observation.propositions.segment
             )
-        decide(
-            observation.tick, state, labels, self._roads, self._obstacles, drivers, self._desk, self._command
-        )
+        self._decide(observation.tick, self._command)
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)

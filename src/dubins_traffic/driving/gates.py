@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.driving.exits import cheapest, price_exits, ticks_of
 from dubins_traffic.driving.law_tables import (
-    DEGREE,
+    CROSSING,
     DISC,
     FORFEIT,
     HALF_WIDTH,
@@ -69,16 +69,18 @@ def mind_gate(
     v = lane_end(roads, net, ints[LANE])
     if part != BEFORE or labels.crosses[b, n] == v:
         return speed
-    edge = build[DISC] + build[REACH] + MARGIN
-    aside = left - build[MIDDLE]
-    line = sqrt(max(edge * edge - aside * aside, 0.0))
-    to_line = -way_to_go(way, x, y) - line
     row = roads.vert_off[net] + v
-    crossing = roads.degree[row] >= build[DEGREE]
+    crossing = drivers.way[b, n, CROSSING] != 0.0
     bits = np.int64(labels.bits[b, n])
     its_turn = crossing and bits & GOES_NOW == GOES_NOW
     ints[TURN] = ints[TURN] + 1 if its_turn else 0
     ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
+    edge = build[DISC] + build[REACH] + MARGIN
+    to_go = -way_to_go(way, x, y)
+    if to_go - edge >= speed * build[PERIOD]:
+        return speed
+    aside = left - build[MIDDLE]
+    to_line = to_go - sqrt(max(edge * edge - aside * aside, 0.0))
     if to_line >= speed * build[PERIOD]:
         return speed
     if crossing:

@@ -8,7 +8,6 @@ before every tick rules out all motions that could bring about a contact, whatev
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,19 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.driving.gates import TRAIL, mind_gate, turn_elsewhere
+from dubins_traffic.driving.kept_ways import way_of
 from dubins_traffic.driving.lane_graph import lane_at
 from dubins_traffic.driving.law_tables import (
     ABSENT,
     ASIDE,
+    CROSSING,
     DISC,
     FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
     HOLD,
     KIND,
     LANE,
     LEFT_SIDE,
+    LENGTH,
     MIDDLE,
     MOOD,
     NEMESIS,
@@ -36,28 +36,36 @@ from dubins_traffic.driving.law_tables import (
     PERIOD,
     REACH,
     ROUND,
-    ROUNDING,
-    SLOWEST,
     SPEED,
     TAILGATING,
     THROUGH_SPEED,
-    TIGHTEST,
     UNTIL,
     WAITED,
-    YAW_MOST,
+    WAY,
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, stays_right
-from dubins_traffic.driving.safety import VERGE, leaves_road, motion_is_safe
-from dubins_traffic.driving.seeing import QUEUE_GAP, gather, look_ahead, wanted_gap, way_to_go
-from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way, way_between
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
+from dubins_traffic.driving.safety import VERGE, leaves_road
+from dubins_traffic.driving.seeing import (
+    HELD,
+    QUEUE_GAP,
+    alone,
+    gather,
+    look_ahead,
+    wanted_gap,
+    way_to_go,
+)
+from dubins_traffic.driving.steering import catch_up, move, put_off
+from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED, LEFT
 
+SURELY = 1e-6
+"""By how much more than rounding a car has to be sure that it stays on the road, metres."""
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
 asked, and on its way to another exit it might leave the disc outside its lane."""
@@ -67,52 +75,64 @@ PRESSED = 0.4
 """Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
-HURRY = 0.25
-"""Metres in which a car returns to its way."""
-SLANT, STEEP = 0.7, 0.9
-"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return."""
-ALIGNED, NIMBLE = 0.8, 0.98
-"""Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
-GAIN = 8.0
-"""Yaw rate for each unit of the sine of that angle, 1/s."""
+
+
+# Where each table begins and ends among the arrays of a call.
+STATE_END = len(State._fields)
+LABELS_END = STATE_END + len(Labels._fields)
+ROADS_END = LABELS_END + len(RoadTable._fields)
+OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
+DRIVERS_END = OBSTACLES_END + len(Drivers._fields)
 
 
 @jit
-def decide(
-    tick: int,
-    state: State,
-    labels: Labels,
-    roads: RoadTable,
-    obstacles: ObstacleTable,
-    drivers: Drivers,
-    desk: Desk,
-    commands: Floats,
-) -> None:
-    """Write the commands of all cars that the law drives."""
+def decide(tick: int, commands: Floats, *arrays: Any) -> None:
+    """Write the commands of all cars that the law drives.
+
+    `arrays` are those of State, Labels, RoadTable, ObstacleTable, Drivers and Desk, one after another: a call from
+    Python with arrays takes a third of the time of one with tables of them.
+    """
+    _decide(
+        tick, State(*arrays[:STATE_END]), Labels(*arrays[STATE_END:LABELS_END]),
+        RoadTable(*arrays[LABELS_END:ROADS_END]), ObstacleTable(*arrays[ROADS_END:OBSTACLES_END]),
+        Drivers(*arrays[OBSTACLES_END:DRIVERS_END]), Desk(*arrays[DRIVERS_END:]), commands,
+    )  # fmt: skip
+
+
+@jit_inline
+def _decide(
+    tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
+    desk: Desk, commands: Floats,
+) -> None:  # fmt: skip
     for b in range(drivers.active.shape[0]):
         if drivers.active[b] != 0:
-            decide_trial(b, tick, -1.0, state, labels, roads, obstacles, drivers, desk, commands)
+            decide_trial(
+                b, tick, -1.0, desk.apart, 0.0, state, labels, roads, obstacles, drivers, desk, commands
+            )
 
 
-@jit_inner
+@jit_inline
 def decide_trial(
-    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
+    b: int, tick: int, sight2: float, apart: Floats, loss: float, state: State, labels: Labels,
+    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
 ) -> None:  # fmt: skip
     """Write the commands of the cars of one trial that the law drives.
 
     The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
-    given if that is negative.
+    given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
     """
     hidden = list_cars(b, sight2, state, labels, desk)
+    enough = loss + alone(drivers.build[b])
+    if obstacles.off[b] != obstacles.off[b + 1]:
+        enough = HELD
     for n in range(state.count[b]):
         if n == 1 and hidden > 0:
             unlist_cars(b, state, labels, desk)
             list_cars(b, -1.0, state, labels, desk)
         if drivers.ints[b, n, KIND] != ABSENT:
-            speed, yaw_rate = drive(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-            commands[b, n, 0] = speed
-            commands[b, n, 1] = yaw_rate
+            lonely = apart[n] > enough
+            drive(b, n, tick, lonely, state, labels, roads, obstacles, drivers, desk, commands)
+    catch_up(b, state, drivers, desk, commands)
     unlist_cars(b, state, labels, desk)
 
 
@@ -143,90 +163,128 @@ def unlist_cars(b: int, state: State, labels: Labels, desk: Desk) -> None:
 
 @jit_inline
 def drive(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the command of a car."""
-    net = drivers.net[b]
+    b: int, n: int, tick: int, lonely: bool, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
+) -> None:  # fmt: skip
+    """Write the command of a car; a `lonely` one has nothing around that matters to a car that just drives on."""
     build = drivers.build[b]
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    x, y = state.x[b, n], state.y[b, n]
     if ints[KIND] == ROUND:
         count_visit(b, n, labels, drivers)
     elif ints[KIND] == NEMESIS:
         watch_ego(b, n, labels, drivers)
-    way = keep_place(b, n, tick, x, y, c, s, state, labels, roads, drivers, desk)
+    way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, drivers, desk)
     part, key, left, px, py = on_way(way, x, y)
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, desk)
+    near = 0
+    if not (lonely and just_drives(ints, floats, drivers.way[b, n])):
+        near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, desk)
     gap, who, close = look_ahead(
         b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, desk
     )
     rides = ints[MOOD] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
-    passes = floats[ASIDE] != 0.0
-    speed = build[FASTEST] if rides or passes else floats[SPEED]
-    if labels.crosses[b, n] >= 0:
-        speed = min(max(speed, build[THROUGH_SPEED]), build[FASTEST])
+    speed = cruise(rides or floats[ASIDE] != 0.0, labels.crosses[b, n] >= 0, build, floats)
     speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
+    kept = 0.0
+    if who != -1:
+        speed, kept = follow(
+            b, n, speed, gap, who, rides, part, way, near, state, labels, roads, drivers, desk
+        )
+    speed = dawdle(b, n, speed, near, state, labels, roads, drivers, desk)
+    speed, offset = pass_what_stands(
+        b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
+    )
+    if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
+        turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
+    bend = way.bend if part == THROUGH else 0.0
+    if put_off(b, n, speed, left - offset, px, py, bend, close, labels, obstacles, drivers, desk):
+        return
+    speed, yaw_rate = move(
+        b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,
+        labels, obstacles, drivers, desk,
+    )  # fmt: skip
+    if (
+        speed != 0.0
+        and ints[KIND] == ROUND
+        and strays(b, n, speed, yaw_rate, left, part, state, roads, drivers)
+    ):
+        speed = 0.0
+    commands[b, n, 0] = speed
+    commands[b, n, 1] = yaw_rate
+
+
+@jit_inline
+def just_drives(ints: Any, floats: Any, way: Any) -> bool:
+    """Tell whether a car does nothing for which it looks at cars that are far away."""
+    plain = ints[KIND] != NEMESIS and ints[MOOD] & TAILGATING == 0 and floats[ASIDE] == 0.0
+    return plain and way[CROSSING] != 0.0
+
+
+@jit_inline
+def cruise(hurries: bool, in_disc: bool, build: Any, floats: Any) -> float:
+    """Return the speed at which a car drives if nothing is in its way."""
+    speed = build[FASTEST] if hurries else floats[SPEED]
+    if in_disc:
+        speed = min(max(speed, build[THROUGH_SPEED]), build[FASTEST])
+    return speed
+
+
+@jit_inline
+def follow(
+    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: Way, near: int,
+    state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
+) -> tuple[float, float]:  # fmt: skip
+    """Return (speed, gap to keep) of a car that has `who` ahead."""
+    build = drivers.build[b]
+    ints = drivers.ints[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
     behind = who >= 0 and labels.lane[b, who] == ints[LANE] and kept > QUEUE_GAP
     if behind and is_pressed(b, n, near, state, labels, roads, drivers, desk):
         kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
-    speed = min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead)
-    if ints[KIND] == NEMESIS and not passes and before_ego(b, n, near, state, labels, roads, drivers, desk):
-        speed = min(speed, DAWDLE)
-    if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, net, ints[LANE]):
-        floats[HOLD] -= build[PERIOD]
-        speed = 0.0
-    speed, offset = pass_what_stands(
-        b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
-    )
-    if part != BEFORE and ints[WAITED] > ticks_of(STUCK, build) and ints[KIND] != ROUND:
-        turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
-    trusted = who if rides else -1
-    speed, yaw_rate = move(
-        b, n, speed, left, offset, px, py, part, outside, way, near if close else 0, trusted, state, labels,
-        obstacles, drivers, desk,
-    )  # fmt: skip
-    if speed != 0.0 and ints[KIND] == ROUND:
-        edge = float(roads.half_width[net]) - VERGE
-        if leaves_road(x, y, c, s, speed, yaw_rate, build[PERIOD], edge, roads, net):
-            speed = 0.0
-    return speed, yaw_rate
+    return min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead), kept
 
 
 @jit_inline
-def move(
-    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, part: int, outside: bool,
-    way: Way, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
-    build = drivers.build[b]
-    c, s = state.c[b, n], state.s[b, n]
-    passes = drivers.floats[b, n, ASIDE] != 0.0
-    steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
-    aligned = NIMBLE if passes and left < offset else ALIGNED
-    speed, yaw_rate = steer(c, s, left - offset, px, py, part, way, allowed, steep, aligned, build)
-    if passes or build[TIGHTEST] > 0.0:
-        speed, yaw_rate = keep_right(
-            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, desk
-        )
-    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
-    if not safe and passes and offset == 0.0:
-        speed, yaw_rate = steer(c, s, 0.0, px, py, part, way, allowed, steep, aligned, build)
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
-    if not safe:
+def dawdle(
+    b: int, n: int, speed: float, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
+    desk: Desk,
+) -> float:  # fmt: skip
+    """Return the speed of a car that may hold up the ego, or stand in a disc, on purpose."""
+    ints = drivers.ints[b, n]
+    floats = drivers.floats[b, n]
+    passes = floats[ASIDE] != 0.0
+    if ints[KIND] == NEMESIS and not passes and before_ego(b, n, near, state, labels, roads, drivers, desk):
+        speed = min(speed, DAWDLE)
+    if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
+        floats[HOLD] -= drivers.build[b, PERIOD]
         speed = 0.0
-        if build[HALF_LENGTH] > 0.0 and not is_safe(
-            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk
-        ):
-            yaw_rate = 0.0
-    return speed, yaw_rate
+    return speed
+
+
+@jit_inline
+def strays(
+    b: int, n: int, speed: float, yaw_rate: float, left: float, part: int, state: State, roads: RoadTable,
+    drivers: Drivers,
+) -> bool:  # fmt: skip
+    """Tell whether a motion takes the centre off the road, or nearly.
+
+    The look at the roads is spared who is on a lane, and farther from the edge of its road than it drives.
+    """
+    build = drivers.build[b]
+    net = drivers.net[b]
+    edge = float(roads.half_width[net]) - VERGE
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    row = drivers.way[b, n]
+    if part == BEFORE and abs(left - build[MIDDLE]) + abs(speed) * build[PERIOD] < edge - SURELY:
+        to_go = (row[WAY] - x) * row[WAY + 2] + (row[WAY + 1] - y) * row[WAY + 3]
+        if abs(speed) * build[PERIOD] < to_go < row[LENGTH] - abs(speed) * build[PERIOD]:
+            return False
+    return leaves_road(x, y, c, s, speed, yaw_rate, build[PERIOD], edge, roads, net)
 
 
 @jit_inline
@@ -280,26 +338,6 @@ def waited_long(ints: Any, bits: Any, build: Any) -> bool:
 
 
 @jit_inline
-def keep_right(
-    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: Way, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
-) -> tuple[float, float]:  # fmt: skip
-    """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
-    build = drivers.build[b]
-    bits = np.int64(labels.bits[b, n])
-    lawless = drivers.ints[b, n, MOOD] & LEFT_SIDE != 0
-    if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
-        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, desk
-    ):  # fmt: skip
-        return speed, yaw_rate
-    leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
-    if drivers.floats[b, n, ASIDE] != 0.0 or not leans or build[SLOWEST] >= 0.0:
-        return 0.0, 0.0
-    speed = min(speed, -build[SLOWEST])
-    return -speed, -min(speed / build[TIGHTEST], build[YAW_MOST])
-
-
-@jit_inline
 def keep_place(
     b: int, n: int, tick: int, x: float, y: float, c: float, s: float, state: State, labels: Labels,
     roads: RoadTable, drivers: Drivers, desk: Desk,
@@ -314,12 +352,12 @@ def keep_place(
         take_lane(b, n, tick, lane, state, labels, roads, drivers, desk)
     elif seen >= 0 and seen != ints[LANE]:
         take_lane(b, n, tick, seen, state, labels, roads, drivers, desk)
-    way = way_between(roads, net, ints[LANE], ints[NEXT], build[MIDDLE], build[DISC])
+    way = way_of(b, n, roads, drivers)
     if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * build[DISC]:
         part, _, _, _, _ = on_way(way, x, y)
         if part == AFTER:
             take_lane(b, n, tick, ints[NEXT], state, labels, roads, drivers, desk)
-            way = way_between(roads, net, ints[LANE], ints[NEXT], build[MIDDLE], build[DISC])
+            way = way_of(b, n, roads, drivers)
     return way
 
 
@@ -344,72 +382,3 @@ def before_ego(
     behind = dx * state.c[b, n] + dy * state.s[b, n] < 0.0
     comes = its >= 0 and lane_end(roads, net, its) == v
     return behind and (its == lane or comes or labels.crosses[b, 0] == v)
-
-
-@jit_inline
-def steer(
-    c: float, s: float, left: float, px: float, py: float, part: int, way: Way, speed: float,
-    most: float, aligned: float, build: Any,
-) -> tuple[float, float]:  # fmt: skip
-    """Return (speed, yaw rate) of a car `left` of the line it should drive, whose direction is (px, py).
-
-    `most` is the sine of the largest angle to that line, `aligned` the cosine beyond which the car turns in place.
-    """
-    sine = min(max(-left / HURRY, -most), most)
-    cosine = sqrt(1.0 - sine * sine)
-    hx = px * cosine - py * sine
-    hy = py * cosine + px * sine
-    cross = c * hy - s * hx
-    dot = c * hx + s * hy
-    limit = build[YAW_MOST]
-    if dot < aligned and build[TIGHTEST] == 0.0:
-        turn = limit
-        if dot > 0.0:
-            turn = min(limit, abs(cross) / build[PERIOD])
-        return 0.0, turn if cross >= 0.0 else -turn
-    bend = way.side / way.radius if part == THROUGH else 0.0
-    if abs(bend) * speed > 0.8 * limit:
-        speed = 0.8 * limit / abs(bend)
-    if speed == 0.0:
-        return 0.0, 0.0
-    yaw_rate = speed * bend + GAIN * cross
-    if build[TIGHTEST] > 0.0:
-        limit = min(limit, speed / build[TIGHTEST])
-        if dot < 0.0:
-            yaw_rate = limit if cross >= 0.0 else -limit
-    return speed, min(max(yaw_rate, -limit), limit)
-
-
-@jit
-def is_safe(
-    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
-    obstacles: ObstacleTable, build: Any, desk: Desk,
-) -> bool:  # fmt: skip
-    """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    period = build[PERIOD]
-    p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
-    travel = build[FASTEST] * period
-    if p > 0.0:
-        travel += build[YAW_MOST] * reach * period
-    for k in range(near):
-        j = desk.near[k]
-        dx = state.x[b, j] - x
-        dy = state.y[b, j] - y
-        far = 2.0 * reach + 0.2
-        if j != trusted and dx * dx + dy * dy < far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel,
-        ):  # fmt: skip
-            return False
-    for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[k]
-        dx = row[0] - x
-        dy = row[1] - y
-        far = reach + row[7] + 0.2
-        if dx * dx + dy * dy < far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], 0.0,
-        ):  # fmt: skip
-            return False
-    return True

@@ -50,6 +50,13 @@ place; least speed in a disc, m/s; how far left of the centre line a body may re
 stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, s.
 """
 
+IN, OUT, CROSSING, LENGTH = range(4)
+WAY = 4
+WAYS = 16
+"""Columns of `Drivers.way`: the two lanes whose way the row holds (-1: none yet), whether there is a crossing between
+them, metres of the first, and from WAY on the fields of the `driving.turn_arcs.Way`.
+"""
+
 LONGEST_WAY = 2.21
 """Length of the longest way through a disc, in units of R + rho."""
 PROMPT = 0.8
@@ -62,9 +69,9 @@ class Drivers(NamedTuple):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
-    `trial` (B,): of the random numbers; `build` (B, BUILD), `ints` (B, N, INTS) and `floats` (B, N, FLOATS): columns
-    as above; `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from the beginning of each
-    lane to the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
+    `trial` (B,): of the random numbers; `build` (B, BUILD), `ints` (B, N, INTS), `floats` (B, N, FLOATS) and `way`
+    (B, N, WAYS): columns as above; `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from
+    the beginning of each lane to the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
     """
 
     active: Ints
@@ -74,13 +81,15 @@ class Drivers(NamedTuple):
     build: Floats
     ints: Ints
     floats: Floats
+    way: Floats
     stage: Ints
     distance: Floats
 
 
 class Desk(NamedTuple):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
-    lanes that the ego will probably take.
+    lanes that the ego will probably take; `late` (N, 6): commands put off; `apart` (N,): for
+    who does not know how far cars are apart, 0.
     """
 
     head: Ints
@@ -90,6 +99,8 @@ class Desk(NamedTuple):
     queue: Ints
     cost: Floats
     chain: Ints
+    late: Floats
+    apart: Floats
 
 
 def blank(cars: int) -> tuple[Ints, Floats]:
@@ -97,6 +108,11 @@ def blank(cars: int) -> tuple[Ints, Floats]:
     ints = np.zeros((cars, INTS), dtype=np.int64)
     ints[:, (PLACE, GOAL, LANE, NEXT)] = -1
     return ints, np.zeros((cars, FLOATS))
+
+
+def no_ways(trials: int, cars: int) -> Floats:
+    """Return `Drivers.way` before the first tick."""
+    return np.full((trials, cars, WAYS), -1.0)
 
 
 def desk(cars: int, segments: int) -> Desk:
@@ -109,6 +125,8 @@ def desk(cars: int, segments: int) -> Desk:
         queue=np.zeros(2 * segments, dtype=np.int64),
         cost=np.zeros(4),
         chain=np.zeros(4, dtype=np.int64),
+        late=np.zeros((cars, 6)),
+        apart=np.zeros(cars),
     )
 
 

@@ -12,9 +12,11 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.law_tables import (
     ASIDE,
     DISC,
+    FASTEST,
     HALF_WIDTH,
     KIND,
     MOOD,
+    PERIOD,
     REACH,
     ROUND,
     ROUNDING,
@@ -50,12 +52,21 @@ HALF_TURN = 3.1
 SIGHT = 3.0
 """What is farther away than this does not matter to a car's next tick, metres."""
 HELD = 1e9
+AWARE = 0.06
+"""A car takes note of what is up to this much farther away than the gap it keeps, metres."""
 
 
 @jit_inline
 def way_to_go(way: Way, x: float, y: float) -> float:
     """Return minus the metres along the lane to the intersection at its end."""
     return (x - way.x) * way.tx + (y - way.y) * way.ty
+
+
+@jit_inline
+def alone(build: Any) -> float:
+    """Return metres between the centres beyond which another car makes no difference to one that just drives on."""
+    widest = max(MOVING_GAP, STANDING_GAP, FACING_GAP)
+    return 2.0 * build[REACH] + widest + AWARE + build[FASTEST] * build[PERIOD]
 
 
 @jit_inline

@@ -11,6 +11,7 @@ from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbour
 from dubins_traffic.cars.state import EGO, Labels, Observation, Pose, Propositions, SensedCar, State, Twist
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
@@ -67,10 +68,16 @@ class Senses:
             self._obstacles = pack_obstacles([problem.obstacles])
             self._latest = -1
         self._scan: Floats | None = None
+        self._state: State | None = None
+        self._labels: Labels | None = None
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the car's driver knows at the beginning of the tick that starts in `state`."""
-        count = neighbours(0, self._car, self._radius, self._reals, self._wholes, *state, *labels)
+        if state is not self._state or labels is not self._labels:
+            self._state, self._labels = state, labels
+            first = (0, 0, 0.0, self._reals, self._wholes)
+            self._look = bound(neighbours, first, (*state, *labels))
+        count = self._look(0, self._car, self._radius, self._reals, self._wholes)
         if self._noisy:
             noise = self._instance.disturbances
             blur(
@@ -88,15 +95,27 @@ class Senses:
             new(Pose, own[:4]),
             new(Twist, own[4:]),
             new(Propositions, labelled[1:]),
-            tuple([self._sensed(reals[k], wholes[k]) for k in range(1, count)]),
+            self._sensed(reals, wholes),
             self._scan,
         )
 
-    def _sensed(self, real: list[float], whole: list[int]) -> SensedCar:
-        index = whole[0]
-        pose, twist = new(Pose, real[:4]), new(Twist, real[4:])
-        return new(
-            SensedCar, (self._names[index], index, pose, twist, self._body, new(Propositions, whole[1:]))
+    def _sensed(self, reals: list[list[float]], wholes: list[list[int]]) -> tuple[SensedCar, ...]:
+        names, body = self._names, self._body
+        return tuple(
+            [
+                new(
+                    SensedCar,
+                    (
+                        names[whole[0]],
+                        whole[0],
+                        new(Pose, real[:4]),
+                        new(Twist, real[4:]),
+                        body,
+                        new(Propositions, whole[1:]),
+                    ),
+                )
+                for real, whole in zip(reals[1:], wholes[1:], strict=True)
+            ]
         )
 
     def sweep(self, state: State) -> Floats:

@@ -27,8 +27,8 @@ class Way(NamedTuple):
     """The way from a lane to another through the intersection at (x, y).
 
     (tx, ty) and (ux, uy) are the directions of the lane in and the lane out, (cx, cy) the centre of the arc and
-    `radius` its radius; `side` is 1 for a turn to the left, -1 to the right, 0 straight on. `middle` is how far
-    right of the centre line lanes are driven, metres.
+    `radius` its radius; `side` is 1 for a turn to the left, -1 to the right, 0 straight on; `bend` is side / radius,
+    0 straight on. `middle` is how far right of the centre line lanes are driven, metres.
     """
 
     x: float
@@ -42,6 +42,7 @@ class Way(NamedTuple):
     radius: float
     side: float
     middle: float
+    bend: float
 
 
 @jit
@@ -72,7 +73,7 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
         cot = 0.0
         radius = middle
     elif abs(sine) < STRAIGHT and cosine > 0.0:
-        return Way(x, y, tx, ty, ux, uy, x, y, 0.0, 0.0, middle)
+        return Way(x, y, tx, ty, ux, uy, x, y, 0.0, 0.0, middle, 0.0)
     else:
         side = 1.0 if sine > 0.0 else -1.0
         cot = abs(sine) / (1.0 - cosine)
@@ -81,7 +82,9 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
             begin = (radius - side * middle) / cot
     px = x - begin * tx + middle * ty
     py = y - begin * ty - middle * tx
-    return Way(x, y, tx, ty, ux, uy, px - side * radius * ty, py + side * radius * tx, radius, side, middle)
+    cx = px - side * radius * ty
+    cy = py + side * radius * tx
+    return Way(x, y, tx, ty, ux, uy, cx, cy, radius, side, middle, side / radius)
 
 
 @jit

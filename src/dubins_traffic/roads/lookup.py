@@ -6,11 +6,16 @@ intersections and lanes are numbered within the network. Lane 2s runs along segm
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit_inline
+from math import sqrt
+
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.paving import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
 INFINITE = float("inf")
+CERTAIN = 1e-6
+"""What rounding can't make up, metres."""
 
 
 @jit_inline
@@ -106,6 +111,50 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
             best = v
             least = d2
     return best, least
+
+
+@jit
+def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
+    """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
+
+    The rectangle (x from row[0] to row[1], y from row[2] to row[3], its edges not included) lies within the cell of the
+    point, and within the disc in which nothing else can become nearest. It is empty outside the box of cells.
+    """
+    row[0] = row[1] = row[2] = row[3] = 0.0
+    cell = cell_of(t, net, x, y)
+    if cell < 0:
+        s, _ = nearest_segment(t, net, x, y)
+        v, _ = nearest_vertex(t, net, x, y)
+        row[4] = s
+        row[5] = v
+        return
+    best = 0
+    least = second = INFINITE
+    for k in range(t.seg_start[cell], t.seg_start[cell + 1]):
+        d2 = distance2(t, net, t.seg_item[k], x, y)
+        if d2 < least:
+            best = k
+        second = min(second, max(d2, least))
+        least = min(d2, least)
+    row[4] = t.seg_item[best]
+    spare = sqrt(second) - sqrt(least)
+    least = second = INFINITE
+    for k in range(t.vert_start[cell], t.vert_start[cell + 1]):
+        d2 = vertex_distance2(t, net, t.vert_item[k], x, y)
+        if d2 < least:
+            best = k
+        second = min(second, max(d2, least))
+        least = min(d2, least)
+    row[5] = t.vert_item[best]
+    spare = min(spare, sqrt(second) - sqrt(least))
+    half = 0.7 * 0.5 * spare - CERTAIN
+    side = 1.0 / t.cell_box[net, 2]
+    left = t.cell_box[net, 0] + side * int((x - t.cell_box[net, 0]) * t.cell_box[net, 2])
+    low = t.cell_box[net, 1] + side * int((y - t.cell_box[net, 1]) * t.cell_box[net, 2])
+    row[0] = max(x - half, left + CERTAIN)
+    row[1] = min(x + half, left + side - CERTAIN)
+    row[2] = max(y - half, low + CERTAIN)
+    row[3] = min(y + half, low + side - CERTAIN)
 
 
 @jit_inline

@@ -43,6 +43,10 @@ GOAL_INTS = 7
 whether the ego is inside its disc, visits, tick of the last one (0 before the first), longest gap between them."""
 
 
+ROUNDING = 1e-6
+"""What rounding can't make up, metres."""
+
+
 class Tally(NamedTuple):
     """What is counted of each trial.
 
@@ -274,12 +278,14 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
     last = first + ints[GOALS]
     offset = roads.vert_off[ints[NET]]
     radius = tally.floats[b, RADIUS]
+    about2 = (radius + ROUNDING) * (radius + ROUNDING)
     some = False
     for g in range(first, last):
         goal = tally.goal[g]
         dx = x - roads.vert[offset + goal[VERTEX], 0]
         dy = y - roads.vert[offset + goal[VERTEX], 1]
-        inside = 1 if sqrt(dx * dx + dy * dy) < radius else 0
+        d2 = dx * dx + dy * dy
+        inside = 1 if d2 < about2 and sqrt(d2) < radius else 0
         if inside > 0:
             some = True
             goal[SAMPLE_DONE] = 1

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dubins_traffic.cars.motion import Workspace, step, workspace
+from dubins_traffic.cars.motion import step
+from dubins_traffic.cars.partners import Workspace, workspace
 from dubins_traffic.cars.rows import Rows, rows
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.protocols import Capabilities
 
 if TYPE_CHECKING:
@@ -54,7 +56,7 @@ class Embedded:
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
         self._rows = rows(self._cars, max(counts), 1.0 / self._rate)
         self._tick = 0
-        self._gather()
+        self._commands: Floats | None = None
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -62,15 +64,18 @@ class Embedded:
         trials = len(self._none)
         contacts: list[tuple[Contact, ...]] = self._none
         self._tick += 1
+        if commands is not self._commands:
+            self._commands = commands
+            self._bind()
         done = 0
         while done < trials:
-            reached = step(done, 1.0 / self._rate, commands, *self._arrays)
+            reached = self._call(done, 1.0 / self._rate, commands)
             if self._work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
                 self._work = enlarged(self._work)
-                self._gather()
+                self._bind()
         return contacts
 
     @property
@@ -81,8 +86,9 @@ class Embedded:
     def close(self) -> None:
         """Nothing is held outside memory."""
 
-    def _gather(self) -> None:
-        self._arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)
+    def _bind(self) -> None:
+        arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)
+        self._call = bound(step, (0, 0.0, self._commands), arrays)
 
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.spec.tables import ticks
+from dubins_traffic.spec.tables import GRAIN, ticks
 
 if TYPE_CHECKING:
     from dubins_traffic.spec.parameters import RuleParameters
@@ -51,7 +51,8 @@ WAY: Final = 1
 EXIT_GAP: Final = 2
 LANE_MIDDLE: Final = 3
 NEAR2: Final = 4
-REALS: Final = 5
+LONE: Final = 5
+REALS: Final = 6
 
 OFF_ROAD: Final = 0
 LEFT_SINCE: Final = 1
@@ -89,7 +90,8 @@ class Terms(NamedTuple):
     ----------
     real : (B, REALS) float64
         Squared distance of a body, without its rounding, from a vertex up to which it is in the way of those who
-        leave (`EXIT2`), and of its centre (`NEAR2`); E5's way ahead (`WAY`); E4's free length of an exit
+        leave (`EXIT2`), and of its centre (`NEAR2`); distance to others from which on a car in a disc has none of them
+        in its way (`LONE`); E5's way ahead (`WAY`); E4's free length of an exit
         (`EXIT_GAP`); distance of the right lane's middle from the centre line (`LANE_MIDDLE`). Metres.
     whole : (B, WHOLES) int64
         Whether the trial is judged at all, and the durations of the rules in ticks; E3's most new tickets.
@@ -177,6 +179,7 @@ def pack_terms(
         far = float(cars.reach[b] - cars.rounding[b])
         real[b, EXIT2] = reach * reach
         real[b, NEAR2] = (reach + far) * (reach + far)
+        real[b, LONE] = radius + float(cars.reach[b]) + reach + far + GRAIN
         real[b, WAY] = own.way_distance
         real[b, EXIT_GAP] = own.exit_gap
         real[b, LANE_MIDDLE] = cars.w[b]

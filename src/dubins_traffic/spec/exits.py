@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dubins_traffic.cars.near import Spacing, list_near
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.compile import jit_inner
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.compile import jit_inline, jit_inner
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import obstacle_narrows
-from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, LANE_MIDDLE, Terms
+from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, LANE_MIDDLE, LONE, NEAR2, Terms
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
@@ -24,10 +26,12 @@ from dubins_traffic.spec.tables import (
 
 
 @jit_inner
-def has_exit(
+def find_exit(
     b: int,
     n: int,
     v: int,
+    crowd: Ints,
+    count: int,
     state: State,
     t: RoadTable,
     obstacles: ObstacleLanes,
@@ -35,14 +39,15 @@ def has_exit(
     terms: Terms,
     labels: Labels,
 ) -> bool:
-    """Tell whether car n, whose body meets the disc of v, may leave by some lane."""
+    """Do what `has_exit` does, by a look at each lane and each of the first `count` cars of `crowd`."""
     real = rules.real[b]
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v
     vx, vy = t.vert[row, 0], t.vert[row, 1]
     mouth, middle = real[RADIUS], terms.real[b, LANE_MIDDLE]
     taken = 0
-    for k in range(state.count[b]):
+    for i in range(count):
+        k = crowd[i]
         x, y, c, s = state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k]
         near2 = distance2_to_body(vx, vy, x, y, c, s, real[HALF_LENGTH], real[HALF_WIDTH])
         if k == n or near2 > terms.real[b, EXIT2]:
@@ -73,3 +78,37 @@ def has_exit(
         ):
             return True
     return False
+
+
+@jit_inline
+def has_exit(
+    b: int,
+    n: int,
+    tick: int,
+    v: int,
+    spacing: Spacing,
+    state: State,
+    t: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+) -> bool:
+    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane.
+
+    Who is near with his centre outside the disc is in the way to one lane at most.
+    """
+    row = t.vert_off[rules.whole[b, NET]] + v
+    vx, vy = t.vert[row, 0], t.vert[row, 1]
+    far2 = terms.real[b, NEAR2]
+    near = 0
+    count = list_near(state, b, tick, float(vx), float(vy), terms.real[b, LONE], spacing)
+    for i in range(count):
+        k = spacing.near[i]
+        dx = state.x[b, k] - vx
+        dy = state.y[b, k] - vy
+        near += 1 if k != n and dx * dx + dy * dy <= far2 else 0
+        near += 4 if k != n and labels.at[b, k] == v else 0
+    if near < t.degree[row] and obstacles.base[b] < 0:
+        return True
+    return find_exit(b, n, v, spacing.near, count, state, t, obstacles, rules, terms, labels)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
@@ -75,6 +75,9 @@ from dubins_traffic.spec.tables import (
     RuleTable,
 )
 
+BESIDE = STILL | LEFT | OVERTAKING
+"""Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
+
 # Where each table begins and ends among the arrays of a call.
 STATE_END = len(State._fields)
 ROADS_END = STATE_END + len(RoadTable._fields)
@@ -129,23 +132,29 @@ def label_trial(
     cars = state.count[b]
     for n in range(cars):
         locate(b, n, tick, state, roads, rules, labels, memory)
+    some = 0
     for n in range(cars):
-        _stop(b, n, tick, roads, rules, labels, memory)
-    for n in range(cars):
-        _queue(b, n, tick, roads, rules, labels, memory)
-    for n in range(cars):
-        _stand(b, n, rules, labels, memory)
-    for n in range(cars):
-        _block(b, n, state, roads, obstacles, rules, labels, memory)
+        some |= _stop(b, n, tick, roads, rules, labels, memory)
+    if some & STOPPED != 0:
+        for n in range(cars):
+            _queue(b, n, tick, roads, rules, labels, memory)
+        for n in range(cars):
+            _stand(b, n, rules, labels, memory)
+    elif some & STILL != 0:
+        for n in range(cars):
+            _say_stands(b, n, labels)
+    if some & BESIDE != 0 or obstacles.base[b] >= 0:
+        for n in range(cars):
+            _block(b, n, state, roads, obstacles, rules, labels, memory)
     for n in range(cars):
         _forget(b, n, roads, rules, labels, memory)
 
 
-@jit
-def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
+@jit_inline
+def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> Any:
     """Find whether a car approaches, has stopped and gets a ticket; enter it in the queue ahead.
 
-    Sets CLEAR too, which needs who crosses what.
+    Sets CLEAR too, which needs who crosses what. Returns the car's flags so far, with LEFT if it will be left.
     """
     net: int = rules.whole[b, NET]
     real = rules.real
@@ -158,8 +167,9 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
     if gap2 < 0.0:
         if bits & IN_CROSSING != 0 and memory.head[crosses, CROSSERS] == 1:
             bits |= CLEAR
-        labels.bits[b, n] = bits & ~STOPPED
-        return
+        bits &= ~STOPPED
+        labels.bits[b, n] = bits
+        return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
     v = lane_end(t, net, lane)
     own = 1 if crosses == v else 0
     if memory.head[v, CROSSERS] == own:
@@ -184,6 +194,7 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
         memory.link[n, NEXT_IN_QUEUE] = memory.head[v, QUEUE]
         memory.head[v, QUEUE] = n
     labels.bits[b, n] = bits
+    return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
 
 
 @jit

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic.cars.near import unknown
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
@@ -119,6 +120,7 @@ class Referee:
             self._labeller.reset(state)
         trials, cars = state.x.shape
         self._docket = Docket.empty(trials, cars, len(self._terms.goal))
+        self._spacing = unknown(trials, cars)
         self._judge(0, state)
         return self._collect(state, [()] * trials)
 
@@ -187,6 +189,7 @@ class Referee:
             own.labels,
             own.memory,
             self._docket,
+            self._spacing,
         )
         judge_frame(tick, *state, *chain.from_iterable(tables))
 
@@ -212,6 +215,7 @@ class Referee:
         if frames.first == 0:
             self._state = State.zeros(1, cars)
             self._docket = Docket.empty(1, cars, len(self._terms.goal), _ROOMY)
+            self._spacing = unknown(1, cars)
             self._next = 0
             own.begin(1, cars)
         if self._state is None or frames.first != self._next:
@@ -238,6 +242,7 @@ class Referee:
                 own.labels,
                 own.memory,
                 self._docket,
+                self._spacing,
             )
             for row in self._found():
                 f, n = row[AT_TICK] - frames.first, row[OF_CAR]

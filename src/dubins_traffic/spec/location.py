@@ -9,10 +9,11 @@ import numpy as np
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import (
+    distance2,
     lane_direction,
     lane_end,
-    nearest_segment,
-    nearest_vertex,
+    patch,
+    vertex_distance2,
 )
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.lane_state import lane_state
@@ -45,6 +46,12 @@ from dubins_traffic.spec.tables import (
     NEXT_IN_LANE,
     NEXT_ON_SEGMENT,
     NOW,
+    PATCH_HIGH_X,
+    PATCH_HIGH_Y,
+    PATCH_LOW_X,
+    PATCH_LOW_Y,
+    PATCH_SEGMENT,
+    PATCH_VERTEX,
     PROGRESS,
     RADIUS,
     REACH,
@@ -74,19 +81,18 @@ def locate(
     net: int = rules.whole[b, NET]
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
-    segment, off2 = nearest_segment(t, net, x, y)
-    v, away2 = nearest_vertex(t, net, x, y)
+    row = memory.patch[b, n]
+    if not (row[PATCH_LOW_X] < x < row[PATCH_HIGH_X] and row[PATCH_LOW_Y] < y < row[PATCH_HIGH_Y]):
+        patch(t, net, x, y, row)
+    segment = int(row[PATCH_SEGMENT])
+    v = int(row[PATCH_VERTEX])
+    off2 = distance2(t, net, segment, x, y)
+    away2 = vertex_distance2(t, net, v, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
-    body2 = distance2_to_body(
-        float(t.vert[t.vert_off[net] + v, 0]),
-        float(t.vert[t.vert_off[net] + v, 1]),
-        x,
-        y,
-        c,
-        s,
-        half_length,
-        half_width,
-    )
+    round_body = half_length + half_width == 0.0
+    body2 = away2
+    if not round_body:
+        body2 = distance2_to_vertex(t, net, v, x, y, c, s, half_length, half_width)
     crosses = v if body2 < real[b, CROSS2] else -1
 
     before = np.int64(labels.bits[b, n])
@@ -121,27 +127,54 @@ def locate(
     labels.lane[b, n] = lane
     labels.bits[b, n] = bits | _still(b, n, tick, x, y, rules, memory)
 
-    measure = memory.measure
-    measure[b, n, TOP] = top
-    measure[b, n, PROGRESS] = progress
-    measure[b, n, LATERAL] = lateral
-    measure[b, n, REACH] = 0.0
-    measure[b, n, GAP2] = -1.0
+    measure = memory.measure[b, n]
+    measure[TOP] = top
+    measure[PROGRESS] = progress
+    measure[LATERAL] = lateral
     if crosses >= 0:
         memory.head[crosses, CROSSERS] += 1
     memory.link[n, NEXT_ON_SEGMENT] = memory.head[segment, SEGMENT]
     memory.head[segment, SEGMENT] = n
+    _reach(b, n, x, y, c, s, lane, lateral, t, rules, memory)
+
+
+@jit_inline
+def _reach(
+    b: int, n: int, x: float, y: float, c: float, s: float, lane: int, lateral: float, t: RoadTable,
+    rules: RuleTable, memory: Memory,
+) -> None:  # fmt: skip
+    """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead."""
+    net: int = rules.whole[b, NET]
+    real = rules.real[b]
+    half_length, half_width = real[HALF_LENGTH], real[HALF_WIDTH]
+    round_body = half_length + half_width == 0.0
+    reach = 0.0
+    gap2 = -1.0
     if lane >= 0:
-        tx, ty = lane_direction(t, net, lane)
-        half = half_extent(tx, ty, c, s, half_length, half_width, real[b, ROUNDING])
-        measure[b, n, REACH] = lateral + half
+        half = real[ROUNDING]
+        if not round_body:
+            tx, ty = lane_direction(t, net, lane)
+            half = half_extent(tx, ty, c, s, half_length, half_width, half)
+        reach = lateral + half
         end = lane_end(t, net, lane)
-        row = t.vert_off[net] + end
-        if t.degree[row] >= rules.whole[b, CROSSING_DEGREE]:
-            measure[b, n, GAP2] = distance2_to_body(
-                t.vert[row, 0], t.vert[row, 1], x, y, c, s, half_length, half_width
-            )
+        if t.degree[t.vert_off[net] + end] >= rules.whole[b, CROSSING_DEGREE]:
+            gap2 = vertex_distance2(t, net, end, x, y)
+            if not round_body:
+                gap2 = distance2_to_vertex(t, net, end, x, y, c, s, half_length, half_width)
         _enter_in_lane(b, n, lane, memory)
+    memory.measure[b, n, REACH] = reach
+    memory.measure[b, n, GAP2] = gap2
+
+
+@jit_inline
+def distance2_to_vertex(
+    t: RoadTable, net: int, v: int, x: float, y: float, c: float, s: float, half_length: float, half_width: float
+) -> float:  # fmt: skip
+    """Return the squared distance of an intersection from a body without its rounding."""
+    row = t.vert_off[net] + v
+    return distance2_to_body(
+        float(t.vert[row, 0]), float(t.vert[row, 1]), x, y, c, s, half_length, half_width
+    )
 
 
 @jit_inline

@@ -71,6 +71,14 @@ CROSSERS: Final = 3
 NOW: Final = 4
 HEADS: Final = 5
 
+PATCH_LOW_X: Final = 0
+PATCH_HIGH_X: Final = 1
+PATCH_LOW_Y: Final = 2
+PATCH_HIGH_Y: Final = 3
+PATCH_SEGMENT: Final = 4
+PATCH_VERTEX: Final = 5
+PATCH: Final = 6
+
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
 
@@ -100,6 +108,9 @@ class Memory(NamedTuple):
         First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
         in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
         (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none.
+    patch : (B, N, PATCH) float64
+        A rectangle about the place where the centre was last looked up, within which nearest segment and vertex
+        (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty before.
     trail : (B, M, N, 2) float64
         Positions at the last M ticks, tick k in row k mod M.
     link : (N, LINKS) int64
@@ -111,6 +122,7 @@ class Memory(NamedTuple):
 
     measure: Floats
     mark: Ints
+    patch: Floats
     trail: Floats
     link: Ints
     head: Ints
@@ -125,6 +137,7 @@ class Memory(NamedTuple):
         return Memory(
             np.zeros((trials, cars, MEASURES)),
             mark,
+            np.zeros((trials, cars, PATCH)),
             np.zeros((trials, depth, cars, 2)),
             np.full((cars, LINKS), -1, dtype=np.int64),
             head,

@@ -1,0 +1,178 @@
+"""The referee's looks at one car, compiled: clocks of runs, breaches by rule, and who is in the way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.compile import jit_inline, jit_inner
+from dubins_traffic.spec.docket import (
+    AT_SINCE,
+    AT_TICK,
+    AT_VERTEX,
+    BITS,
+    CLEARANCE,
+    CROSSES,
+    ENTER,
+    ENTER_TICKS,
+    FIRST_SINCE,
+    LANE,
+    LEFT_SINCE,
+    LEFT_UNBLOCKED,
+    MOST_TICKETS,
+    OF_CAR,
+    OF_RULE,
+    OF_TRIAL,
+    OFF_ROAD,
+    ON_LANE,
+    ORDER,
+    RETURN,
+    RETURN_TICKS,
+    ROAD,
+    SINCE_TICK,
+    STOP,
+    STOPPED_SINCE,
+    TICKETS,
+    UNBLOCKED_SINCE,
+)
+from dubins_traffic.spec.propositions import (
+    AHEAD,
+    CLEAR,
+    EXCUSED,
+    FIRST,
+    LEFT,
+    ON_ROAD,
+    OVERTAKING,
+    STANDS,
+    STOPPED,
+)
+from dubins_traffic.spec.tables import (
+    FORFEITS,
+    PROGRESS,
+    TICKET,
+)
+
+EGO: int = 0
+GOES = FIRST | CLEAR
+
+
+@jit_inner
+def add(
+    b: int, rule: int, n: int, tick: int, since: int, vertex: int, lane: int, row: Ints, filled: Ints
+) -> None:
+    """Write down a breach of car n in trial b."""
+    k = filled[0]
+    row[k, OF_TRIAL] = b
+    row[k, OF_RULE] = rule
+    row[k, OF_CAR] = n
+    row[k, AT_TICK] = tick
+    row[k, SINCE_TICK] = since
+    row[k, AT_VERTEX] = vertex
+    row[k, ON_LANE] = lane
+    filled[0] = k + 1
+
+
+@jit_inline
+def run(holds: bool, tick: int, clock: Ints, which: int) -> int:
+    """Keep the clock of a run; return for how many ticks it has gone on, -1 if there is none."""
+    if not holds:
+        clock[which] = -1
+        return -1
+    if clock[which] < 0:
+        clock[which] = tick
+    return tick - clock[which]
+
+
+@jit_inner
+def judge_lane(
+    b: int, n: int, tick: int, bits: Any, lane: int, whole: Ints, clock: Ints, row: Ints, filled: Ints
+) -> None:
+    """Rule 2: left only while overtaking, and for a while."""
+    long = run(bits & LEFT != 0, tick, clock, LEFT_SINCE)
+    alone = run(bits & (LEFT | OVERTAKING) == LEFT, tick, clock, UNBLOCKED_SINCE)
+    if alone == 0:
+        add(b, LEFT_UNBLOCKED, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
+    if long == whole[RETURN_TICKS]:
+        add(b, RETURN, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
+
+
+@jit_inner
+def judge_entry(
+    b: int,
+    n: int,
+    tick: int,
+    v: int,
+    stopped: bool,
+    near: Ints,
+    count: int,
+    past: Ints,
+    row: Ints,
+    filled: Ints,
+) -> None:
+    """Rule 3, of a car that enters crossing v in this frame: judged on the frame before, in which it had `stopped`
+    there or not. The first `count` cars of `near` are all that may have been there.
+    """
+    lane = past[n, LANE]
+    if not stopped:
+        add(b, STOP, n, tick, tick, v, lane, row, filled)
+    elif past[n, BITS] & AHEAD != 0:
+        add(b, ORDER, n, tick, tick, v, lane, row, filled)
+    for i in range(count):
+        k = near[i]
+        if k != n and past[k, CROSSES] == v:
+            add(b, CLEARANCE, n, tick, tick, v, lane, row, filled)
+            return
+
+
+@jit_inline
+def judge_road(b: int, tick: int, bits: Any, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
+    """Rule 1: the ego stays on the road from its first frame there."""
+    if bits & ON_ROAD != 0:
+        clock[OFF_ROAD] = -1
+    elif clock[OFF_ROAD] == -1:
+        clock[OFF_ROAD] = tick
+        add(b, ROAD, EGO, tick, tick, -1, lane, row, filled)
+
+
+@jit_inner
+def judge_queue(
+    b: int,
+    n: int,
+    tick: int,
+    bits: Any,
+    lane: int,
+    v: int,
+    whole: Ints,
+    mark: Ints,
+    clock: Ints,
+    row: Ints,
+    filled: Ints,
+) -> None:
+    """E3, of a car that has stopped at v: who is first at a clear crossing enters in time, and takes few tickets."""
+    run(True, tick, clock, STOPPED_SINCE)
+    if run(bits & GOES == GOES, tick, clock, FIRST_SINCE) == whole[ENTER_TICKS]:
+        add(b, ENTER, n, tick, clock[FIRST_SINCE], v, lane, row, filled)
+    if mark[FORFEITS] == whole[MOST_TICKETS] + 1 and mark[TICKET] == tick:
+        add(b, TICKETS, n, tick, clock[STOPPED_SINCE], v, lane, row, filled)
+
+
+@jit_inner
+def has_way(n: int, cars: int, reach: float, lanes: Ints, flags: Bits, measure: Floats) -> bool:
+    """E5: tell whether nobody stands or waits within `reach` ahead of car n in its lane."""
+    own = measure[n, PROGRESS]
+    for k in range(cars):
+        if lanes[k] == lanes[n] and flags[k] & (STANDS | EXCUSED | STOPPED) != 0:
+            ahead = measure[k, PROGRESS] - own
+            if 0.0 < ahead <= reach:
+                return False
+    return True
+
+
+@jit_inline
+def at_goal(goal: int, cars: int, at: Ints, clock: Ints) -> int:
+    """E6: return the e-agent that has been at a goal longest, -1 if none is there."""
+    who = -1
+    for n in range(1, cars):
+        if at[n] == goal and (who < 0 or clock[n, AT_SINCE] < clock[who, AT_SINCE]):
+            who = n
+    return who

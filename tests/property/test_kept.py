@@ -1,0 +1,82 @@
+"""What kernels keep from tick to tick is still so: places on the roads, and how far cars are apart."""
+
+import numpy as np
+import pytest
+
+from dubins_traffic.campaign.group import Group
+from dubins_traffic.cars.near import CELL, list_near
+from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.roads.lookup import patch
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.table import pack
+
+
+def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
+    network = RoadNetwork.grid(3, 4, 4.0)
+    table = pack([network], [0.6])
+    random = np.random.default_rng(3)
+    row = np.zeros(6)
+    filled = 0
+    for x, y in random.uniform((-1.0, -1.0), (13.0, 9.0), (400, 2)):
+        patch(table, 0, x, y, row)
+        if not (row[0] < row[1] and row[2] < row[3]):
+            continue
+        filled += 1
+        assert row[0] <= x <= row[1]
+        assert row[2] <= y <= row[3]
+        points = random.uniform((row[0], row[2]), (row[1], row[3]), (20, 2))
+        assert (network.surface.nearest_segment(points)[0] == row[4]).all()
+        assert (network.surface.nearest_vertex(points)[0] == row[5]).all()
+    assert filled > 300
+
+
+@pytest.mark.parametrize("agents", [6, 30])
+def test_no_car_is_nearer_than_is_known(agents) -> None:
+    config = load_config(
+        {
+            "version": 1,
+            "problem_domain": "dubins_traffic",
+            "network": {"grid": {"rows": 4, "columns": 4, "length": 4.0}},
+            "rules": {},
+            "e-agents": [{"type": "lawful", "name": "agent", "count": agents}],
+            "number_trials": 1,
+            "duration": 20,
+        }
+    )
+    instance = draw(config, 1, 0)
+    group = Group([instance], keeps_rules=True)
+    cars = pack_cars([instance.problem.car])
+    for _ in range(60):
+        group.advance(7)
+        own, tick = group.spacing, int(group.ticks[0])
+        far = np.hypot(*(position - position.T for position in (group.state.x, group.state.y)))
+        np.fill_diagonal(far, np.inf)
+        drift = cars.speed_high[0] * instance.problem.period
+        lost = 2.0 * drift * (tick - own.since[0])
+        assert (
+            own.apart[0] - lost - 1e-6 <= np.minimum(far.min(axis=1), CELL if agents > 24 else np.inf)
+        ).all()
+        assert own.least[0] <= own.apart[0].min()
+        count = list_near(group.state, 0, tick, 4.0, 4.0, 3.0, own)
+        near = np.hypot(group.state.x[0] - 4.0, group.state.y[0] - 4.0) <= 3.0
+        assert set(np.flatnonzero(near)) <= set(own.near[:count])
+
+
+@jit
+def total(scale: float, *arrays) -> float:
+    found = 0.0
+    for k in range(arrays[0].shape[0]):
+        found += scale * (arrays[0][k] + arrays[1][k])
+    return found
+
+
+def test_a_bound_kernel_reads_its_arrays_at_each_call() -> None:
+    one, two = np.ones(3), np.zeros(3)
+    call = bound(total, (1.0,), (one, two))
+    assert call(2.0) == total(2.0, one, two) == 6.0
+    two[:] = 1.0
+    assert call(2.0) == 12.0
