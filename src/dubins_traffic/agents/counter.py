@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from math import hypot
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,6 +29,7 @@ from dubins_traffic.driving.law_tables import (
     blank,
     build_of,
     desk,
+    no_ways,
 )
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
@@ -110,7 +112,8 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        decide(tick, state, labels, self._roads, self._obstacles, self._drivers, self._desk, commands)
+        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._desk)
+        decide(tick, commands, *chain.from_iterable(tables))
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
                 self._hold(car, commands[0, car.car])
@@ -247,6 +250,7 @@ def _drivers(instance: Instance) -> Drivers:
         build=build_of([problem]),
         ints=ints[None].copy(),
         floats=floats[None].copy(),
+        way=no_ways(1, cars),
         stage=np.full(cars, NO_GOAL, dtype=np.int64),
         distance=np.zeros((cars, problem.network.lanes)),
     )

@@ -101,7 +101,9 @@ def shield_trial(
     build = drivers.build[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
     _remember(b, tick, state, labels, roads, drivers, guards)
-    decide_trial(b, tick, sight2, state, labels, roads, obstacles, drivers, desk, commands)
+    decide_trial(
+        b, tick, sight2, desk.apart, 0.0, state, labels, roads, obstacles, drivers, desk, commands
+    )  # fmt: skip
     law, law_yaw = bounded(commands[b, EGO, 0], commands[b, EGO, 1], build)
     near = gather_close(b, state, sight2, build, desk)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0

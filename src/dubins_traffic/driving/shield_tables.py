@@ -17,6 +17,7 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
     blank,
     build_of,
+    no_ways,
 )
 from dubins_traffic.driving.rounds import stages
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -114,6 +115,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
         build=build_of(problems),
         ints=ints,
         floats=floats,
+        way=no_ways(trials, cars),
         stage=np.array(stage, dtype=np.int64),
         distance=distance,
     )
