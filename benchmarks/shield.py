@@ -129,7 +129,7 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         tick = np.full(count, -1)
         tick[active] = group.ticks[active]
         now = int(tick.max())
-        decide(now, group.state, group.labels, roads, bodies, law, room, group.commands)
+        decide(now, group.commands, *group.state, *group.labels, *roads, *bodies, *law, *room)
         group.commands[:, EGO] = hostile.ask(now, group.state, group.labels, group.commands[:, EGO].copy())
         shield(
             tick, False, group.state, group.labels, roads, bodies, drivers, watch, room, group.commands
