@@ -37,7 +37,7 @@ from dubins_traffic.transports.lcm.encoding import (
 )
 from dubins_traffic.transports.lcm.transport import Lcm
 from dubins_traffic.transports.link import Link
-from tests.conformance.transport import TransportConformance, frames, slalom
+from tests.conformance.transport import UntypedConformance, frames, slalom
 from tests.recordings import make_instance
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,7 +109,7 @@ class LcmPeer:
             del self.lcm
 
 
-class TestLcm(TransportConformance):
+class TestLcm(UntypedConformance):
     detects_loss = False
 
     def make(self) -> Lcm:

@@ -22,7 +22,7 @@ from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.lines_client import drive
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.observed import observation_from_document, observation_to_document
-from tests.conformance.transport import BRIEF, TransportConformance, frames
+from tests.conformance.transport import BRIEF, UntypedConformance, frames
 from tests.unit.test_bad_documents import base
 
 
@@ -69,7 +69,7 @@ class LinesPeer:
         self.socket.close()
 
 
-class TestLines(TransportConformance):
+class TestLines(UntypedConformance):
     def make(self) -> Lines:
         return Lines()
 

@@ -85,7 +85,7 @@ class Ros1Peer(RosPeer):
 
 
 class TestRos1(TransportConformance):
-    tagged = untyped = False
+    tagged = False
     patience = replace(BRIEF, absence=2.0)
 
     @pytest.fixture(autouse=True)

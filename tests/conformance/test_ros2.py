@@ -59,7 +59,7 @@ class Ros2Peer(RosPeer):
 
 
 class TestRos2(TransportConformance):
-    tagged = untyped = False
+    tagged = False
     patience = replace(BRIEF, absence=2.0)
 
     def make(self) -> Ros2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
 from dubins_traffic.scoring.clearance import Clearance
-from dubins_traffic.scoring.margins_kernel import LINE, MARGINS, RETURN, ROAD, find_margins, margin_table
 from dubins_traffic.spec.parameters import RuleParameters
+
+MEASURED: Final = ("1.road", "2.left", "2.return")
+"""The rules whose margins `find_margins` finds, in the order of its columns."""
 
 
 class Margins:
@@ -54,10 +57,13 @@ class Margins:
         gap = self._clearance.result()
         count = sum(map(len, self._poses))
         if not count:
-            return margins_by_rule(gap, [math.inf] * MARGINS)
+            return margins_by_rule(gap, [math.inf] * len(MEASURED))
+        # compiles; only where there is something to measure
+        from dubins_traffic.scoring.margins_kernel import find_margins, margin_table
+
         problem = self._problem
         rules = RuleParameters.from_mapping(problem.rules)
-        found = np.empty((1, MARGINS))
+        found = np.empty((1, len(MEASURED)))
         only = np.zeros(1, dtype=np.int64)
         find_margins(
             only,
@@ -75,6 +81,5 @@ class Margins:
 
 def margins_by_rule(gap: float | None, found: Sequence[float]) -> dict[str, float | None]:
     """Return the margins by the rules' names, given the smallest gap and a row of what `find_margins` finds."""
-    named = {"1.road": found[ROAD], "2.left": found[LINE], "2.return": found[RETURN]}
-    rest = {rule: value if math.isfinite(value) else None for rule, value in named.items()}
-    return {"1.collision": gap, **rest}
+    named = zip(MEASURED, found, strict=True)
+    return {"1.collision": gap} | {rule: value if math.isfinite(value) else None for rule, value in named}

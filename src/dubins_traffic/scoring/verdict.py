@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.driving.rounds import round_time
 from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
@@ -262,6 +261,8 @@ def reach_verdict(
     margins
         How far the ego stayed from breaking rules 1 and 2.
     """
+    from dubins_traffic.driving.rounds import round_time  # compiles; only where there is something to judge
+
     rate = instance.problem.rate
     violations = tuple(_violation(instance, breach) for breach in breaches)
     own = [breach for breach in breaches if breach.car == EGO]
