@@ -127,6 +127,18 @@ class Labels(NamedTuple):
         return Labels(segment, at, crosses, lane, np.zeros((trials, cars), dtype=np.uint32))
 
 
+def put_observed(state: State, labels: Labels, observation: Observation) -> None:
+    """Write what an ego observes into trial 0 of `state` and `labels` (1, N): itself first, then the others."""
+    state.count[0] = 1 + len(observation.others)
+    seen = [(observation.pose, observation.twist, observation.propositions)]
+    seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
+    for n, (pose, twist, propositions) in enumerate(seen):
+        state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
+        state.speed[0, n], state.yaw_rate[0, n] = twist
+        for array, value in zip(labels, propositions, strict=True):
+            array[0, n] = value
+
+
 @dataclass(frozen=True, slots=True)
 class Contact:
     """Two bodies touched: `car` and `other`, at `time` seconds, during the tick that ends in frame `tick`.

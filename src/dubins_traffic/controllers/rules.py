@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law import decide
@@ -80,15 +80,7 @@ class Rules:
         drivers = self._drivers
         if drivers is None:
             return Command(0.0, 0.0)
-        state, labels = self._state, self._labels
-        state.count[0] = 1 + len(observation.others)
-        seen = [(observation.pose, observation.twist, observation.propositions)]
-        seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
-        for n, (pose, twist, propositions) in enumerate(seen):
-            state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
-            state.speed[0, n], state.yaw_rate[0, n] = twist
-            for array, value in zip(labels, propositions, strict=True):
-                array[0, n] = value
+        put_observed(self._state, self._labels, observation)
         if drivers.ints[0, EGO, PLACE] < 0:
             drivers.ints[0, EGO, PLACE] = nearest_stage(
                 drivers.distance, observation.propositions.lane, observation.propositions.segment

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law_tables import Desk, Drivers, desk
@@ -82,15 +82,7 @@ class Guard:
             Speed, m/s, and yaw rate, rad/s. Out of bounds it means what the simulator makes of it; numbers that are
             not finite mean (0, 0).
         """
-        state, labels = self._state, self._labels
-        state.count[0] = 1 + len(observation.others)
-        seen = [(observation.pose, observation.twist, observation.propositions)]
-        seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
-        for n, (pose, twist, propositions) in enumerate(seen):
-            state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
-            state.speed[0, n], state.yaw_rate[0, n] = twist
-            for array, value in zip(labels, propositions, strict=True):
-                array[0, n] = value
+        put_observed(self._state, self._labels, observation)
         self._tick[0] = observation.tick
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
