@@ -13,6 +13,12 @@ from pathlib import Path
 from typing import IO, Any
 
 NODES = 3
+NOTICE: dict[str, Any] = {
+    "health_check_initial_delay_ms": 1000,
+    "health_check_period_ms": 500,
+    "health_check_failure_threshold": 3,
+}
+"""How soon the head notices that a node is gone: within some two seconds, not the usual twenty."""
 
 
 class RayCluster:
@@ -67,7 +73,8 @@ def main() -> None:
         "num_cpus": 1,
         "object_store_memory": 80_000_000,
     }
-    cluster = Cluster(initialize_head=True, head_node_args={**common, "include_dashboard": False})
+    head = {**common, "include_dashboard": False, "_system_config": NOTICE}
+    cluster = Cluster(initialize_head=True, head_node_args=head)
     nodes = [cluster.add_node(wait=False, **common) for _ in range(NODES - 1)]
     cluster.wait_for_nodes()
     helpers = _helpers()

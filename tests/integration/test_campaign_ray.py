@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 
 import pytest
 from pyarrow import parquet
 
+from dubins_traffic.campaign import ray_driver, ray_engine
+from dubins_traffic.cli.main import main
 from tests import ray_cluster
 from tests.campaigns import campaign, command, logged, run, succeed, written
 
@@ -20,50 +23,73 @@ DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=24)
 TRIALS = 2 * 4 * 24
 BOUND = 60.0
 """Seconds within which a cluster must have begun, and one that is lost must have been told."""
+SILENCE = 6.0
+"""Seconds after which a silent cluster counts as lost here."""
+WIDE = ("--workers", "6")
+"""`Slow` sleeps most of the time."""
 
 
-def wait_for(folder: Path, trials: int, process: subprocess.Popen[str]) -> None:
+def wait_for(folder: Path, trials: int, process: subprocess.Popen[str] | None = None) -> None:
     """Wait until `Slow` has begun so many trials."""
     begun = time.monotonic()
     while logged(folder) < trials:
         assert time.monotonic() - begun < BOUND
-        assert process.poll() is None
+        assert process is None or process.poll() is None
         time.sleep(0.02)
 
 
-def test_workers_nodes_and_the_head_are_killed(tmp_path: Path) -> None:
+def test_workers_nodes_and_the_head_are_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     plain, many, lost = (tmp_path / name for name in ("plain", "many", "lost"))
     for folder in (plain, many, lost):
         folder.mkdir()
-    table = succeed(written(plain, DOCUMENT), plain / "out")
-    with ray_cluster.running() as cluster:
+    with (
+        subprocess.Popen(command(written(plain, DOCUMENT), plain / "out", *WIDE)) as alone,
+        ray_cluster.running() as cluster,
+    ):
+        assert alone.wait(timeout=120) == 0
+        table = (plain / "out" / "results.parquet").read_bytes()
         ray = ("--ray", cluster.address)
         file = written(many, DOCUMENT)
-        with subprocess.Popen(command(file, many / "out", *ray), text=True) as process:
+        with subprocess.Popen(
+            command(file, many / "out", *ray), stdout=subprocess.PIPE, text=True
+        ) as process:
             wait_for(many, 10, process)
             os.kill(int((many / "log").read_text().split()[-1]), signal.SIGKILL)
             wait_for(many, 30, process)
             cluster.kill_node()
-            assert process.wait(timeout=120) == 0
+            told, _ = process.communicate(timeout=120)
+        assert process.returncode == 0
+        assert told == f"{many / 'out' / 'results.parquet'}: {TRIALS} trials\n"
         assert (many / "out" / "results.parquet").read_bytes() == table
         assert len(set((many / "log").read_text().split())) >= ray_cluster.NODES
 
         file = written(lost, DOCUMENT)
-        with subprocess.Popen(
-            command(file, lost / "out", *ray), stderr=subprocess.PIPE, text=True
-        ) as process:
-            wait_for(lost, 20, process)
+        monkeypatch.setattr(ray_engine, "SILENCE", SILENCE)
+        killed: list[float] = []
+
+        def kill() -> None:
+            wait_for(lost, 20)
             cluster.kill_head()
-            killed = time.monotonic()
-            _, told = process.communicate(timeout=120)
-        assert time.monotonic() - killed < BOUND
-        assert process.returncode == 1
+            killed.append(time.monotonic())
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        assert main(command(file, lost / "out", *ray)[1:]) == 1
+        killer.join()
+        assert time.monotonic() - killed[0] < SILENCE + BOUND / 2
+        told = capsys.readouterr().err
         assert f"the Ray cluster at {cluster.address} is lost" in told
         assert f"of {TRIALS} trials are kept, --resume goes on" in told
     kept, begun = finished(lost / "out"), logged(lost)
     assert kept < TRIALS
-    assert succeed(file, lost / "out", "--resume") == table
+    assert succeed(file, lost / "out", "--resume", *WIDE) == table
     assert logged(lost) - begun <= TRIALS - kept
+
+
+def test_a_lost_head_is_told_within_half_a_minute() -> None:
+    assert ray_engine.SILENCE + ray_driver.PULSE < 30.0
 
 
 def finished(out: Path) -> int:

@@ -10,6 +10,7 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from dubins_traffic.campaign.campaign import Campaign, load_campaign, seed_of
+from dubins_traffic.campaign.chunks import LEAST_CAR_STEPS, MOST_CAR_STEPS, cost
 from dubins_traffic.campaign.factors import put, raised, scalar, vary
 from dubins_traffic.campaign.folder import remaining
 from dubins_traffic.campaign.schema import campaign_schema, shipped_campaign_schema
@@ -197,6 +198,33 @@ def test_the_shipped_schema_is_up_to_date_and_agrees() -> None:
     validator.validate({**BASE, "configurations": [{"name": "own", "document": TOWN}, "demo"]})
     for changes, _ in WRONG[:2] + WRONG[6:8] + WRONG[10:11]:
         assert not validator.is_valid({**BASE, **changes})
+
+
+def test_chunks_get_smaller_towards_the_end_and_hold_about_as_much_work() -> None:
+    campaign = made(
+        controllers=["rules", "lanes"],
+        trials=3000,
+        configurations=["town"],
+        factors={"duration": [6.0, 60.0]},
+    )
+    chunks = list(campaign.chunks())
+    ends = [chunk.end for chunk in chunks]
+    assert [chunk.number for chunk in chunks] == [0, *ends[:-1]]
+    assert ends[-1] == campaign.total
+    for cell in campaign.cells:
+        for place in campaign.places:
+            counts = [
+                chunk.count
+                for chunk in chunks
+                if chunk.controller == place and chunk.configuration is cell.settled
+            ]
+            each = cost(cell, place)
+            assert max(counts) * each <= max(MOST_CAR_STEPS, each)
+            assert sum(counts) == cell.count
+            assert min(counts) >= max(1, int(0.5 * LEAST_CAR_STEPS / each))
+    last = [chunk.count for chunk in chunks if chunk.configuration is campaign.cells[-1].settled]
+    assert last == sorted(last, reverse=True)
+    assert cost(campaign.cells[0], "lanes") > 10.0 * cost(campaign.cells[0], "rules")
 
 
 def test_what_is_left_of_the_work() -> None:

@@ -18,6 +18,7 @@ from dubins_traffic.campaign.asked import Maker, ask, grouped
 from dubins_traffic.campaign.group import Group, Outcome
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
@@ -30,8 +31,6 @@ from dubins_traffic.scoring.verdict import Ruling
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-COMPILED = "rules"
-"""The controller that is compiled: no Python runs between two ticks of its trials."""
 ASKED = 16
 """So many trials of a campaign's chunk run at a time where a controller is asked in every tick."""
 KEEP = "none, all, failures or sample:K"

@@ -13,6 +13,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from dubins_traffic.campaign.chunks import Cell, Chunk, cut
 from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
@@ -23,71 +24,6 @@ from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import plain
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.simulators import registry as simulators
-
-CAR_STEPS = 2_000_000
-"""Car-steps of a chunk whose size the file does not give."""
-MOST_IN_CHUNK = 2_000
-LEAST_CAR_STEPS = 200_000
-"""Car-steps below which a chunk does not hide what it costs to hand out and to keep."""
-TRIAL = 2_000
-"""What it costs to begin and to score a trial, in car-steps."""
-CHUNKS = 64
-"""At least so many chunks are made, if they are not too small for that."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """One combination of a configuration and a value of each factor.
-
-    `values` tells the factors as tables do; `first` is the number of its first trial, of which there are `count` for
-    each controller. Trial k of every controller is ``draw(settled, seed, k)``, with `settled` the configuration that
-    has the values put in.
-    """
-
-    index: int
-    configuration: str
-    values: Mapping[str, Scalar]
-    seed: int
-    first: int
-    count: int
-    settled: Configuration
-
-
-@dataclass(frozen=True, slots=True)
-class Chunk:
-    """A unit of work: `count` trials, from number `trial`, of one controller in one cell.
-
-    Attributes
-    ----------
-    number : int
-        Number of the first of them in the campaign; the others follow.
-    configuration : Configuration
-        What the instances are drawn from, with `seed` and the number of the trial.
-    controller : str
-        What `controllers.registry.load` takes.
-    deadline : float or None
-        Seconds within which each `act` must answer.
-    """
-
-    number: int
-    configuration: Configuration
-    seed: int
-    controller: str
-    trial: int
-    count: int
-    deadline: float | None = None
-
-    @property
-    def end(self) -> int:
-        """The number after the last."""
-        return self.number + self.count
-
-    def part(self, number: int, end: int) -> Chunk:
-        """Return the chunk of the trials from `number` up to before `end`."""
-        trial = self.trial + number - self.number
-        return Chunk(
-            number, self.configuration, self.seed, self.controller, trial, end - number, self.deadline
-        )
 
 
 @dataclass(frozen=True)
@@ -174,27 +110,12 @@ class Campaign:
 
     def chunks(self) -> Iterator[Chunk]:
         """Make all units of work, in order; they depend on the campaign alone."""
-        for cell in self.cells:
-            size = self.model.chunk or self._size(cell)
-            for k, place in enumerate(self.places):
-                start = cell.first + k * cell.count
-                for trial in range(0, cell.count, size):
-                    count = min(size, cell.count - trial)
-                    yield Chunk(
-                        start + trial, cell.settled, cell.seed, place, trial, count, self.model.deadline
-                    )
+        return cut(self.cells, self.places, self.model.chunk, self.model.deadline)
 
     def chunk(self, cell: Cell, controller: int, trial: int) -> Chunk:
         """Return one trial as a chunk of its own."""
         number = cell.first + controller * cell.count + trial
         return Chunk(number, cell.settled, cell.seed, self.places[controller], trial, 1, self.model.deadline)
-
-    def _size(self, cell: Cell) -> int:
-        settings = cell.settled.settings
-        seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
-        cost = TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents))
-        least = int(LEAST_CAR_STEPS / cost)
-        return max(1, least, min(int(CAR_STEPS / cost), MOST_IN_CHUNK, -(-self.total // CHUNKS)))
 
 
 def load_campaign(path: str | os.PathLike[str]) -> Campaign:

@@ -11,6 +11,7 @@ from pathlib import Path
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
 from dubins_traffic.campaign.engine import Engine
+from dubins_traffic.campaign.folder import Folder
 from dubins_traffic.campaign.pool import Pool
 from dubins_traffic.campaign.ray_engine import RayEngine, check_address
 from dubins_traffic.campaign.schedule import carry_out
@@ -76,20 +77,29 @@ def run_campaign(
     if ray is not None:
         check_address(ray)
     with folders.opened(Path(folder), campaign, resume=resume, records=records) as own:
-        done = own.done()
-        count = before = sum(end - first for first, end in done)
+        before = sum(end - first for first, end in own.done())
         if progress is not None:
-            progress(count, campaign.total)
-        if count < campaign.total:
+            progress(before, campaign.total)
+        if before < campaign.total:
             around = Surroundings.here(own.records)
             with contextlib.closing(_engine(workers, ray, around)) as engine:
-                for chunk, part in carry_out(engine, folders.remaining(campaign.chunks(), done)):
-                    own.keep(chunk, part)
-                    count += chunk.count
-                    if progress is not None:
-                        progress(count, campaign.total)
+                run_left(own, engine, progress)
         own.finish()
         return Ran(campaign, own.path, before)
+
+
+def run_left(own: Folder, engine: Engine, progress: Progress | None = None) -> None:
+    """Run on `engine` what is left of the campaign in a folder, and keep each chunk there; the table is not made yet.
+
+    The exceptions are those of `run_campaign`.
+    """
+    done = own.done()
+    count = sum(end - first for first, end in done)
+    for chunk, part in carry_out(engine, folders.remaining(own.campaign.chunks(), done)):
+        own.keep(chunk, part)
+        count += chunk.count
+        if progress is not None:
+            progress(count, own.campaign.total)
 
 
 def _engine(workers: int | None, ray: str | None, around: Surroundings) -> Engine:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.chunks import Chunk
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dubins_traffic.campaign import manifest, table
-from dubins_traffic.campaign.campaign import Campaign, Chunk
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.records import FOLDER as RECORDS
 from dubins_traffic.campaign.records import Keep, Records, read_keep
 from dubins_traffic.errors import InputError

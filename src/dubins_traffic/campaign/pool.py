@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING
 
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.engine import Outcome
 from dubins_traffic.campaign.many import deaf_to_interrupts
 from dubins_traffic.campaign.orphans import end_with_parent

@@ -1,4 +1,7 @@
-"""The process that drives Ray for a campaign: takes chunks from a pipe, sends their parts back."""
+"""The process that drives Ray for a campaign: takes chunks from a pipe, sends their parts back.
+
+It handles chunks as bytes, and loads nothing of this package that runs trials: a cluster is joined the sooner.
+"""
 
 from __future__ import annotations
 
@@ -6,30 +9,46 @@ import contextlib
 import os
 import queue
 import threading
+from concurrent.futures import Future
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, TypeAlias
 
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign import ray_task
 from dubins_traffic.campaign.orphans import end_with_parent
-from dubins_traffic.campaign.work import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 
 ALIVE, DONE, FAILED = "alive", "done", "failed"
 """Kinds of messages: (alive, processors of the cluster), (done, number, part or None if lost), (failed, why)."""
 PULSE = 1.0
 """Seconds between signs of life."""
-PAUSE = 0.05
-"""Longest time for which a new chunk waits to be noticed, seconds."""
+
+_Event: TypeAlias = tuple[int, bytes | Future[bytes]] | None
+"""A chunk that has come, or one that is done, by its number; None: the pipe is closed."""
 
 
-def drive(pipe: Connection, address: str, workers: int, around: Surroundings) -> None:
-    """Join the cluster at `address` and run chunks until the pipe is closed at the other end."""
+def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
+    """Join the cluster at `address` and run chunks until the pipe is closed at the other end.
+
+    Parameters
+    ----------
+    pipe : Connection
+        Chunks come from it as (number, the chunk pickled); messages go into it.
+    address : str
+        As of `RayEngine`.
+    workers : int
+        Processors of a local cluster.
+    around : bytes
+        What workers share, pickled.
+    """
     end_with_parent()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    # Ray's own words stand in its logs; ours go through the pipe.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    # Ray's own words, pages of them when a node is lost, stand in its logs; ours go through the pipe.
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for output in (1, 2):
+        os.dup2(nowhere, output)
     ray: Any = import_module("ray")
     send = _Sender(pipe)
     over = threading.Event()
@@ -83,41 +102,31 @@ def _beat(ray: Any, send: _Sender, over: threading.Event) -> None:
 
 
 class _Driver:
-    """Keeps the chunks that are under way."""
+    """Hands chunks over as they come, and their parts back as they are done."""
 
-    def __init__(self, ray: Any, pipe: Connection, send: _Sender, around: Surroundings) -> None:
-        self._ray = ray
+    def __init__(self, ray: Any, pipe: Connection, send: _Sender, around: bytes) -> None:
+        self._errors = ray.exceptions
         self._send = send
         self._around = ray.put(around)
-        self._task = ray.remote(num_cpus=1, max_retries=0)(_run)
-        self._version = version("dubins-traffic")
-        self._numbers: dict[Any, int] = {}
-        self._waiting: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()
+        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_task.run)
+        self._version = version(ray_task.PACKAGE)
+        self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         threading.Thread(target=self._listen, args=(pipe,), daemon=True).start()
 
     def run(self) -> None:
         """Run chunks until there is nobody to run them for."""
-        while self._submit():
-            if not self._numbers:
-                continue
-            ready, _ = self._ray.wait(list(self._numbers), num_returns=1, timeout=PAUSE)
-            for reference in ready:
-                self._send(DONE, self._numbers.pop(reference), self._result(reference))
+        while (event := self._events.get()) is not None:
+            number, what = event
+            if isinstance(what, bytes):
+                future: Future[bytes] = self._task.remote(what, self._around, self._version).future()
+                future.add_done_callback(partial(self._note, number))
+            else:
+                self._send(DONE, number, self._part(what))
 
-    def _submit(self) -> bool:
-        """Hand over what has come; with nothing under way wait for it. False: the pipe is closed."""
-        chunk: Chunk | None
-        while True:
-            try:
-                chunk = self._waiting.get(block=not self._numbers)
-            except queue.Empty:
-                return True
-            if chunk is None:
-                return False
-            reference = self._task.remote(chunk, self._around, self._version)
-            self._numbers[reference] = chunk.number
+    def _note(self, number: int, done: Future[bytes]) -> None:
+        self._events.put((number, done))
 
-    def _result(self, reference: Any) -> bytes | None:
+    def _part(self, done: Future[bytes]) -> bytes | None:
         """Return the part of a chunk, None if it was lost with a worker or a node.
 
         Raises
@@ -125,24 +134,16 @@ class _Driver:
         DubinsTrafficError
             If the worker is fit for nothing, such as one of another version.
         """
-        errors = self._ray.exceptions
         try:
-            return self._ray.get(reference)
-        except errors.RayTaskError as error:
+            return done.result()
+        except self._errors.RayTaskError as error:
             raise DubinsTrafficError(str(error.cause or error)) from None
-        except errors.RayError:
+        except self._errors.RayError:
             return None
 
     def _listen(self, pipe: Connection) -> None:
         try:
             while True:
-                self._waiting.put(pipe.recv())
+                self._events.put(pipe.recv())
         except (EOFError, OSError):
-            self._waiting.put(None)
-
-
-def _run(chunk: Chunk, around: Surroundings, wanted: str) -> bytes:
-    """Run a chunk on a worker of the cluster."""
-    if version("dubins-traffic") != wanted:
-        raise DubinsTrafficError(f"a node has dubins-traffic {version('dubins-traffic')}, not {wanted}")
-    return run_part(chunk, around)
+            self._events.put(None)

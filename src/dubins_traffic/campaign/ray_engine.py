@@ -7,13 +7,14 @@ drives it. This side sees that process fall silent, and says what has happened.
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 import socket
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
 
 from dubins_traffic.campaign import ray_driver
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.engine import Outcome
 from dubins_traffic.campaign.many import deaf_to_interrupts
 from dubins_traffic.campaign.work import Surroundings
@@ -53,7 +54,7 @@ class RayEngine:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(
-            target=ray_driver.drive, args=(theirs, address, workers, around), daemon=False
+            target=ray_driver.drive, args=(theirs, address, workers, pickle.dumps(around)), daemon=False
         )
         with deaf_to_interrupts():
             self._process.start()
@@ -75,7 +76,7 @@ class RayEngine:
         """Take a chunk to run."""
         self._under_way[chunk.number] = chunk
         try:
-            self._pipe.send(chunk)
+            self._pipe.send((chunk.number, pickle.dumps(chunk)))
         except OSError:
             raise self._lost("its driver ended") from None
 

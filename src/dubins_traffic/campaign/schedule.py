@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Iterator
 
 from dubins_traffic.campaign import rows
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.engine import Engine
 
 LOSSES = 2

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.campaign import rows
-from dubins_traffic.campaign.campaign import Campaign, Cell
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.chunks import Cell
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.batch import run_together
-from dubins_traffic.campaign.campaign import Chunk
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.many import Job
 from dubins_traffic.campaign.records import Keep, Records, remove_record
 from dubins_traffic.controllers import registry as controllers

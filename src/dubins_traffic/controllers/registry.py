@@ -28,6 +28,8 @@ _DESCRIPTIONS = {
     "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
     "synthesized": "plays a winning strategy of the game of cells, found at the start; drives as rules does",
 }
+COMPILED = "rules"
+"""The controller that is compiled: in a batch no Python runs between two ticks of its trials."""
 SHIELDED = "+shield"
 """What ends the name of a controller that drives under the shield (`controllers.shield`)."""
 _OPTION = "--controller"

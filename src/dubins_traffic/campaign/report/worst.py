@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.campaign import rows
-from dubins_traffic.campaign.campaign import Campaign, Chunk
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.many import Job
 from dubins_traffic.campaign.table import places
 from dubins_traffic.errors import DubinsTrafficError

@@ -1,0 +1,122 @@
+"""The units of work of a campaign: how many trials are handed out at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from dubins_traffic.campaign.factors import Scalar
+from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.problem.configuration import Configuration
+
+MOST_CAR_STEPS = 3_000_000
+"""Car-steps of the largest chunks, about half a second: so much is lost with a worker."""
+LEAST_CAR_STEPS = 500_000
+"""Car-steps of the smallest, about a tenth of a second, ten times what it costs to hand one out and to keep it."""
+SHARES = 16
+"""A chunk is this part of the work that is left, if that lies between: so all workers end at about the same time."""
+MOST_IN_CHUNK = 2_000
+TRIAL = 1_000
+"""What it costs to begin and to score a trial, in car-steps."""
+ASKED = 200
+"""What it costs at least to ask a controller in Python once, in car-steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One combination of a configuration and a value of each factor.
+
+    `values` tells the factors as tables do; `first` is the number of its first trial, of which there are `count` for
+    each controller. Trial k of every controller is ``draw(settled, seed, k)``, with `settled` the configuration that
+    has the values put in.
+    """
+
+    index: int
+    configuration: str
+    values: Mapping[str, Scalar]
+    seed: int
+    first: int
+    count: int
+    settled: Configuration
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A unit of work: `count` trials, from number `trial`, of one controller in one cell.
+
+    Attributes
+    ----------
+    number : int
+        Number of the first of them in the campaign; the others follow.
+    configuration : Configuration
+        What the instances are drawn from, with `seed` and the number of the trial.
+    controller : str
+        What `controllers.registry.load` takes.
+    deadline : float or None
+        Seconds within which each `act` must answer.
+    """
+
+    number: int
+    configuration: Configuration
+    seed: int
+    controller: str
+    trial: int
+    count: int
+    deadline: float | None = None
+
+    @property
+    def end(self) -> int:
+        """The number after the last."""
+        return self.number + self.count
+
+    def part(self, number: int, end: int) -> Chunk:
+        """Return the chunk of the trials from `number` up to before `end`."""
+        trial = self.trial + number - self.number
+        return Chunk(
+            number, self.configuration, self.seed, self.controller, trial, end - number, self.deadline
+        )
+
+
+def cut(
+    cells: Sequence[Cell], places: Sequence[str], most: int | None = None, deadline: float | None = None
+) -> Iterator[Chunk]:
+    """Return the chunks of a campaign, in the order of its trials.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Its cells.
+    places : sequence of str
+        Its controllers.
+    most : int, optional
+        Trials in a chunk; by default by how long they take, and fewer towards the end.
+    deadline : float, optional
+        Seconds within which each `act` must answer.
+    """
+    left = sum(cell.count * cost(cell, place) for cell in cells for place in places)
+    for cell in cells:
+        for k, place in enumerate(places):
+            each = cost(cell, place)
+            trial = 0
+            while trial < cell.count:
+                rest = cell.count - trial
+                pieces = -(-rest // (most or _trials(left, each)))
+                count = min(most, rest) if most else -(-rest // pieces)
+                number = cell.first + k * cell.count + trial
+                yield Chunk(number, cell.settled, cell.seed, place, trial, count, deadline)
+                trial += count
+                left -= count * each
+
+
+def cost(cell: Cell, controller: str) -> float:
+    """Return about what a trial takes, in car-steps of the compiled tick."""
+    settings = cell.settled.settings
+    seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
+    asked = 0 if controller == COMPILED else ASKED
+    return TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents) + asked)
+
+
+def _trials(left: float, each: float) -> int:
+    """Return how many trials the next chunk has at most, with so much left to do."""
+    steps = min(MOST_CAR_STEPS, max(LEAST_CAR_STEPS, left / SHARES))
+    return max(1, min(MOST_IN_CHUNK, int(steps / each)))

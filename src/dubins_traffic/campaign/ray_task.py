@@ -1,0 +1,43 @@
+"""What a worker of a Ray cluster is asked to do.
+
+The process that drives Ray names it and hands chunks on as they came, so that it need not load what runs them.
+"""
+
+from __future__ import annotations
+
+import pickle
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from dubins_traffic.errors import DubinsTrafficError
+
+if TYPE_CHECKING:
+    from dubins_traffic.campaign.chunks import Chunk
+    from dubins_traffic.campaign.work import Surroundings
+
+PACKAGE = "dubins-traffic"
+
+
+def run(chunk: bytes, around: bytes, wanted: str) -> bytes:
+    """Run a chunk and return its part of the table.
+
+    Parameters
+    ----------
+    chunk, around : bytes
+        The chunk and the surroundings, pickled.
+    wanted : str
+        The version of this package that they are of.
+
+    Raises
+    ------
+    DubinsTrafficError
+        If this node has another version.
+    """
+    own = version(PACKAGE)
+    if own != wanted:
+        raise DubinsTrafficError(f"a node has {PACKAGE} {own}, not {wanted}")
+    from dubins_traffic.campaign.work import run_part
+
+    known: Chunk = pickle.loads(chunk)
+    shared: Surroundings = pickle.loads(around)
+    return run_part(known, shared)
