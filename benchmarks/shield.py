@@ -120,7 +120,8 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         [problem.network for problem in problems], [problem.car.lane_width for problem in problems]
     )
     bodies = pack_obstacles([problem.obstacles for problem in problems])
-    law, drivers, watch = egos(problems, places, net), egos(problems, places, net), guards(problems)
+    law, drivers = egos(problems, places, net), egos(problems, places, net)
+    watch = guards(problems, roads, net)
     room = desk(places, int(np.diff(roads.seg_off).max()))
     hostile = Hostile(kinds, law.build, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)

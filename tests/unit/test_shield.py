@@ -19,6 +19,7 @@ from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.shield import Shield
 from dubins_traffic.driving.guard import Guard, Intervention
+from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
@@ -51,8 +52,8 @@ class Drives:
 class Noting(Shield):
     """A shield that keeps what it did."""
 
-    def __init__(self, controller: Any) -> None:
-        super().__init__(controller)
+    def __init__(self, controller: Any, *, overtakes: Overtakes = "sure") -> None:
+        super().__init__(controller, overtakes=overtakes)
         self.found: list[Intervention] = []
 
     def act(self, observation: Observation) -> Command | None:
@@ -81,15 +82,43 @@ def reasons(found: Sequence[Intervention]) -> set[str]:
     return {one.reason for one in found}
 
 
-def test_rules_drives_as_without_a_shield() -> None:
-    agents = [car("lawful", f"c{k}", goes="wander") for k in range(3)]
-    parked = car("parked", "parked", turned(3.0, -W), vacates_after=None)
-    instance = on_grid([*agents, parked], 60.0, START)
-    shield = Shield("rules")
+def in_the_way() -> dict[str, Any]:
+    """Return an obstacle in the ego's lane."""
+    x, y, _ = turned(3.2, -W)
+    return {"disc": {"x": x, "y": y, "radius": 0.15}}
+
+
+@pytest.mark.parametrize("overtakes", ["sure", "law"])
+def test_rules_drives_as_without_a_shield(overtakes: Overtakes) -> None:
+    """It is let across the centre line past an obstacle with nobody near, and by the law's leave past a car."""
+    if overtakes == "sure":
+        instance = on_grid([], 60.0, START, obstacles=[in_the_way()])
+    else:
+        agents = [car("lawful", f"c{k}", goes="wander") for k in range(3)]
+        parked = car("parked", "parked", turned(3.0, -W), vacates_after=None)
+        instance = on_grid([*agents, parked], 60.0, START)
+    shield = Shield("rules", overtakes=overtakes)
     with_it, without = run_trial(instance, shield).score, run_trial(instance, "rules").score
     assert shield.guard.count == 0
     assert with_it.driven == without.driven
     assert with_it.driven.distance_m > 20.0
+
+
+def test_what_is_not_sure_is_not_done() -> None:
+    """By default no car is passed, and no obstacle beside which one could come; never means never."""
+    parked = car("parked", "parked", turned(3.0, -W), vacates_after=None)
+    near = car("parked", "parked", turned(4.0, -W), vacates_after=None)
+    cases: list[tuple[Instance, Overtakes]] = [
+        (on_grid([parked], 10.0, START), "sure"),
+        (on_grid([near], 10.0, START, obstacles=[in_the_way()]), "sure"),
+        (on_grid([], 10.0, START, obstacles=[in_the_way()]), "never"),
+    ]
+    for instance, overtakes in cases:
+        shield = Noting("rules", overtakes=overtakes)
+        score = run_trial(instance, shield).score
+        assert broken(score, "ego") == set()
+        assert reasons(shield.found) == {"2.left"}
+        assert score.driven.distance_m < 2.0
 
 
 CASES: dict[str, tuple[Sequence[float], Act, str]] = {
@@ -173,9 +202,7 @@ def test_what_is_done_is_no_farther_from_what_was_asked_than_standing() -> None:
 
 def test_the_law_takes_over_to_pass_what_stands() -> None:
     """Who steers round an obstacle is let across the centre line only as the law passes, and is back in time."""
-    x, y, _ = turned(3.2, -W)
-    disc = {"disc": {"x": x, "y": y, "radius": 0.15}}
-    instance = on_grid([], 40.0, START, obstacles=[disc])
+    instance = on_grid([], 40.0, START, obstacles=[in_the_way()])
     shield = Noting("lanes")
     score = run_trial(instance, shield).score
     assert broken(score, "ego") == set()
@@ -238,9 +265,25 @@ def test_names_with_a_shield(tmp_path: Path) -> None:
     assert registry.shielded("rules") == registry.shielded("rules+shield") == "rules+shield"
     with pytest.raises(InputError, match="unknown controller"):
         registry.load("nobody+shield")
+    assert registry.shielded("rules+shield:law") == "rules+shield:law"
+    with pytest.raises(InputError, match="overtakes: not a way to overtake: got 'maybe'; expected sure, law"):
+        registry.load("rules+shield:maybe")
+    with pytest.raises(InputError, match="got ''"):
+        registry.load("rules+shield:")
+    with pytest.raises(InputError, match="got True"):
+        Guard(overtakes=True)  # pyright: ignore[reportArgumentType]
     instance = on_grid([], 8.0, START)
     result = run_trial(instance, "simple+shield", record=tmp_path / "one.mcap")
     assert read(result.record or "").controller == "simple+shield"
+
+
+def test_a_name_says_when_the_ego_overtakes() -> None:
+    instance = on_grid([], 20.0, START, obstacles=[in_the_way()])
+    driven = {
+        how: run_trial(instance, f"rules+shield{how}").score.driven.distance_m
+        for how in ("", ":sure", ":law", ":never")
+    }
+    assert driven[""] == driven[":sure"] == driven[":law"] > driven[":never"] + 5.0
 
 
 def test_a_car_that_can_not_keep_the_rules_is_refused() -> None:

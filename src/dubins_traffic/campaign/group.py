@@ -31,9 +31,10 @@ from dubins_traffic.campaign.batch_kernel import (
 )
 from dubins_traffic.cars.near import Spacing, spacing
 from dubins_traffic.cars.state import EGO, Contact, Labels, State
+from dubins_traffic.driving.lane_graph import nearest_stage
 from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
 from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
-from dubins_traffic.driving.rounds import nearest_stage, stages
+from dubins_traffic.driving.rounds import stages
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending
@@ -200,9 +201,8 @@ class Group:
         world.course.ints[:, LAWFUL] = drivers.active
         for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
             own = drivers.ints[b, EGO]
-            far = drivers.distance[own[FIRST] : own[LAST_STAGE]]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
-            own[PLACE] = own[FIRST] + nearest_stage(far, lane, segment)
+            own[PLACE] = nearest_stage(drivers.distance, int(own[FIRST]), int(own[LAST_STAGE]), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most

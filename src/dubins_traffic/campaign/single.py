@@ -138,8 +138,8 @@ def run_trial(
     """
     if link is not None and link.ego:
         name, driver = link.transport.name, RemoteController(link)
-        if isinstance(controller, str) and controller.endswith(controllers.SHIELDED):
-            name, driver = controllers.shielded(name), controllers.under_shield(driver)
+        if isinstance(controller, str) and controllers.is_shielded(controller):
+            name, driver = controllers.shielded(name), controllers.under_shield(driver, controller)
     else:
         name = controller if isinstance(controller, str) else type(controller).__name__
         driver = controllers.load(controller) if isinstance(controller, str) else controller

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 import sys
 import zlib
 from collections.abc import Mapping
@@ -31,7 +32,9 @@ _DESCRIPTIONS = {
 COMPILED = "rules"
 """The controller that is compiled: in a batch no Python runs between two ticks of its trials."""
 SHIELDED = "+shield"
-"""What ends the name of a controller that drives under the shield (`controllers.shield`)."""
+"""What ends the name of a controller that drives under the shield (`controllers.shield`); behind it there may be a
+colon and when the ego may overtake, as in ``lanes+shield:never``."""
+_SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
 _OPTION = "--controller"
 _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
@@ -50,7 +53,8 @@ def load(spec: str) -> Controller:
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
         directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
         strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`. Followed by
-        ``+shield``: the same under the shield.
+        ``+shield``: the same under the shield; by ``+shield:law`` or ``+shield:never`` under one that overtakes
+        otherwise (`controllers.shield.Shield`).
 
     Raises
     ------
@@ -58,8 +62,8 @@ def load(spec: str) -> Controller:
         If there is no such name, module, file or class, if the code raises while it is loaded or constructed, or
         if the object lacks a method of `dubins_traffic.protocols.Controller`.
     """
-    if spec.endswith(SHIELDED):
-        return under_shield(load(spec.removesuffix(SHIELDED)))
+    if is_shielded(spec):
+        return under_shield(load(_SHIELD.sub("", spec)), spec)
     if spec in _BUILT_IN:
         module, name = _BUILT_IN[spec]
         return cast(Controller, getattr(importlib.import_module(module), name)())
@@ -94,14 +98,29 @@ def load(spec: str) -> Controller:
     return cast(Controller, made)
 
 
+def is_shielded(spec: str) -> bool:
+    """Tell whether a name is that of a controller under the shield."""
+    return _SHIELD.search(spec) is not None
+
+
 def shielded(spec: str) -> str:
     """Return the name of a controller under the shield."""
-    return spec if spec.endswith(SHIELDED) else spec + SHIELDED
+    return spec if is_shielded(spec) else spec + SHIELDED
 
 
-def under_shield(controller: Controller) -> Controller:
-    """Return a controller that drives as `controller` does under the shield (`controllers.shield`)."""
-    return cast(Controller, importlib.import_module("dubins_traffic.controllers.shield").Shield(controller))
+def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
+    """Return a controller that drives as `controller` does under the shield that a name `spec` ends in.
+
+    Raises
+    ------
+    InputError
+        If there is no such shield.
+    """
+    ending = _SHIELD.search(spec)
+    given = None if ending is None else ending["overtakes"]
+    more = {} if given is None else {"overtakes": given}
+    shield = importlib.import_module("dubins_traffic.controllers.shield").Shield
+    return cast(Controller, shield(controller, **more))
 
 
 def _load_file(place: str, spec: str) -> ModuleType:

@@ -9,6 +9,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
+from dubins_traffic.driving.lane_graph import nearest_stage
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
     FIRST,
@@ -24,7 +25,7 @@ from dubins_traffic.driving.law_tables import (
     desk,
     no_ways,
 )
-from dubins_traffic.driving.rounds import nearest_stage, stages
+from dubins_traffic.driving.rounds import stages
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
@@ -82,8 +83,9 @@ class Rules:
             return Command(0.0, 0.0)
         put_observed(self._state, self._labels, observation)
         if drivers.ints[0, EGO, PLACE] < 0:
+            seen = observation.propositions
             drivers.ints[0, EGO, PLACE] = nearest_stage(
-                drivers.distance, observation.propositions.lane, observation.propositions.segment
+                drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment
             )
         self._decide(observation.tick, self._command)
         speed, yaw_rate = self._command[0, EGO].tolist()

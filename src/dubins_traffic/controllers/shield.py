@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
 from dubins_traffic.driving.guard import Guard
+from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.protocols import Closes, Controller, Reports
 from dubins_traffic.record.sink import SHIELD
 
@@ -22,8 +23,14 @@ class Shield:
     ----------
     controller : Controller or str
         Whatever drives; by name as `controllers.registry.load` takes it.
-    overtakes : bool
-        Whether the ego may cross the centre line to pass what stands.
+    overtakes : {"sure", "law", "never"}
+        When the ego may cross the centre line to pass what stands: only where it is sure to be back in time whatever
+        the others do, by default; wherever the law of the road would, as the controller `rules` does; or never.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller, or `overtakes` is something else.
 
     Attributes
     ----------
@@ -43,7 +50,7 @@ class Shield:
     True
     """
 
-    def __init__(self, controller: Controller | str, *, overtakes: bool = True) -> None:
+    def __init__(self, controller: Controller | str, *, overtakes: Overtakes = "sure") -> None:
         self._controller = registry.load(controller) if isinstance(controller, str) else controller
         self.guard = Guard(overtakes=overtakes)
         self._events: list[tuple[str, str]] = []

@@ -15,8 +15,8 @@ from dubins_traffic.controllers.shield import told
 from dubins_traffic.driving.exits import BACK
 from dubins_traffic.driving.gates import MARGIN
 from dubins_traffic.driving.guard import Guard
+from dubins_traffic.driving.lane_graph import nearest_stage
 from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
-from dubins_traffic.driving.rounds import nearest_stage
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import SHIELD
@@ -144,7 +144,8 @@ class Synthesized(Rules):
         cars += [Sighting(car.index, car.pose, car.propositions) for car in seen.others]
         changed = course.play.follow(seen.tick, cars)
         if course.stage == NO_STAGE:
-            course.stage = nearest_stage(course.ways, seen.propositions.lane, seen.propositions.segment)
+            lane, segment = seen.propositions.lane, seen.propositions.segment
+            course.stage = nearest_stage(course.ways, 0, len(course.ways), lane, segment)
         elif seen.propositions.at == course.vertices[course.stage]:
             course.stage = (course.stage + 1) % len(course.goals)
         elif not changed:

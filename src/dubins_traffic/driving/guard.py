@@ -11,7 +11,15 @@ from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law_tables import Desk, Drivers, desk
 from dubins_traffic.driving.shield import shield
-from dubins_traffic.driving.shield_tables import REASON, REASONS, Guards, egos, guards
+from dubins_traffic.driving.shield_tables import (
+    REASON,
+    REASONS,
+    Guards,
+    Overtakes,
+    check_overtakes,
+    egos,
+    guards,
+)
 from dubins_traffic.roads.table import RoadTable, pack
 
 if TYPE_CHECKING:
@@ -32,8 +40,9 @@ class Guard:
 
     Parameters
     ----------
-    overtakes : bool
-        Whether the ego may cross the centre line at all.
+    overtakes : {"sure", "law", "never"}
+        When the ego may cross the centre line to pass what stands: only where it is sure to be back in time whatever
+        the others do, by default; wherever the law of the road would, as the controller `rules` does; or never.
 
     Examples
     --------
@@ -49,8 +58,8 @@ class Guard:
         How many ticks the shield has stepped in.
     """
 
-    def __init__(self, *, overtakes: bool = True) -> None:
-        self._overtakes = overtakes
+    def __init__(self, *, overtakes: Overtakes = "sure") -> None:
+        self._overtakes: Overtakes = check_overtakes(overtakes)
         self.intervention: Intervention | None = None
         self.count = 0
 
@@ -66,8 +75,9 @@ class Guard:
         self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
         self._desk: Desk = desk(cars, len(problem.network.segments))
-        self._drivers: Drivers = egos([problem], cars, np.zeros(1, dtype=np.int64))
-        self._guards: Guards = guards([problem], overtakes=self._overtakes)
+        net = np.zeros(1, dtype=np.int64)
+        self._drivers: Drivers = egos([problem], cars, net)
+        self._guards: Guards = guards([problem], self._roads, net, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
         self._shield()  # compiles, so that nobody waits for that in the first tick
 

@@ -30,6 +30,20 @@ def lane_at(roads: RoadTable, net: int, x: float, y: float, c: float, s: float) 
 
 
 @jit
+def nearest_stage(distance: Floats, first: int, last: int, lane: int, segment: int) -> int:
+    """Return the stage, of rows `first` to `last` - 1, that is nearest along lanes; the first of equally near ones.
+
+    From `lane`, or from `segment` for a car without lane state; -1 if there are no rows.
+    """
+    start = lane if lane >= 0 else 2 * segment
+    best = -1
+    for k in range(first, last):
+        if best < 0 or distance[k, start] < distance[best, start]:
+            best = k
+    return best
+
+
+@jit
 def aim_for(lane: int, hops: Ints, queue: Ints, count: int) -> int:
     """Make a lane a target of `spread`; return the number of targets so far."""
     if hops[lane] == FAR:

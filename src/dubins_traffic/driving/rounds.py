@@ -34,8 +34,3 @@ def stages(problem: Problem) -> tuple[Ints, Floats]:
         distance = np.stack([graph.metres_to(target) for target in targets]) + np.array(graph.length)
         graph.stages[found] = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
     return graph.stages[found]
-
-
-def nearest_stage(distance: Floats, lane: int, segment: int) -> int:
-    """Return the goal that is nearest along lanes from `lane`, or from `segment` for a car without lane state."""
-    return int(np.argmin(distance[:, lane if lane >= 0 else 2 * segment]))

@@ -3,7 +3,8 @@
 A car that stands breaks nothing and is never at fault. So a command is let through if, after one tick of it, the ego
 can stand for ever (`driving.shield_checks`): then nothing goes wrong whatever the others do within E1 and E2. There is
 one exception: a car that is left of the centre line has to return. So nobody crosses that line but as the law of the
-road does (`driving.law`), which has made sure of the way back, and the law drives until the ego is in its lane again.
+road does (`driving.law`), where the way back is sure (`driving.shield_return`), and the law drives until the ego is in
+its lane again.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.law import decide_trial, list_cars, unlist_cars
+from dubins_traffic.driving.lane_graph import nearest_stage
+from dubins_traffic.driving.law import list_cars, unlist_cars
 from dubins_traffic.driving.law_tables import (
     ASIDE,
     DISC,
@@ -34,18 +36,24 @@ from dubins_traffic.driving.law_tables import (
 )
 from dubins_traffic.driving.passing import BACK, TURNING, along, find_way_past
 from dubins_traffic.driving.shield_checks import bounded, gather_close, may_touch, refusal
+from dubins_traffic.driving.shield_return import drive_alone, drive_by_law, keep, recall, surely_returns
 from dubins_traffic.driving.shield_tables import (
     AIMED,
     EGO,
+    KEPT,
     LAST_AT,
     LAST_LANE,
     LAST_TICK,
+    LAW,
     LEFT_TIME,
+    MODE,
+    NEVER,
     NOTHING,
     NUMBER,
     REASON,
     SIGHT2,
     STRAYED,
+    SURE,
     TOP,
     TURN_BACK,
     Guards,
@@ -101,14 +109,13 @@ def shield_trial(
     build = drivers.build[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
     _remember(b, tick, state, labels, roads, drivers, guards)
-    decide_trial(
-        b, tick, sight2, desk.apart, 0.0, state, labels, roads, obstacles, drivers, desk, commands
-    )  # fmt: skip
-    law, law_yaw = bounded(commands[b, EGO, 0], commands[b, EGO, 1], build)
-    near = gather_close(b, state, sight2, build, desk)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0
+    law, law_yaw = _law(
+        b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, desk, commands
+    )  # fmt: skip
+    near = gather_close(b, state, sight2, build, desk)
     obeys = _may_obey(
-        b, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk
+        b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk
     )
     near = gather_close(b, state, sight2, build, desk)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
@@ -133,6 +140,26 @@ def shield_trial(
     obeyed = commands[b, EGO, 0] == law and commands[b, EGO, 1] == law_yaw
     passes = drivers.floats[b, EGO, ASIDE] != 0.0 and not left
     guards.mark[b, STRAYED] = 1 if passes and (guards.mark[b, STRAYED] != 0 or not obeyed) else 0
+    if not left:
+        guards.mark[b, KEPT] = 1 if guards.setting[b, MODE] == SURE else 0
+
+
+@jit_inline
+def _law(
+    b: int, tick: int, left: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk, commands: Floats,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the command of the law, within bounds; where the return is sure, that which has been rehearsed."""
+    if left and guards.mark[b, KEPT] != 0:
+        recall(b, drivers, guards)
+        law, law_yaw = drive_alone(
+            b, tick, labels.lane[b, EGO], state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO],
+            roads, obstacles, drivers, guards, desk,
+        )  # fmt: skip
+        keep(b, drivers, guards)
+        return law, law_yaw
+    drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, desk, commands)
+    return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.build[b])
 
 
 @jit_inline
@@ -147,6 +174,7 @@ def _remember(
         top = guards.memory[b, TOP]
         if mark[LAST_TICK] != tick - 1 and tick > 0:
             guards.memory[b, TOP] = progress + guards.limit[b, TURN_BACK]
+            mark[KEPT] = 0
         elif tick == 0 or lane != mark[LAST_LANE] or mark[LAST_AT] >= 0 or progress > top:
             guards.memory[b, TOP] = progress
     mark[LAST_TICK] = tick
@@ -154,24 +182,15 @@ def _remember(
     mark[LAST_AT] = labels.at[b, EGO]
     if mark[AIMED] == 0:
         mark[AIMED] = 1
-        _aim(b, labels, drivers)
-
-
-@jit_inline
-def _aim(b: int, labels: Labels, drivers: Drivers) -> None:
-    """Let the law begin with the goal that is nearest along lanes, as the controller `rules` does."""
-    own = drivers.ints[b, EGO]
-    lane = labels.lane[b, EGO]
-    if lane < 0:
-        lane = 2 * labels.segment[b, EGO]
-    for k in range(own[FIRST], own[LAST]):
-        if own[PLACE] < 0 or drivers.distance[k, lane] < drivers.distance[own[PLACE], lane]:
-            own[PLACE] = k
+        own = drivers.ints[b, EGO]
+        own[PLACE] = nearest_stage(
+            drivers.distance, own[FIRST], own[LAST], lane, labels.segment[b, EGO]
+        )  # fmt: skip
 
 
 @jit_inline
 def _may_obey(
-    b: int, left: bool, sight2: float, law: float, law_yaw: float, near: int, state: State, labels: Labels,
+    b: int, tick: int, left: bool, sight2: float, law: float, law_yaw: float, near: int, state: State, labels: Labels,
     roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
 ) -> bool:  # fmt: skip
     """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
@@ -182,9 +201,23 @@ def _may_obey(
     found = refusal(b, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk)
     if found != LEAVES_LANE:
         return found == NOTHING
-    floats = drivers.floats[b, EGO]
-    if floats[ASIDE] == 0.0:
+    mode = guards.setting[b, MODE]
+    if drivers.floats[b, EGO, ASIDE] == 0.0 or mode == NEVER:
         return False
+    if mode == LAW:
+        return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, desk)
+    return surely_returns(
+        b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, desk
+    )  # fmt: skip
+
+
+@jit_inline
+def _has_way_back(
+    b: int, sight2: float, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, guards: Guards, desk: Desk,
+) -> bool:  # fmt: skip
+    """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
+    floats = drivers.floats[b, EGO]
     ints = drivers.ints[b, EGO]
     build = drivers.build[b]
     way = way_between(roads, drivers.net[b], ints[LANE], ints[NEXT], build[MIDDLE], build[DISC])
