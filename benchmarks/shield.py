@@ -56,12 +56,14 @@ BODIES: tuple[dict[str, Any], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Shielded:
-    """One trial: who drove, what the ego and the others broke, collisions and those with the ego at fault, in how many
-    ticks the shield stepped in for each reason, how often the ego crossed the centre line, and metres driven.
+    """One trial: who drove, whether there are obstacles, what the ego and the others broke, collisions and those with
+    the ego at fault, in how many ticks the shield stepped in for each reason, how often the ego crossed the centre
+    line, and metres driven.
     """
 
     number: int
     kind: str
+    obstacles: bool
     end: str
     own: tuple[str, ...]
     others: tuple[str, ...]
@@ -141,15 +143,18 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         passed += aside & ~before
     for b, outcome in enumerate(group.outcomes(range(count), "shield")):
         told = {REASONS[k]: int(n) for k, n in enumerate(reasons[b]) if k and n}
-        yield _shielded(own[b].trial, kinds[b], outcome.score, told, int(passed[b]))
+        yield _shielded(own[b], kinds[b], outcome.score, told, int(passed[b]))
 
 
-def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0) -> Shielded:
+def _shielded(
+    own: Instance, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0
+) -> Shielded:
     verdict = score.verdict
     assert verdict is not None
     return Shielded(
-        number,
+        own.trial,
         kind,
+        len(own.problem.obstacles) > 0,
         str(score.end),
         tuple(one.rule for one in verdict.violations if one.car == "ego"),
         tuple(one.rule for one in verdict.violations if one.car != "ego"),
@@ -163,9 +168,9 @@ def _shielded(number: int, kind: str, score: Score, reasons: Mapping[str, int], 
 
 def ruled(number: int, seconds: float = DURATION) -> Shielded:
     """Run a trial of the controller `rules` under the shield."""
-    driver = Shield("rules")
-    score = run_trial(instance(number, seconds), driver).score
-    return _shielded(number, "rules", score, {"": driver.guard.count} if driver.guard.count else {})
+    driver, own = Shield("rules"), instance(number, seconds)
+    score = run_trial(own, driver).score
+    return _shielded(own, "rules", score, {"": driver.guard.count} if driver.guard.count else {})
 
 
 def bars(found: Sequence[Shielded]) -> list[Row]:
@@ -173,8 +178,10 @@ def bars(found: Sequence[Shielded]) -> list[Row]:
     hostile = [one for one in found if one.kind != "rules"]
     quiet = [one for one in found if one.kind == "rules"]
     rows = [_breaches("random, hostile and broken", hostile), _breaches("rules", quiet)]
-    alone = sum(1 for one in quiet if not one.reasons) / max(len(quiet), 1)
-    rows.append(Row("rules: never stepped in", f"{100 * alone:.1f} % of trials", ">= 95 %", alone >= 0.95))
+    rows.append(_left_alone("rules: never stepped in", quiet))
+    rows.append(_left_alone("the same, without obstacles", [one for one in quiet if not one.obstacles]))
+    passed = sum(one.passed for one in hostile)
+    rows.append(Row("random, hostile and broken: crossings of the centre line", str(passed), "", True))
     for kind in KINDS:
         own = [one for one in hostile if one.kind == kind]
         ticks = sum(sum(one.reasons.values()) for one in own) / max(len(own), 1) / (30.0 * DURATION)
@@ -183,6 +190,11 @@ def bars(found: Sequence[Shielded]) -> list[Row]:
             Row(f"{kind}: ticks stepped in; driven", f"{100 * ticks:.1f} %; {driven:.1f} m", "", True)
         )
     return rows
+
+
+def _left_alone(name: str, found: Sequence[Shielded]) -> Row:
+    alone = sum(1 for one in found if not one.reasons) / max(len(found), 1)
+    return Row(name, f"{100 * alone:.2f} % of {len(found)} trials", ">= 95 %", alone >= 0.95)
 
 
 def _breaches(kind: str, found: Sequence[Shielded]) -> Row:

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given, settings, target
 from hypothesis import strategies as st
 
-from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import Shield
 from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Frames
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators.embedded import Embedded
@@ -128,6 +129,29 @@ def test_nobody_comes_in_time_to_prevent_the_return(x: float, left: float) -> No
     assert broken(score, "ego") == set()
     assert len(spans) == (1 if x < 1.0 or x > 7.5 else 0)
     assert all(ticks * PERIOD < 4.0 for ticks in spans)
+
+
+class Beyond:
+    """`rules`, with the largest numbers that mean the same."""
+
+    def __init__(self) -> None:
+        self._law = Rules()
+
+    def start(self, problem: Problem) -> None:
+        """Start the law."""
+        self._law.start(problem)
+
+    def act(self, observation: Observation) -> Command:
+        """Ask for more speed than there is where the law asks for all."""
+        speed, yaw_rate = self._law.act(observation)
+        return Command(10.0 if speed == FASTEST else speed, yaw_rate)
+
+
+def test_commands_beyond_the_bounds_are_taken_for_those_at_them() -> None:
+    instance = on_grid([standing(0.6, -W)], 15.0, START, obstacles=[disc(3.2, -W, 0.15)])
+    found = [opposed(instance, hunts, Shield(driver)) for driver in ("rules", Beyond())]
+    assert found[0][1] == found[1][1] != []
+    assert found[0][0].driven == found[1][0].driven
 
 
 BODIES: list[dict[str, Any]] = [

@@ -71,7 +71,7 @@ from dubins_traffic.driving.gaps import (
     sample_path,
 )
 from dubins_traffic.driving.paths import HIGH, LENGTH, LOW, NO_STOP, PIVOT, WAITING_GAP
-from dubins_traffic.driving.safety import VERGE, leaves_road, motion_is_safe
+from dubins_traffic.driving.safety import NEAR, VERGE, leaves_road, may_hit, motion_is_safe
 from dubins_traffic.driving.tracking import AHEAD, ahead_on, locate, place_on, steer
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.table import RoadTable
@@ -304,20 +304,13 @@ def _is_safe(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float
         o = others[n]
         dx = o[OX] - x
         dy = o[OY] - y
-        near = 2.0 * reach + 0.2
+        near = 2.0 * reach + NEAR
         if o[O_SEEN] != 0.0 and dx * dx + dy * dy < near * near and not motion_is_safe(
             x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
             o[OX], o[OY], o[OC], o[OS], a, h, r, travel,
         ):  # fmt: skip
             return False
-    for p in range(desk.part_off[b], desk.part_off[b + 1]):
-        o = desk.part[p]
-        dx = o[0] - x
-        dy = o[1] - y
-        near = reach + o[7] + 0.2
-        if dx * dx + dy * dy < near * near and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
-            o[0], o[1], o[2], o[3], o[4], o[5], o[6], 0.0,
-        ):  # fmt: skip
-            return False
-    return True
+    return not may_hit(
+        x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
+        desk.part, desk.part_off[b], desk.part_off[b + 1], NEAR, 0.0,
+    )  # fmt: skip

@@ -78,14 +78,15 @@ class Synthesized(Rules):
     -----
     The strategy is asked whenever something has changed in the game while the ego is in a lane. Where it has nothing to
     say, since the ego is behind another car, the ego goes on as `rules` does. So it does where the strategy does not
-    win, as when the others have broken their assumption; then under the shield, until the strategy wins again.
+    win, as when the others have broken their assumption; then under the shield, until the strategy wins again. That
+    shield overtakes as `rules` does: a car that is parked for good is often what has broken the assumption.
     """
 
     def __init__(self, strategy: Strategy | None = None) -> None:
         super().__init__()
         self._strategy = strategy
         self._course: _Course | None = None
-        self._guard = Guard()
+        self._guard = Guard(overtakes="law")
 
     def start(self, problem: Problem) -> None:
         """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import separation
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import nearest_segment
 from dubins_traffic.roads.table import RoadTable
 
 GUARD = 0.01
 """What is kept free beyond the other's worst motion, metres."""
+NEAR = 0.2
+"""What is farther away than this is not looked at: no tick leads there, metres."""
 VERGE = 0.02
 """What an ego's centre keeps from the edge of the road whatever happens, metres."""
 
@@ -93,3 +96,27 @@ def motion_is_safe(
         )
         least = min(least, last)
     return least > o_travel + GUARD or (least == gap and last - gap > 0.2 * own)
+
+
+@jit_inline
+def may_hit(
+    x: float, y: float, c: float, s: float, speed: float, yaw_rate: float, period: float, half_length: float,
+    half_width: float, rounding: float, reach: float, parts: Floats, first: int, last: int, near: float,
+    spread: float,
+) -> bool:  # fmt: skip
+    """Whether a motion for one tick might touch an obstacle: the rows `first` to `last` - 1 of `ObstacleTable.part`.
+
+    Looked at are those within `near` of what the car reaches; each is kept clear by `spread`, metres, more than GUARD.
+    The rest is as in `motion_is_safe`.
+    """
+    for k in range(first, last):
+        row = parts[k]
+        dx = row[0] - x
+        dy = row[1] - y
+        far = reach + row[7] + near
+        if dx * dx + dy * dy < far * far and not motion_is_safe(
+            x, y, c, s, speed, yaw_rate, period, half_length, half_width, rounding, reach,
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6], spread,
+        ):  # fmt: skip
+            return True
+    return False

@@ -53,7 +53,6 @@ from dubins_traffic.driving.shield_tables import (
     REASON,
     SIGHT2,
     STRAYED,
-    SURE,
     TOP,
     TURN_BACK,
     Guards,
@@ -113,6 +112,8 @@ def shield_trial(
     law, law_yaw = _law(
         b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, desk, commands
     )  # fmt: skip
+    if not left:
+        guards.mark[b, KEPT] = 0
     near = gather_close(b, state, sight2, build, desk)
     obeys = _may_obey(
         b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk
@@ -127,21 +128,21 @@ def shield_trial(
     if reason == NOTHING:
         commands[b, EGO, 0] = asked
         commands[b, EGO, 1] = asked_yaw
-    elif left:
-        commands[b, EGO, 0] = law if obeys else 0.0
-        commands[b, EGO, 1] = law_yaw if obeys else 0.0
     else:
-        speed, yaw_rate = _nearest(
-            b, speed, yaw_rate, obeys, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards,
-            desk,
-        )  # fmt: skip
+        if left:
+            speed, yaw_rate = (law, law_yaw) if obeys else (0.0, 0.0)
+        else:
+            speed, yaw_rate = _nearest(
+                b, speed, yaw_rate, obeys, law, law_yaw, near, state, labels, roads, obstacles, drivers,
+                guards, desk,
+            )  # fmt: skip
         commands[b, EGO, 0] = speed
         commands[b, EGO, 1] = yaw_rate
-    obeyed = commands[b, EGO, 0] == law and commands[b, EGO, 1] == law_yaw
+    obeyed = speed == law and yaw_rate == law_yaw
     passes = drivers.floats[b, EGO, ASIDE] != 0.0 and not left
     guards.mark[b, STRAYED] = 1 if passes and (guards.mark[b, STRAYED] != 0 or not obeyed) else 0
-    if not left:
-        guards.mark[b, KEPT] = 1 if guards.setting[b, MODE] == SURE else 0
+    if not left and not obeyed:
+        guards.mark[b, KEPT] = 0
 
 
 @jit_inline
@@ -149,7 +150,7 @@ def _law(
     b: int, tick: int, left: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk, commands: Floats,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the command of the law, within bounds; where the return is sure, that which has been rehearsed."""
+    """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
     if left and guards.mark[b, KEPT] != 0:
         recall(b, drivers, guards)
         law, law_yaw = drive_alone(
@@ -206,9 +207,11 @@ def _may_obey(
         return False
     if mode == LAW:
         return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, desk)
-    return surely_returns(
+    sure = surely_returns(
         b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, desk
     )  # fmt: skip
+    guards.mark[b, KEPT] = 1 if sure else 0
+    return sure
 
 
 @jit_inline

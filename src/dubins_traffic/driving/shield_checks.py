@@ -24,7 +24,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.safety import GUARD, motion_is_safe
+from dubins_traffic.driving.safety import GUARD, may_hit, motion_is_safe
 from dubins_traffic.driving.shield_tables import (
     CLEARANCE,
     CONTACT,
@@ -120,17 +120,10 @@ def may_touch(
             state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel + between,
         ):  # fmt: skip
             return True
-    for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[k]
-        dx = row[0] - x
-        dy = row[1] - y
-        far = reach + row[7] + travel + between + GUARD
-        if dx * dx + dy * dy <= far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], between,
-        ):  # fmt: skip
-            return True
-    return False
+    return may_hit(
+        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+        obstacles.part, obstacles.off[b], obstacles.off[b + 1], travel + between + GUARD, between,
+    )  # fmt: skip
 
 
 @jit

@@ -61,7 +61,8 @@ MARKS: Final = 7
 """Columns of `Guards.mark`. LAST_TICK, LAST_LANE, LAST_AT: tick, lane state and disc of the ego when it was last
 looked at, LAST_TICK -2 before the first time. STRAYED: 1 if the ego has not done as the law since the law began to pass
 something. AIMED: 1 once the law knows its first goal. REASON: why the shield stepped in in this tick, NOTHING if it did
-not. KEPT: 1 if the ego, should it be left in the next frame, is sure to return in time."""
+not. KEPT: 1 if the ego, while it is left, does what has been rehearsed.
+"""
 
 LEFT_RELEASE, TURN_BACK, LEFT_TIME, SIGHT2, BLOCKED_AHEAD = range(5)
 LIMITS: Final = 5

@@ -28,7 +28,7 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.passing import stays_right
-from dubins_traffic.driving.safety import motion_is_safe
+from dubins_traffic.driving.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
@@ -182,20 +182,13 @@ def is_safe(
         j = desk.near[k]
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
-        far = 2.0 * reach + 0.2
+        far = 2.0 * reach + NEAR
         if j != trusted and dx * dx + dy * dy < far * far and not motion_is_safe(
             x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
             state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel,
         ):  # fmt: skip
             return False
-    for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[k]
-        dx = row[0] - x
-        dy = row[1] - y
-        far = reach + row[7] + 0.2
-        if dx * dx + dy * dy < far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], 0.0,
-        ):  # fmt: skip
-            return False
-    return True
+    return not may_hit(
+        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+        obstacles.part, obstacles.off[b], obstacles.off[b + 1], NEAR, 0.0,
+    )  # fmt: skip
