@@ -2,7 +2,7 @@
 
 import json
 import re
-from math import floor, hypot
+from math import cos, floor, hypot, sin
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,15 @@ from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 from shapely.affinity import rotate, translate
 
-from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.body import Body, Car, Disc, Rectangle
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.starts import TIGHT
+from dubins_traffic.problem.overlap import body_shape, overlap
+from dubins_traffic.problem.starts import TIGHT, Ground, Wish, check_given
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.weave import most_segments
 from tests.roadnets import networks
@@ -345,3 +347,29 @@ def test_many_instances_drawn_at_once_are_those_drawn_one_by_one(changes: dict[s
     for instance in many:
         alone = draw(load_config(document), 2**63 + 1, instance.trial)
         assert instance_to_document(instance) == instance_to_document(alone)
+
+
+@pytest.mark.parametrize("body", [Disc(0.1), Rectangle(0.3, 0.1)])
+@quick
+@given(data=st.data())
+def test_given_starts_that_overlap_are_found_as_by_looking_at_all_pairs(
+    body: Body, data: st.DataObject
+) -> None:
+    car = Car(body=body)
+    near = st.floats(-0.7, 0.7)
+    angles = st.sampled_from([0.0, 0.4, 1.6, -2.5])
+    poses = [
+        Pose(x, y, cos(theta), sin(theta))
+        for x, y, theta in data.draw(st.lists(st.tuples(near, near, angles), max_size=8))
+    ]
+    shapes = [body_shape(car.body, pose) for pose in poses]
+    pairs = [(n, m) for n in range(len(poses)) for m in range(n) if overlap(shapes[n], shapes[m])]
+    ground = Ground(RoadNetwork.grid(2, 2), car, 1.0, ())
+    wishes = [Wish(pose, None, f"starts[{n}]") for n, pose in enumerate(poses)]
+    names = [f"car {n}" for n in range(len(poses))]
+    if pairs:
+        n, m = pairs[0]
+        with pytest.raises(InputError, match=rf"^starts\[{n}\]: car {n} overlaps car {m}:"):
+            check_given(ground, names, wishes)
+    else:
+        check_given(ground, names, wishes)

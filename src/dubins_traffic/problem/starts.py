@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import chain
+from math import floor
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +13,7 @@ from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.problem.overlap import body_shape, obstacle_shape, overlap
+from dubins_traffic.problem.overlap import Shape, body_shape, obstacle_shape, overlap
 from dubins_traffic.problem.places import Places
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -121,19 +123,22 @@ def _attempt(
 
 def check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
     """Refuse given starts in which a body overlaps another or an obstacle."""
-    given = [
-        (name, wish, body_shape(ground.car.body, wish.pose))
-        for name, wish in zip(names, wishes, strict=True)
-        if wish.pose is not None
-    ]
     obstacles = [obstacle_shape(obstacle) for obstacle in ground.obstacles]
-    for k, (name, wish, shape) in enumerate(given):
-        for other, _, other_shape in given[:k]:
+    side = 2.0 * ground.car.body.reach * (1.0 + 1e-9)
+    cells: dict[tuple[int, int], list[tuple[int, Shape]]] = {}
+    for n, wish in enumerate(wishes):
+        if wish.pose is None:
+            continue
+        shape = body_shape(ground.car.body, wish.pose)
+        column, row = floor(wish.pose.x / side), floor(wish.pose.y / side)
+        near = [cells.get((column + i, row + j), ()) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        for other, other_shape in sorted(chain.from_iterable(near)):
             if overlap(shape, other_shape):
-                raise _overlap_error(name, wish, other)
+                raise _overlap_error(names[n], wish, names[other])
         for number, obstacle in enumerate(obstacles):
             if overlap(shape, obstacle):
-                raise _overlap_error(name, wish, f"obstacles[{number}]")
+                raise _overlap_error(names[n], wish, f"obstacles[{number}]")
+        cells.setdefault((column, row), []).append((n, shape))
 
 
 def _overlap_error(name: str, wish: Wish, other: str) -> InputError:
