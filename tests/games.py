@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 from dubins_traffic.roads.network import RoadNetwork
@@ -19,6 +20,16 @@ def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree
     network = RoadNetwork.grid(rows, columns)
     arena = Arena.of(network, [0, len(network.intersections) - 1], order_degree)
     return Board(arena, Assumption.parse(word for word in assumed.split(",") if word), others)
+
+
+PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
+"""A square with a handle."""
+
+
+def pan(others: int, goals: Sequence[int], assumed: str = ALL) -> Board:
+    """Return the positions on a square with a handle, whose end is node 4; crossings as in the rules."""
+    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
+    return Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)
 
 
 @cache

@@ -12,24 +12,15 @@ import numpy as np
 import pytest
 from benchmarks.synthesis import request
 
-from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.queues import EGO, OTHER, Scene
 from dubins_traffic.synthesis.solver import solve
-from tests.games import ALL, board
+from tests.games import ALL, board, pan
 from tests.tools import interpreter_with
 
 SCRIPT = Path(__file__).with_name("omega_game.py")
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
-PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
-
-
-def pan(others: int, assumed: str, goals: tuple[int, ...]) -> Board:
-    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
-    return Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)
 
 
 def asked(some: Board) -> Any:
@@ -71,11 +62,11 @@ def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
         board(2, 2, 2, ALL, 3),
         board(3, 4, 1),
         board(3, 4, 1, "E1,E2,E4,E5,E6", 3),
-        pan(1, "E1,E2,E3,E5,E6", (0, 4)),
-        pan(1, "E1,E2,E3,E5,E6", (0, 3)),
-        pan(2, "E1,E2,E3,E5,E6", (0, 4)),
-        pan(2, "E1,E2,E3,E5", (0, 2)),
-        pan(2, ALL, (4,)),
+        pan(1, (0, 4), "E1,E2,E3,E5,E6"),
+        pan(1, (0, 3), "E1,E2,E3,E5,E6"),
+        pan(2, (0, 4), "E1,E2,E3,E5,E6"),
+        pan(2, (0, 2), "E1,E2,E3,E5"),
+        pan(2, (4,), ALL),
     ],
     ids=lambda some: f"{some.arena.cells} cells, {some.others} cars, {some.assumption}",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 
@@ -28,16 +29,13 @@ from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.story import told
 from dubins_traffic.synthesis.strategy import Strategy
 from dubins_traffic.synthesis.strengthening import smallest
-from tests.games import ALL, board, solved
+from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
-PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
-"""A square with a handle."""
 
 
-def pan(others: int, goals: list[int], assumed: str = ALL) -> Solution:
-    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
-    return solve(build(Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)))
+def solved_pan(others: int, goals: Sequence[int], assumed: str = ALL) -> Solution:
+    return solve(build(pan(others, goals, assumed)))
 
 
 def test_bounds_of_an_ego_on_shortest_routes() -> None:
@@ -53,7 +51,7 @@ def test_bounds_of_an_ego_on_shortest_routes() -> None:
 
 
 def test_a_goal_in_a_dead_end_bears_two() -> None:
-    network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
+    network = pan(1, [0]).arena.network
     dead_end = network.vertex((2, 1))
     assert route_bound(Arena.of(network, [0, dead_end]), Assumption()) == 2
     assert route_bound(Arena.of(network, [0, 3]), Assumption()) > 2
@@ -63,17 +61,17 @@ def test_the_bound_holds_where_games_can_be_solved() -> None:
     for others in (5, 6):
         assert solved(2, 2, others).everywhere
     for others in (1, 2):
-        assert pan(others, [0, 4], "E1,E2,E3,E4,E5").everywhere
-    assert not pan(3, [0, 4], "E1,E2,E3,E4,E5").everywhere
+        assert solved_pan(others, [0, 4], "E1,E2,E3,E4,E5").everywhere
+    assert not solved_pan(3, [0, 4], "E1,E2,E3,E4,E5").everywhere
 
 
 def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
     """Three e-agents fill a dead end; the ego before it keeps them there, so that the goal is never free again."""
     for others, goals, vacuous in ((2, [0, 4], 0), (3, [0, 3], 0), (3, [0, 4], 7_476)):
-        found = pan(others, goals)
+        found = solved_pan(others, goals)
         assert found.everywhere
         assert int(found.vacuous.sum()) == vacuous
-    found = pan(3, [4])
+    found = solved_pan(3, [4])
     check(found.game, found.ranks)
     assert found.everywhere
     assert ((found.ranks[0].rank >= 0) == ~found.vacuous).all()
@@ -216,6 +214,7 @@ def test_the_command_refuses_what_is_wrong(capsys: pytest.CaptureFixture[str], t
     for arguments, message in (
         (["--assume", "E9"], "--assume: not an assumption: got 'E9'; expected some of E1,"),
         (["--cars", "9"], "proved to win against up to 42 e-agents"),
+        (["-o", "won.json"], "--output: not a name of an archive: got 'won.json'; expected NAME.npz"),
         (["--cars", "4", "--memory", "100"], "MiB'; expected at most 100 MiB (--memory)"),
         (["--assume", "nothing", "-o", str(tmp_path / "none.npz")], "a strategy that wins from nowhere"),
     ):
