@@ -373,3 +373,16 @@ def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
     assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
     assert 2 <= len(kept) < 200
     assert kept == list(range(len(kept)))
+
+
+def test_ctrl_c_ends_a_long_search_and_writes_nothing(place):
+    ask = ["synth", "demo", "--cars", "3", "--assume", "E1,E2,E3:one-forfeit,E4,E5,E6", "-o", "won.npz"]
+    process = subprocess.Popen(
+        [COMMAND, *ask], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(timeout=5)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (1, "", "dubins-traffic: interrupted: the game is not solved\n")
+    assert not (place / "won.npz").exists()

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.checker import StrategyError, check
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.export import save_game
@@ -131,7 +134,7 @@ def test_files_that_are_no_strategies_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         Strategy.load(path)
     path.write_text("nonsense")
-    with pytest.raises(InputError, match="can't be read as a strategy"):
+    with pytest.raises(InputError, match=r"can't be read as a strategy \(no NumPy archive"):
         Strategy.load(path)
     np.savez(path, rank_0=np.zeros(3))
     with pytest.raises(InputError, match="header"):
@@ -151,8 +154,23 @@ def test_too_large_a_game_is_refused_before_it_is_built() -> None:
         build(board(4, 4, 3), limit=100 << 20)
     with pytest.raises(InputError, match="less than 2147483647"):
         build(board(3, 4, 8))
-    with pytest.raises(InputError, match=r"--cars: .* got 9; expected 1 to 8"):
-        estimate(board(2, 2, 9))
+    with pytest.raises(InputError, match=r"--cars: .* got 63; expected 1 to 62"):
+        estimate(board(2, 2, 63))
+    with pytest.raises(InputError, match="more cars than cells: got 13; expected at most 12"):
+        estimate(board(2, 2, 12))
+
+
+def test_crowds_too_are_solved_and_the_bound_is_exact_on_the_square() -> None:
+    for others, found in ((9, (4_800, 4_800, 0)), (10, (1_408, 1_408, 1_088))):
+        solution = solved(2, 2, others)
+        assert figures(solution) == found
+        check(solution.game, solution.ranks)
+
+
+def test_there_may_be_many_goals() -> None:
+    arena = Arena.of(RoadNetwork.grid(9, 9), range(81))
+    some = Board(arena, Assumption(), 1)
+    assert estimate(some).moves > some.positions
 
 
 def test_the_estimate_is_close() -> None:

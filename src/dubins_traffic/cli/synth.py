@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import faults, options
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
@@ -79,13 +79,19 @@ def synth(
     ] = 0,
     json: options.Json = False,
 ) -> None:
-    """Say whether the ego can win at all: solve the game of cells behind a problem."""
+    """Say whether the ego can win at all: solve the game of cells behind a problem.
+
+    Ctrl-C ends it soon; nothing is written then.
+    """
     from dubins_traffic.synthesis.answer import answer
     from dubins_traffic.synthesis.assumption import Assumption
     from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
     from dubins_traffic.synthesis.strategy import Strategy
 
+    for option, name in (("--output", strategy), ("--graph", graph)):
+        if name is not None and not name.endswith(".npz"):
+            raise InputError("not a name of an archive", field=option, value=name, expected="NAME.npz")
     instance = _instance(source, seed, trial)
     words = None if assume is None else [word for word in assume.split(",") if word.strip() != "nothing"]
     with _progress() as progress:
@@ -142,4 +148,8 @@ def _progress() -> Generator[Callable[[str, float], object]]:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("build", total=1.0)
-        yield lambda what, share: progress.update(task, description=what, completed=share)
+        try:
+            yield lambda what, share: progress.update(task, description=what, completed=share)
+        except KeyboardInterrupt:
+            faults.tell("interrupted: the game is not solved")
+            raise

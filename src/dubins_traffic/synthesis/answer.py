@@ -87,7 +87,7 @@ class Answer:
             "nowhere": "nowhere",
         }[self.outcome]
         found = [
-            f"{board.others} e-agents, {board.arena.cells} cells, crossings from degree "
+            f"{_e_agents(board.others)}, {board.arena.cells} cells, crossings from degree "
             f"{board.arena.order_degree} on; assumed: {board.assumption}",
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
@@ -99,7 +99,9 @@ class Answer:
                 "their assumption. The strategy never does so, and gives these positions up."
             )
         if self.route_bound > 0:
-            found.append(f"On shortest routes it is proved to win against up to {self.route_bound} e-agents.")
+            found.append(
+                f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}."
+            )
         return found
 
     def explain(self, progress: Progress | None = None) -> list[str]:
@@ -144,6 +146,10 @@ class Answer:
         }
         shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
         return f"On the way to {list(arena.network.intersections[goal])} it {shares} positions."
+
+
+def _e_agents(count: int) -> str:
+    return f"{count} e-agent{'s' if count != 1 else ''}"
 
 
 def wins(solution: Solution, starts: list[int]) -> bool:
@@ -197,6 +203,6 @@ def _with_bound(error: InputError, bound: int) -> InputError:
     if bound <= 0:
         return error
     error.expected = (
-        f"{error.expected}; on shortest routes the ego is proved to win against up to {bound} e-agents"
+        f"{error.expected}; on shortest routes the ego is proved to win against up to {_e_agents(bound)}"
     )
     return error

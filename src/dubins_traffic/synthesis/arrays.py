@@ -12,4 +12,6 @@ Numbers: TypeAlias = npt.NDArray[np.int32]
 Cells: TypeAlias = npt.NDArray[np.int16]
 """Numbers of cells and goals."""
 Bytes: TypeAlias = npt.NDArray[np.uint8]
+Masks: TypeAlias = npt.NDArray[np.uint8 | np.int64]
+"""A bit for each e-agent that may move: bytes, unless there are more than eight."""
 Flags: TypeAlias = npt.NDArray[np.bool_]

@@ -29,8 +29,8 @@ from dubins_traffic.synthesis.queues import (
     scenery,
 )
 
-MOST_OTHERS: Final = 8
-"""E-agents of the largest game; their moves are bits of a byte."""
+MOST_OTHERS: Final = 62
+"""E-agents of the largest game; their moves are bits of a number."""
 
 
 class Tables(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.synthesis.arrays import Bytes, Cells, Flags, Numbers
+from dubins_traffic.synthesis.arrays import Cells, Flags, Masks, Numbers
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
 from dubins_traffic.synthesis.moves import Moves, Work, expand, list_moves
 
@@ -84,7 +84,7 @@ class Game:
         lean game.
     to : (E,) int32
         The positions to which they lead; there the ego moves.
-    moved : (E,) uint8
+    moved : (E,) uint8 or int64
         Which of the e-agents that may move entered or left a node, as bits.
     ego_at : (N+1,) int64
         Where the moves of the ego from each position begin in `ego_to`.
@@ -94,7 +94,7 @@ class Game:
         Where the debts of each position begin.
     owed : (O,) int16
         A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k is freed.
-    owed_mask : (O,) uint8
+    owed_mask : (O,) uint8 or int64
         The bits of `moved` that end the debt; others may.
     ego_cell : (N,) int16
         Cell of the ego.
@@ -105,12 +105,12 @@ class Game:
     most_moves: int
     to_at: Ints
     to: Numbers
-    moved: Bytes
+    moved: Masks
     ego_at: Ints
     ego_to: Numbers
     owed_at: Ints
     owed: Cells
-    owed_mask: Bytes
+    owed_mask: Masks
     ego_cell: Cells
 
     @property
@@ -147,10 +147,8 @@ class Game:
         """Return the positions to which the environment may bring one."""
         if not self.lean:
             return self.to[self.to_at[position] : self.to_at[position + 1]]
-        out = room(1, self.most_moves)
-        list_moves(
-            self.board.tables, self.board.others, self.positions, position, Work.of(self.board.tables), out
-        )
+        out = room(self.board, 1, self.most_moves)
+        list_moves(self.board.tables, self.board.others, self.positions, position, Work.of(self.board), out)
         return out.to[: int(out.used[0])]
 
     @cached_property
@@ -186,17 +184,19 @@ def estimate(board: Board) -> Estimate:
         )
     sizes = np.zeros(3)
     picked = np.unique(np.linspace(0, count - 1, min(SAMPLE, count)).astype(np.int64))
-    work, out = Work.of(board.tables), room(1, LARGEST_CHOICE)
+    work, out = Work.of(board), room(board, 1, LARGEST_CHOICE)
     for position in picked.tolist():
         out.used[:] = 0
         expand(board.tables, board.others, count, position, position + 1, work, out, position)
         sizes += out.used
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
     goals = len(board.arena.goals)
-    building = 2 * (4 * ego_moves + 3 * debts) + 26 * count
-    solving = 8 * ego_moves + 7 * debts + 26 * count
+    mask = np.dtype(mask_type(board.others)).itemsize
+    building = 2 * (4 * ego_moves + (2 + mask) * debts) + 26 * count
+    solving = 8 * ego_moves + (6 + mask) * debts + 26 * count
     a_goal, a_way = 46 * count + 12 * debts, 5 * count
-    whole = max(building + 10 * moves, solving + 5 * moves + goals * a_goal)
+    kept = (4 + mask) * moves
+    whole = max(building + 2 * kept, solving + kept + goals * a_goal)
     lean = max(building, solving + a_goal + goals * a_way)
     return Estimate(count, int(moves), int(PROGRAM + SPARE * whole), int(PROGRAM + SPARE * lean))
 
@@ -284,10 +284,10 @@ def _expanded(board: Board, each: int, workers: int) -> Iterator[list[Moves]]:
 def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
     """Return the moves of some positions; `each` guesses how many moves the environment has in one."""
     pieces: list[Moves] = []
-    work = Work.of(board.tables)
+    work = Work.of(board)
     count = board.positions
     while first < last:
-        out = room(last - first, each)
+        out = room(board, last - first, each)
         done = expand(board.tables, board.others, count, first, last, work, out, first)
         if done == first:
             each *= 2
@@ -297,21 +297,28 @@ def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
     return pieces
 
 
-def room(rows: int, each: int) -> Moves:
+def room(board: Board, rows: int, each: int) -> Moves:
     """Return room for the moves of `rows` positions, about `each` of the environment from one."""
     margin = 64
+    turns, debts = rows * each + margin, 2 * rows * board.others + margin + len(board.arena.goals)
+    masks = mask_type(board.others)
     return Moves(
-        np.empty(rows * each + margin, dtype=np.int32),
-        np.empty(rows * each + margin, dtype=np.uint8),
+        np.empty(turns, dtype=np.int32),
+        np.empty(turns, dtype=masks),
         np.empty(rows * 5 + margin, dtype=np.int32),
-        np.empty(rows * (2 * MOST_OTHERS) + margin, dtype=np.int16),
-        np.empty(rows * (2 * MOST_OTHERS) + margin, dtype=np.uint8),
+        np.empty(debts, dtype=np.int16),
+        np.empty(debts, dtype=masks),
         np.empty(rows, dtype=np.int16),
         np.empty(rows, dtype=np.int32),
         np.empty(rows, dtype=np.int32),
         np.empty(rows, dtype=np.int32),
         np.zeros(3, dtype=np.int64),
     )
+
+
+def mask_type(others: int) -> type[np.uint8] | type[np.int64]:
+    """Return what holds a bit for each of so many e-agents."""
+    return np.uint8 if others <= 8 else np.int64
 
 
 def _trimmed(out: Moves, rows: int) -> Moves:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_inner
-from dubins_traffic.synthesis.board import MOST_OTHERS, Tables
+from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import (
     ARRIVALS,
     MOST_CHOICES,
@@ -216,10 +216,10 @@ def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) 
 
 
 @jit_inner
-def _owe(t: Tables, work: Work, out: Moves) -> bool:
+def _owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
     """Write what the environment owes in `work.scenes`; false if there is no room."""
     used = out.used[2]
-    if used + 2 * MOST_OTHERS + t.goal_nodes.shape[0] > out.owed.shape[0]:
+    if used + 2 * others + t.goal_nodes.shape[0] > out.owed.shape[0]:
         return False
     for v in range(t.base.shape[0]):
         scene = t.base[v] + work.scenes[v]
@@ -326,7 +326,7 @@ def expand(
         before, ego_before, owed_before = out.used[0], out.used[1], out.used[2]
         unrank(t, others, position, work.scenes)
         room = environment(t, others, positions, work, out)
-        room = room and _owe(t, work, out)
+        room = room and _owe(t, others, work, out)
         cell = -1
         if room:
             cell = _ego(t, others, position, work, out)

@@ -118,7 +118,7 @@ def play(
         np.zeros(board.arena.cells + goals, dtype=np.int64),
         *(np.zeros(goals, dtype=np.int64) for _ in range(3)),
     )
-    moves = Room(room(1, LARGEST_CHOICE), room(1, LARGEST_CHOICE))
+    moves = Room(room(board, 1, LARGEST_CHOICE), room(board, 1, LARGEST_CHOICE))
     ranks = np.stack([own.rank for own in strategy.ranks])
     play_turns(
         board.tables,
@@ -127,7 +127,7 @@ def play(
         int(environment),
         np.uint64(seed),
         turns,
-        Work.of(board.tables),
+        Work.of(board),
         moves,
         table,
     )

@@ -8,8 +8,8 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.synthesis.arrays import Bytes, Cells, Numbers
-from dubins_traffic.synthesis.board import MOST_OTHERS, Tables
+from dubins_traffic.synthesis.arrays import Cells, Masks, Numbers
+from dubins_traffic.synthesis.board import Board, Tables
 from dubins_traffic.synthesis.queues import SLOTS
 
 MOST_CHOICES = SLOTS + 1
@@ -19,17 +19,17 @@ UNITS, ARRIVALS, RAMMED = 0, 1, 2
 
 
 class Work(NamedTuple):
-    """Room for the kernels.
+    """Room for the kernels, for n e-agents.
 
     Attributes
     ----------
     scenes, moved_scenes, arrived_scenes : (V,) int64
         Of the position, after departures, after arrivals.
-    node, slot, choices, chosen : (8,) int64
+    node, slot, choices, chosen : (n,) int64
         The e-agents that may move: where they are, how many choices they have, which is taken.
-    choice : (8, 5) int64
+    choice : (n, 5) int64
         STAY, RENEW, ENTER or a lane.
-    to_node, to_slot, to_who, turn : (8,) int64
+    to_node, to_slot, to_who, turn : (n,) int64
         Those who arrive, by node; `turn` is the order in which they do.
     total : (3,) int64
         How many may move, how many arrive, whether the ego may be rammed.
@@ -50,9 +50,9 @@ class Work(NamedTuple):
     total: Ints
 
     @classmethod
-    def of(cls, tables: Tables) -> Work:
-        """Return room for positions of these tables."""
-        nodes, cars = tables.base.shape[0], MOST_OTHERS
+    def of(cls, board: Board) -> Work:
+        """Return room for positions of this board."""
+        nodes, cars = len(board.arena.nodes), board.others
         shapes = dict.fromkeys(("scenes", "moved_scenes", "arrived_scenes"), (nodes,))
         shapes |= {"choice": (cars, MOST_CHOICES), "total": (3,)}
         return cls(**{name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in cls._fields})
@@ -65,13 +65,13 @@ class Moves(NamedTuple):
     ----------
     to : (E,) int32
         Positions after a turn of the environment.
-    moved : (E,) uint8
+    moved : (E,) uint8 or int64
         Which of the e-agents that may move entered or left a node, as bits.
     ego_to : (F,) int32
         Positions after a turn of the ego.
     owed : (O,) int16
         What the environment owes in a position: cells (an e-agent in it is to go on), or cells + goal (to be freed).
-    owed_mask : (O,) uint8
+    owed_mask : (O,) uint8 or int64
         The bits of `moved` that end it.
     ego_cell : (N,) int16
         Cell of the ego.
@@ -82,10 +82,10 @@ class Moves(NamedTuple):
     """
 
     to: Numbers
-    moved: Bytes
+    moved: Masks
     ego_to: Numbers
     owed: Cells
-    owed_mask: Bytes
+    owed_mask: Masks
     ego_cell: Cells
     many: Numbers
     ego_many: Numbers

@@ -54,8 +54,8 @@ class MoveList:
 
     def __init__(self, board: Board) -> None:
         self._board = board
-        self._work = Work.of(board.tables)
-        self._out = room(1, LARGEST_CHOICE)
+        self._work = Work.of(board)
+        self._out = room(board, 1, LARGEST_CHOICE)
 
     def of_others(self, position: int) -> set[int]:
         """Return the positions that the environment may make of a position."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.synthesis.arrays import Bytes, Cells, Numbers
+from dubins_traffic.synthesis.arrays import Bytes, Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import Moves, Work
 
@@ -33,14 +33,14 @@ class Graph(NamedTuple):
     out: Moves
     to_at: Ints
     to: Numbers
-    moved: Bytes
+    moved: Masks
     ego_at: Ints
     ego_to: Numbers
     back_at: Ints
     back: Numbers
     owed_at: Ints
     owed: Cells
-    owed_mask: Bytes
+    owed_mask: Masks
     owner: Numbers
 
 

@@ -117,12 +117,14 @@ def graph(game: Game) -> Graph:
     reverse(game.ego_at, game.ego_to, back_at, back)
     owner = np.empty(game.owed.shape[0], dtype=np.int32)
     own(game.owed_at, owner)
-    out = room(0, 0) if game.lean else room(0, 0)._replace(to=game.to, moved=game.moved)
+    out = room(game.board, 0, 0)
+    if not game.lean:
+        out = out._replace(to=game.to, moved=game.moved)
     found = Graph(
         game.lean,
         game.board.tables,
         game.board.others,
-        Work.of(game.board.tables),
+        Work.of(game.board),
         out,
         game.to_at,
         out.to,
@@ -143,8 +145,8 @@ def for_thread(game: Game, shared: Graph) -> Graph:
     """Return a graph for one more thread."""
     if not game.lean:
         return shared
-    out = room(1, game.most_moves)
-    return shared._replace(work=Work.of(game.board.tables), out=out, to=out.to, moved=out.moved)
+    out = room(game.board, 1, game.most_moves)
+    return shared._replace(work=Work.of(game.board), out=out, to=out.to, moved=out.moved)
 
 
 def solve(game: Game, *, progress: Progress | None = None, workers: int = WORKERS) -> Solution:

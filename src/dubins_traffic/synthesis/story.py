@@ -52,14 +52,21 @@ def told(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[s
     name = arena.name(arena.goal_nodes[goal][0]).partition(" from")[0]
     lines = [f"From here the ego can be kept from goal {name} for ever:", *_scene_lines(arena, moments[0])]
     if moments[-1].rammed:
-        return [*lines, f"After {len(moments) - 1} turns an e-agent drives into the ego: E2 is not assumed."]
+        return [
+            *lines,
+            f"After {_turns(len(moments) - 1)} an e-agent drives into the ego: E2 is not assumed.",
+        ]
     cycle = moments[again:]
     if again:
-        lines.append(f"After {again} turns this repeats every {len(cycle)}:")
+        lines.append(f"After {_turns(again)} this repeats every {_turns(len(cycle), 'turn')}:")
     else:
-        lines.append(f"This repeats every {len(cycle)} turns:")
+        lines.append(f"This repeats every {_turns(len(cycle), 'turn')}:")
     lines += [_ego_line(arena, cycle)]
     return lines + [_line(board, cycle, car) for car in range(1, board.others + 1)]
+
+
+def _turns(count: int, one: str = "1 turn") -> str:
+    return one if count == 1 else f"{count} turns"
 
 
 def played(counter: Counterstrategy, position: int, turns: int) -> tuple[list[Moment], int, int]:

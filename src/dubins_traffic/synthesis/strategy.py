@@ -80,8 +80,8 @@ class Strategy:
             If the strategy does not win from there.
         """
         board = self.board
-        out = room(1, LARGEST_CHOICE)
-        list_moves(board.tables, board.others, board.positions, position, Work.of(board.tables), out)
+        out = room(board, 1, LARGEST_CHOICE)
+        list_moves(board.tables, board.others, board.positions, position, Work.of(board), out)
         options = out.ego_to[: out.used[1]]
         ranks = self.ranks[goal].rank[options]
         if (ranks < 0).all():
@@ -123,8 +123,11 @@ class Strategy:
             If it can't be read, is no strategy, or of an unknown version. Whether it wins is for `checker.check`.
         """
         try:
-            with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
+            with Path(path).open("rb") as stream:
+                if not zipfile.is_zipfile(stream):
+                    raise zipfile.BadZipFile("no NumPy archive, or only a part of one")
+                with np.load(stream, allow_pickle=False) as archive:
+                    arrays = {name: archive[name] for name in archive.files}
         except FileNotFoundError:
             raise InputError("no such file", file=str(path)) from None
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
