@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import shutil
 import statistics
@@ -17,6 +18,7 @@ from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign.conduct import run_campaign
 from dubins_traffic.campaign.report.write import write_report
+from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from tests.campaigns import campaign, written
@@ -29,10 +31,12 @@ TEN = {
     "e-agents": [{"type": "lawful"}],
     "rules": True,
     "duration": 10.0,
+    "formulas": {"goes on a road": "F on_road_ego", "stays": "G on_road_ego"},
 }
+CONTROLLERS = ["lanes", "simple", "simple+shield"]
 DOCUMENT = campaign(
     name="<b>two & <i>two",
-    controllers=["lanes", "simple"],
+    controllers=CONTROLLERS,
     configurations=[{"name": "ten", "document": TEN}],
     trials=6,
     factors={"e_agents": [1, 3]},
@@ -58,7 +62,7 @@ def sheet(folder: Path, name: str) -> list[dict[str, str]]:
 
 
 def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> None:
-    own = {name: [row for row in rows(folder) if row["controller"] == name] for name in ("lanes", "simple")}
+    own = {name: [row for row in rows(folder) if row["controller"] == name] for name in CONTROLLERS}
     for line in sheet(folder, "controllers.csv"):
         values = [
             float(row[line["metric"]]) for row in own[line["controller"]] if row[line["metric"]] is not None
@@ -71,8 +75,8 @@ def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> N
         metric = line["metric"]
         pairs = [
             float(one[metric]) - float(other[metric])
-            for one in own["lanes"]
-            for other in own["simple"]
+            for one in own[line["first"]]
+            for other in own[line["second"]]
             if (one["cell"], one["trial"]) == (other["cell"], other["trial"]) and one[metric] is not None
         ]
         assert float(line["mean"]) == pytest.approx(statistics.fmean(pairs))
@@ -84,11 +88,41 @@ def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> N
     assert {line["which"] for line in judged} == {"satisfied", "violated", "excused", "unfinished"}
 
 
+def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
+    told = {line["metric"] for line in sheet(folder, "controllers.csv")}
+    parts = {"breaches.", "breaches_of_others."}
+    numbers = {
+        name
+        for name, (kind, _) in SCORES.items()
+        if kind != "string" and not any(name.startswith(part) for part in parts)
+    }
+    assert told == numbers - {"excuse_sensed"}
+    means = {
+        (line["controller"], line["metric"]): float(line["mean"]) for line in sheet(folder, "controllers.csv")
+    }
+    assert means["lanes", "interventions"] == means["simple", "interventions"] == 0.0
+    assert means["simple+shield", "interventions"] > 0.0
+
+
+def test_formulas_are_told_as_shares(folder: Path) -> None:
+    own = {name: [row for row in rows(folder) if row["controller"] == name] for name in CONTROLLERS}
+    told = [line for line in sheet(folder, "shares.csv") if line["of_what"].startswith("formula ")]
+    assert {line["of_what"] for line in told} == {"formula goes on a road", "formula stays"}
+    for line in told:
+        name = line["of_what"].removeprefix("formula ")
+        held = [json.loads(row["formulas"])[name] for row in own[line["controller"]]]
+        assert (int(line["count"]), int(line["of"])) == (held.count(line["which"]), 12)
+        assert float(line["low"]) <= float(line["share"]) <= float(line["high"])
+    text = (folder / "report" / "index.html").read_text()
+    assert "goes on a road" in text
+    assert "presumably false" in text
+
+
 def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     write_report(folder, tmp_path, worst=1)
     first = {path.relative_to(folder / "report"): path for path in (folder / "report").rglob("*.*")}
     assert {path.relative_to(tmp_path) for path in tmp_path.rglob("*.*")} == set(first)
-    assert sum(path.parts[0] == "replays" for path in first) == 2
+    assert sum(path.parts[0] == "replays" for path in first) == 3
     for name, path in first.items():
         assert (tmp_path / name).read_bytes() == path.read_bytes(), name
 
@@ -106,7 +140,7 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     width = browser.execute_script("return [document.body.scrollWidth, innerWidth]")
     assert width[0] <= width[1]
     links = [link.get_attribute("href") for link in browser.find_elements(By.LINK_TEXT, "replay")]
-    assert len(links) == 2
+    assert len(links) == 3
     browser.get(str(links[0]))
     assert "Trial" in browser.title
     assert browser.get_log("browser") == []
@@ -127,7 +161,7 @@ def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
 def test_a_report_in_the_terminal(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "0", "--wall"]) == 0
     told = capsys.readouterr().out
-    assert "24 of 24 trials" in told
+    assert "36 of 36 trials" in told
     assert "time to" in told
     assert not (tmp_path / "r" / "replays").exists()
 

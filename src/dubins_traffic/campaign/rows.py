@@ -99,6 +99,7 @@ SCORES: Mapping[str, tuple[str, Callable[[Score], Any]]] = {
         "bool",
         lambda score: score.verdict and score.verdict.excuse and score.verdict.excuse.sensed,
     ),
+    "interventions": ("int32", lambda score: score.interventions),
     "formulas": ("string", _formulas),
     "breaches": ("int32", lambda score: _breaches(score, ego=True)),
     "breaches_of_others": ("int32", lambda score: _breaches(score, ego=False)),

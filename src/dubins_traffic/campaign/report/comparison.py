@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -14,9 +16,12 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.metrics import FAULTS, METRICS, WALL_METRICS, Metric
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
 
 CONFIGURATION = "configuration"
+HELD: tuple[str, ...] = get_args(Status)
+"""What can hold of a formula of the user's own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +30,8 @@ class Standing:
 
     `estimates` holds a row a metric, by column; `verdicts` the share of each verdict in the judged trials, `ends` that
     of each end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each
-    part of the assumption; `faults` counts collisions by who was at fault.
+    part of the assumption; `faults` counts collisions by who was at fault. `formulas` holds the share of each verdict
+    on each formula of the user's own, by its name, in the trials that carry it.
     """
 
     controller: str
@@ -38,6 +44,7 @@ class Standing:
     fallen: Mapping[str, Share]
     collisions: int
     faults: Mapping[str, int]
+    formulas: Mapping[str, Mapping[str, Share]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +105,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
     known = [
         metric
         for metric in (*METRICS, *WALL_METRICS)
-        if metric.column in values and not np.isnan(values[metric.column]).all()
+        if metric.column in values and _is_told(metric, values[metric.column])
     ]
     names: Any = np.array(results["controller"].to_pylist(), dtype=object)
     chosen = {name: names == name for name in campaign.controllers}
@@ -146,7 +153,26 @@ def _standing(
         {part: happened(f"breaches_of_others.{part}") for part in ASSUMPTIONS} if judged else {},
         int(np.nansum(_floats(own["collisions"]))),
         {who: int(np.nansum(_floats(own[column]))) for column, who in FAULTS.items()},
+        _formulas(own["formulas"].to_pylist()),
     )
+
+
+def _formulas(column: Sequence[str | None]) -> dict[str, dict[str, Share]]:
+    """Return the share of each verdict on each formula, in the order in which the problems have them."""
+    counts: dict[str, Counter[str]] = {}
+    for text, times in Counter(column).items():
+        held: dict[str, str] = json.loads(text or "{}")
+        for name, verdict in held.items():
+            counts.setdefault(name, Counter())[verdict] += times
+    return {
+        name: {verdict: share(found[verdict], found.total()) for verdict in HELD}
+        for name, found in counts.items()
+    }
+
+
+def _is_told(metric: Metric, values: Floats) -> bool:
+    known = values[~np.isnan(values)]
+    return len(known) > 0 and (not metric.rare or bool((known > 0).any()))
 
 
 def _differences(

@@ -10,13 +10,15 @@ from dataclasses import dataclass
 class Metric:
     """A column of the table as a report tells it: its name, its unit (none: a number), and which way is better.
 
-    `better` is 1 where more is better, -1 where less is, 0 where neither is.
+    `better` is 1 where more is better, -1 where less is, 0 where neither is. One that is `rare` is told only where
+    some trial has more than none of it.
     """
 
     column: str
     name: str
     unit: str = ""
     better: int = 0
+    rare: bool = False
 
     @property
     def heading(self) -> str:
@@ -33,6 +35,9 @@ METRICS = (
     Metric("breaches", "breaches of the ego", better=-1),
     Metric("breaches_of_others", "breaches of others"),
     Metric("collisions", "collisions", better=-1),
+    Metric("collisions_ego_fault", "collisions, the ego's fault", better=-1),
+    Metric("collisions_other_fault", "collisions, the other's fault"),
+    Metric("collisions_both_fault", "collisions, the fault of both", better=-1),
     Metric("collisions_among_others", "collisions among others"),
     Metric("min_clearance_m", "least clearance", "m", 1),
     Metric("distance_m", "distance", "m"),
@@ -40,6 +45,7 @@ METRICS = (
     Metric("off_road_s", "off the road", "s", -1),
     Metric("off_road_share", "off the road", "share", -1),
     Metric("lane_departures", "lane departures", better=-1),
+    Metric("interventions", "interventions of a shield", "ticks", -1, rare=True),
     Metric("duration_s", "duration", "s"),
 )
 """The metrics of the table, in the order of a report."""
@@ -48,6 +54,7 @@ WALL_METRICS = (
     Metric("time_to_begin_s", "time to begin, wall clock", "s", -1),
     Metric("act_mean_s", "time to act, mean, wall clock", "s", -1),
     Metric("act_p99_s", "time to act, 99 %, wall clock", "s", -1),
+    Metric("act_max_s", "time to act, longest, wall clock", "s", -1),
 )
 """What was measured on a wall clock."""
 

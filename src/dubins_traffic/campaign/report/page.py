@@ -38,8 +38,10 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
     """
     style = _style(comparison)
     name = comparison.campaign.model.name
+    standings = comparison.standings
     sections = [
         _section("Verdicts and collisions", _overview(comparison)),
+        _section("Formulas", _formulas(comparison)) if any(own.formulas for own in standings) else "",
         _section("Metrics", _metrics(comparison)),
         _section("Differences, pair by pair", _differences(comparison)) if comparison.differences else "",
         *(_section(f"Against {words(factor)}", _plots(comparison, factor)) for factor in comparison.factors),
@@ -108,6 +110,24 @@ def _overview(comparison: Comparison) -> str:
         f'<div class="figures wide">{figures}</div>'
         f"{_table(['controller', 'judged', *plots.VERDICTS], judged)}{_table(at_fault, collided)}"
     )
+
+
+def _formulas(comparison: Comparison) -> str:
+    """Return what held of each formula of the user's own."""
+    standings = comparison.standings
+    names = list(dict.fromkeys(name for standing in standings for name in standing.formulas))
+    figures = "".join(_image(plots.formula(comparison, name), f"Verdicts on {name}") for name in names)
+    body: list[list[str]] = []
+    for name in names:
+        own = [(k, standing) for k, standing in enumerate(standings) if name in standing.formulas]
+        for place, (k, standing) in enumerate(own):
+            first = "" if place else f'<th rowspan="{len(own)}" scope="rowgroup">{_text(name)}</th>'
+            found = standing.formulas[name]
+            judged = next(iter(found.values())).total
+            shares = (_share(found[held]) for held in plots.FORMULA)
+            body.append([first, _name(standing, k), _count(judged), *shares])
+    table = _table(["formula", "", "trials", *plots.FORMULA], body, "grouped")
+    return f'<div class="figures wide">{figures}</div>{table}'
 
 
 def _metrics(comparison: Comparison) -> str:

@@ -29,6 +29,12 @@ FAULTS: Mapping[str, str] = {
     "both": "#882255",
     "the other": "#56B4E9",
 }
+FORMULA: Mapping[str, str] = {
+    "true": palette.GOAL_COLOUR,
+    "presumably true": "#56B4E9",
+    "presumably false": "#E69F00",
+    "false": palette.CONTACT_COLOUR,
+}
 _STYLE: Mapping[str, Any] = {
     **STYLE,
     "svg.fonttype": "none",
@@ -80,6 +86,16 @@ def verdicts(comparison: Comparison) -> str:
         if standing.verdicts
     }
     return _bars(rows, VERDICTS, "share of the judged trials", percent=True)
+
+
+def formula(comparison: Comparison, name: str) -> str:
+    """Return the shares of the verdicts on a formula of the user's own as bars: SVG."""
+    rows = {
+        standing.controller: {held: one.share or 0.0 for held, one in standing.formulas[name].items()}
+        for standing in comparison.standings
+        if name in standing.formulas
+    }
+    return _bars(rows, FORMULA, f"share of the trials that carry {name}", percent=True)
 
 
 def faults(comparison: Comparison) -> str:

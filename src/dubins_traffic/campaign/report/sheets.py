@@ -41,6 +41,7 @@ def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
             "end": standing.ends,
             "rule broken by the ego": standing.broken,
             "assumption broken by others": standing.fallen,
+            **{f"formula {name}": found for name, found in standing.formulas.items()},
         }
         for what, group in groups.items():
             for which, share in group.items():

@@ -46,13 +46,16 @@ def _differences(comparison: Comparison) -> Table:
 
 
 def _shares(comparison: Comparison) -> Table:
-    table = _table("verdicts, ends, and collisions of the ego by fault")
+    table = _table("verdicts, ends, collisions of the ego by fault, and formulas")
     _columns(table, ("what", "controller"), ("trials", "share", "95 %"))
     for standing in comparison.standings:
         for name, share in {**standing.verdicts, **standing.ends}.items():
             table.add_row(words(name), standing.controller, str(share.count), *_share(share))
         for who, count in standing.faults.items():
             table.add_row(f"fault of {who}", standing.controller, str(count), "", "")
+        for name, found in standing.formulas.items():
+            for verdict, share in found.items():
+                table.add_row(f"{name}: {verdict}", standing.controller, str(share.count), *_share(share))
     return table
 
 
