@@ -14,6 +14,7 @@ from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import Shield
+from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.problem.instance import Problem
 from tests.unit.test_law import TURN, W, car, on_grid, turned
 
@@ -73,9 +74,13 @@ BLOCKS = st.sampled_from(["nothing", "parked", "disc", "beside"])
 
 
 @settings(max_examples=60)
-@given(PHASES, PLACES, BLOCKS, st.integers(0, 4))
+@given(PHASES, PLACES, BLOCKS, st.integers(0, 4), st.sampled_from(["sure", "law"]))
 def test_nothing_that_is_asked_breaks_a_rule(
-    phases: list[Phase], place: tuple[float, float, float, float], block: str, agents: int
+    phases: list[Phase],
+    place: tuple[float, float, float, float],
+    block: str,
+    agents: int,
+    overtakes: Overtakes,
 ) -> None:
     x, left, heading, along = place
     others: list[dict[str, Any]] = [car("lawful", f"c{k}", goes="wander") for k in range(agents)]
@@ -87,7 +92,7 @@ def test_nothing_that_is_asked_breaks_a_rule(
         u, v, _ = turned(along + ahead, -W if block == "disc" else -1.7 * W)
         more["obstacles"] = [{"disc": {"x": u, "y": v, "radius": 0.12}}]
     instance = on_grid(others, 12.0, turned(along + x, left, heading), **more)
-    shield = Shield(Phases(phases))
+    shield = Shield(Phases(phases), overtakes=overtakes)
     verdict = run_trial(instance, shield).score.verdict
     assert verdict is not None
     margins = [value for value in verdict.robustness.values() if value is not None]
