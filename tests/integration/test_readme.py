@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from dubins_traffic import load_config, run_batch, run_trial
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -18,6 +22,12 @@ FILE_NAME = re.compile(r"# (\w+\.(?:py|toml))\n")
 
 def blocks(language: str) -> list[str]:
     return [text for found, text in BLOCK.findall(README) if found == language]
+
+
+def runnable(page: str) -> list[tuple[str, str]]:
+    return [
+        (language, text) for language, text in BLOCK.findall(page) if language in {"sh", "python", "toml"}
+    ]
 
 
 def run_block(language: str, text: str, folder: Path) -> None:
@@ -40,14 +50,33 @@ def run_block(language: str, text: str, folder: Path) -> None:
 
 
 def test_all_code_runs(tmp_path):
-    ran = [
-        (language, text) for language, text in BLOCK.findall(README) if language in {"sh", "python", "toml"}
-    ]
+    ran = runnable(README)
     assert len(ran) >= 6
     for language, text in ran:
         run_block(language, text, tmp_path)
     made = {path.suffix for path in tmp_path.rglob("*")}
     assert {".mcap", ".png", ".svg", ".pdf", ".html", ".csv", ".json", ".rnd"} <= made
+
+
+def test_the_page_on_batches_runs_and_ten_thousand_cars_keep_the_rules(tmp_path):
+    for language, text in runnable((ROOT / "docs" / "batches.md").read_text(encoding="utf-8")):
+        run_block(language, text, tmp_path)
+    (trial,) = json.loads((tmp_path / "crowd-score.json").read_text())["trials"]
+    assert (trial["end"], trial["verdict"]["violations"], trial["collisions_among_others"]) == (
+        "duration",
+        [],
+        0,
+    )
+
+
+def test_the_controller_on_the_page_on_batches_drives_alike_alone():
+    page = (ROOT / "docs" / "batches.md").read_text(encoding="utf-8")
+    (code,) = [text for language, text in runnable(page) if language == "python" and FILE_NAME.match(text)]
+    made: dict[str, Any] = {}
+    exec(compile(code, "keeper.py", "exec"), made)
+    config = load_config("town")
+    for outcome in run_batch(config, made["Keeper"], trials=6, batch=4).outcomes:
+        assert run_trial(outcome.instance, made["Keeper"]()).score.driven == outcome.score.driven
 
 
 def test_a_controller_takes_ten_lines():
