@@ -56,14 +56,14 @@ def measure() -> list[Row]:
         Row(
             "drivers, motion, labels, referee, metrics: the compiled pass",
             f"{steps / kernel:.2e} car-steps/s = {motion / kernel:.2f} of motion alone",
-            ">= 8e6, >= 1/6",
-            steps / kernel >= 8e6 and motion / kernel >= 1.0 / 6.0,
+            "",
+            True,
         ),
         Row(
             "with tables, rounds, scores and verdicts of each trial",
             f"{steps / whole:.2e} car-steps/s = {TRIALS / whole:.0f} trials/s, {motion / whole:.2f} of motion",
-            ">= 600 trials/s",
-            TRIALS / whole >= 600,
+            ">= 8e6 car-steps/s, >= 600 trials/s, >= 1/6 of motion",
+            steps / whole >= 8e6 and TRIALS / whole >= 600 and motion / whole >= 1.0 / 6.0,
         ),
         Row(
             "the same, each trial on a random network of its own",

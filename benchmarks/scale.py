@@ -62,7 +62,7 @@ def measure() -> list[Row]:
 
 def _cost(side: int) -> float:
     instance = crowd(side)
-    group = Group([instance], keeps_rules=False)
+    group = Group([instance], keeps_rules=True)
     group.advance(2)
     began = process_time()
     group.advance(TICKS)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.agents.lawful import drivers_of
 from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
@@ -27,9 +28,7 @@ from dubins_traffic.driving.law_tables import (
     SPEED,
     Drivers,
     blank,
-    build_of,
     desk,
-    no_ways,
 )
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
@@ -49,7 +48,7 @@ from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.story import Moment, followed, moment_of, told
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.problem.instance import Instance
 
 NO_GOAL: Final = -2
 """The vertex of the stages that the law is given: at no intersection, since the strategy sends the cars."""
@@ -235,22 +234,12 @@ def _sighting(n: int, state: State, labels: Labels) -> Sighting:
 
 def _drivers(instance: Instance) -> Drivers:
     """Return the team as the law drives it: each car on a round of its own, without goals, at prices of its own."""
-    problem: Problem = instance.problem
-    cars = len(instance.starts)
+    problem, cars = instance.problem, len(instance.starts)
     ints, floats = blank(cars)
     for n, agent in enumerate(instance.e_agents, start=1):
         ints[n, [KIND, FIRST, LAST, PLACE]] = ROUND, n, n + 1, n
         floats[n, SPEED] = min(agent.parameters["speed"], problem.car.bounds.speed)
     ints[EGO, KIND] = 0
-    return Drivers(
-        active=np.ones(1, dtype=np.int64),
-        net=np.zeros(1, dtype=np.int64),
-        seed=np.array([instance.seed], dtype=np.uint64),
-        trial=np.array([instance.trial], dtype=np.int64),
-        build=build_of([problem]),
-        ints=ints[None].copy(),
-        floats=floats[None].copy(),
-        way=no_ways(1, cars),
-        stage=np.full(cars, NO_GOAL, dtype=np.int64),
-        distance=np.zeros((cars, problem.network.lanes)),
-    )
+    net, goals = np.zeros(1, dtype=np.int64), np.full(cars, NO_GOAL, dtype=np.int64)
+    prices = np.zeros((cars, problem.network.lanes))
+    return drivers_of([instance], net, (ints[None], floats[None]), goals, prices)

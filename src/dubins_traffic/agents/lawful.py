@@ -108,6 +108,14 @@ def pack_drivers(
     numbers: list[int] = whose.tolist()
     for b, (instance, number) in enumerate(zip(instances, numbers, strict=True)):
         _add_stages(instance.problem, rows[number], ints[b], stage)
+    return drivers_of(instances, net, (ints, floats), np.array(stage, dtype=np.int64), distance)
+
+
+def drivers_of(
+    instances: Sequence[Instance], net: Ints, rows: tuple[Ints, Floats], stage: Ints, distance: Floats
+) -> Drivers:
+    """Return the cars of a batch that are described by the `ints` and `floats` of `Drivers`, on no way yet."""
+    ints, floats = rows
     return Drivers(
         active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
         net=net,
@@ -116,8 +124,8 @@ def pack_drivers(
         build=build_of([instance.problem for instance in instances]),
         ints=ints,
         floats=floats,
-        way=no_ways(len(instances), cars),
-        stage=np.array(stage, dtype=np.int64),
+        way=no_ways(*ints.shape[:2]),
+        stage=stage,
         distance=distance,
     )
 
