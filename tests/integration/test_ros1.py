@@ -177,6 +177,19 @@ def test_lockstep_over_ros_gives_the_frames_of_the_process(ros: Graph, tmp_path:
         assert getattr(replayed, column).tobytes() == getattr(frames, column).tobytes()
 
 
+def test_an_ego_over_ros_drives_under_the_shield(ros: Graph, tmp_path: Path) -> None:
+    config = configuration(tmp_path, duration=6.0, number_trials=1, rules={})
+    session = ros.session(config, "--lockstep", "--shield", "--records", tmp_path)
+    client = ros.client("drive")
+    status, out, err = finish(session)
+    assert status == 0, err
+    assert finish(client)[0] == 0
+    (score,) = json.loads(out)["trials"]
+    assert (score["end"], score["controller"], score["verdict"]["clean"]) == ("duration", "ros1+shield", True)
+    record = dt.load_record(tmp_path / "trial-0000.mcap")
+    assert sum(event.kind == "shield" for event in record.frames.events) == score["interventions"] > 0
+
+
 def test_faulty_clients_end_their_trials_and_the_session_goes_on(ros: Graph, tmp_path: Path) -> None:
     records = tmp_path / "out"
     config = configuration(tmp_path, duration=30.0, number_trials=5)
