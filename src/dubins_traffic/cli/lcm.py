@@ -17,8 +17,9 @@ EXAMPLES = options.examples(
 
 
 @app.command("run", epilog=EXAMPLES)
+@session.shared
 def run(
-    source: options.Source,
+    asked: session.Asked,
     url: Annotated[
         str | None,
         typer.Option(
@@ -28,35 +29,15 @@ def run(
             show_default="$LCM_DEFAULT_URL, else multicast within this machine",
         ),
     ] = None,
-    controller: session.Controller = None,
-    remote: session.Remote = None,
-    trials: session.Trials = None,
-    endless: session.Endless = False,
     wait: Annotated[
         bool, typer.Option("--wait", help="Begin each trial when a program asks START, not at once.")
     ] = False,
-    lockstep: session.Lockstep = False,
-    factor: session.Factor = 1.0,
-    deadline: session.Deadline = 5.0,
-    begin: session.Begin = 60.0,
-    silence: session.Silence = 5.0,
-    seed: options.Seed = 0,
-    rnd: options.Network = None,
-    data: options.Data = None,
-    data_over: options.DataOver = None,
-    records: options.Records = None,
-    shield: options.Shield = False,
-    json: options.Json = False,
 ) -> None:
     """Run trials whose ego, or some of whose e-agents, are driven over LCM. Ctrl-C keeps all finished trials."""
     from dubins_traffic.campaign.lcm import run_over_lcm
 
-    todo = session.programme(
-        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
-        records=records, shield=shield,
-    )  # fmt: skip
-    pace = session.pace(lockstep, factor, deadline, begin, silence)
-    session.conduct(todo, run_over_lcm(todo, pace, url=url, wait=wait), json=json)
+    todo = asked.programme()
+    session.conduct(todo, run_over_lcm(todo, asked.pace(), url=url, wait=wait), json=asked.json)
 
 
 @app.command("messages", epilog=options.examples("lcm messages -o dubins_traffic_lcm.lcm"))

@@ -19,13 +19,10 @@ EXAMPLES = options.examples(
 
 
 @app.command("run", epilog=EXAMPLES, context_settings={"allow_extra_args": True})
+@session.shared
 def run(
+    asked: session.Asked,
     context: typer.Context,
-    source: options.Source,
-    controller: session.Controller = None,
-    remote: session.Remote = None,
-    trials: session.Trials = None,
-    endless: session.Endless = False,
     master: Annotated[
         bool,
         typer.Option("--master", help="Start a ROS master on this machine, at --port; without it, join one."),
@@ -33,11 +30,6 @@ def run(
     port: Annotated[
         int, typer.Option("--port", metavar="PORT", min=0, max=65535, help="Of that master; 0: any free one.")
     ] = 11311,
-    lockstep: session.Lockstep = False,
-    factor: session.Factor = 1.0,
-    deadline: session.Deadline = 5.0,
-    begin: session.Begin = 60.0,
-    silence: session.Silence = 5.0,
     clock: session.Clock = False,
     simulator: Annotated[
         str | None,
@@ -53,28 +45,16 @@ def run(
             "--poses", metavar="TOPIC", help="Of that world: PoseStamped of each car, {} for its name."
         ),
     ] = None,
-    seed: options.Seed = 0,
-    rnd: options.Network = None,
-    data: options.Data = None,
-    data_over: options.DataOver = None,
-    records: options.Records = None,
-    shield: options.Shield = False,
-    json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
     from dubins_traffic.campaign.ros1 import run_over_ros1
 
     _check_remappings(context.args)
     world = _is_world(simulator, poses)
-    todo = session.programme(
-        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
-        records=records, shield=shield,
-        simulator=None if world else simulator,
-    )  # fmt: skip
-    pace = session.pace(lockstep, factor, deadline, begin, silence)
+    todo = asked.programme(None if world else simulator)
     at = port if master else None
-    results = run_over_ros1(todo, pace, master=at, clock=clock, world=world, poses=poses)
-    session.conduct(todo, results, json=json)
+    results = run_over_ros1(todo, asked.pace(), master=at, clock=clock, world=world, poses=poses)
+    session.conduct(todo, results, json=asked.json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))

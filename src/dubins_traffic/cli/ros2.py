@@ -19,8 +19,9 @@ EXAMPLES = options.examples(
 
 
 @app.command("run", epilog=EXAMPLES)
+@session.shared
 def run(
-    source: options.Source,
+    asked: session.Asked,
     domain: Annotated[
         int | None,
         typer.Option(
@@ -31,30 +32,12 @@ def run(
         bool,
         typer.Option("--wide", help="Beyond this machine, as $CYCLONEDDS_URI or Cyclone's defaults say."),
     ] = False,
-    controller: session.Controller = None,
-    remote: session.Remote = None,
-    trials: session.Trials = None,
-    endless: session.Endless = False,
-    lockstep: session.Lockstep = False,
-    factor: session.Factor = 1.0,
-    deadline: session.Deadline = 5.0,
-    begin: session.Begin = 60.0,
-    silence: session.Silence = 5.0,
     clock: session.Clock = False,
-    seed: options.Seed = 0,
-    rnd: options.Network = None,
-    data: options.Data = None,
-    data_over: options.DataOver = None,
-    records: options.Records = None,
-    shield: options.Shield = False,
-    json: options.Json = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials."""
     from dubins_traffic.campaign.ros2 import run_over_ros2
 
-    todo = session.programme(
-        source, controller, remote, data, data_over, trials=trials, endless=endless, seed=seed, rnd=rnd,
-        records=records, shield=shield,
-    )  # fmt: skip
-    pace = session.pace(lockstep, factor, deadline, begin, silence)
-    session.conduct(todo, run_over_ros2(todo, pace, domain=domain, here=not wide, clock=clock), json=json)
+    todo = asked.programme()
+    session.conduct(
+        todo, run_over_ros2(todo, asked.pace(), domain=domain, here=not wide, clock=clock), json=asked.json
+    )

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -53,27 +56,68 @@ Clock = Annotated[
 ]
 
 
-def programme(
-    source: str,
-    controller: str | None,
-    remote: list[str] | None,
-    data: str | None,
-    data_over: str | None,
-    **more: Any,
-) -> Programme:
-    """Return what a session shall run, as its command's options say; `more` as for `campaign.sessions.programme`."""
-    from dubins_traffic.campaign.sessions import programme
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What the options say that all of these commands share."""
 
-    file = options.trial_data(data, data_over)
-    return programme(source, controller, remote=remote or (), data=file, overwrite_data=data is None, **more)
+    source: options.Source
+    controller: Controller = None
+    remote: Remote = None
+    trials: Trials = None
+    endless: Endless = False
+    lockstep: Lockstep = False
+    factor: Factor = 1.0
+    deadline: Deadline = 5.0
+    begin: Begin = 60.0
+    silence: Silence = 5.0
+    seed: options.Seed = 0
+    rnd: options.Network = None
+    data: options.Data = None
+    data_over: options.DataOver = None
+    records: options.Records = None
+    shield: options.Shield = False
+    json: options.Json = False
+
+    def programme(self, simulator: str | None = None) -> Programme:
+        """Return what the session shall run."""
+        from dubins_traffic.campaign.sessions import programme
+
+        return programme(
+            self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
+            remote=self.remote or (), data=options.trial_data(self.data, self.data_over),
+            overwrite_data=self.data is None, records=self.records, simulator=simulator, shield=self.shield,
+        )  # fmt: skip
+
+    def pace(self) -> Pace:
+        """Return how drivers are waited for."""
+        from dubins_traffic.campaign.sessions import Pace
+        from dubins_traffic.transports.link import Patience
+
+        patience = Patience(begin=self.begin, silence=self.silence)
+        return Pace(self.lockstep, self.factor, self.deadline, patience)
 
 
-def pace(lockstep: bool, factor: float, deadline: float, begin: float, silence: float) -> Pace:
-    """Return how drivers are waited for, as a command's options say."""
-    from dubins_traffic.campaign.sessions import Pace
-    from dubins_traffic.transports.link import Patience
+def shared(own: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with the options of `own`, but for its first parameter, and those of `Asked`, which it is given.
 
-    return Pace(lockstep, factor, deadline, Patience(begin=begin, silence=silence))
+    The library reads options off a signature, so this makes one.
+    """
+
+    @wraps(own)
+    def command(**given: Any) -> None:
+        asked = Asked(**{name: given.pop(name) for name in hints})
+        own(asked, **given)
+
+    hints = get_type_hints(Asked, include_extras=True)
+    own_hints = get_type_hints(own, include_extras=True)
+    _, *rest = signature(own).parameters.values()
+    parameters = [
+        *(one.replace(kind=Parameter.KEYWORD_ONLY, annotation=own_hints[one.name]) for one in rest),
+        *(one.replace(annotation=hints[one.name]) for one in signature(Asked).parameters.values()),
+    ]
+    command.__signature__ = Signature(parameters)  # pyright: ignore[reportAttributeAccessIssue]
+    command.__annotations__ = {one.name: one.annotation for one in parameters}
+    return command
 
 
 def conduct(todo: Programme, session: Iterable[Result], *, json: bool) -> None:
