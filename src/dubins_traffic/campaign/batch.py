@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 
 ASKED = 16
 """So many trials of a campaign's chunk run at a time where a controller is asked in every tick."""
+UNDER_WAY = 3
+"""Groups under way for each thread: while the oldest is waited for, the others go on."""
+LEAST = 4
+"""Trials in the smallest of the last groups, which still hide what it costs to begin one."""
 KEEP = "none, all, failures or sample:K"
 Progress = Callable[[int], object]
 
@@ -159,16 +163,29 @@ def outcomes(
         return
     cancelled = Event()
     waiting: deque[Future[list[Outcome]]] = deque()
+    groups = _groups(source, batch, threads)
     with ThreadPoolExecutor(threads) as pool:
         try:
             while True:
-                while len(waiting) <= threads and (taken := list(islice(source, batch))):
+                for taken in islice(groups, UNDER_WAY * threads - len(waiting)):
                     waiting.append(pool.submit(_compiled_or_alone, taken, cancelled))
                 if not waiting:
                     return
                 yield from waiting.popleft().result()
         finally:
             cancelled.set()
+
+
+def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[list[Instance]]:
+    """Cut instances into groups of `batch`; several threads get smaller ones in the end, to end together."""
+    ahead: deque[Instance] = deque()
+    while True:
+        ahead.extend(islice(source, batch * (threads + 1) - len(ahead)))
+        if not ahead:
+            return
+        last = threads > 1 and len(ahead) <= batch * threads
+        count = max(LEAST, -(-len(ahead) // (2 * threads))) if last else batch
+        yield [ahead.popleft() for _ in range(min(count, batch, len(ahead)))]
 
 
 def run_together(

@@ -95,7 +95,7 @@ def formula(comparison: Comparison, name: str) -> str:
         for standing in comparison.standings
         if name in standing.formulas
     }
-    return _bars(rows, FORMULA, f"share of the trials that carry {name}", percent=True)
+    return _bars(rows, FORMULA, f"{name}: share of the trials", percent=True)
 
 
 def faults(comparison: Comparison) -> str:
