@@ -17,7 +17,7 @@ from dubins_traffic.roads.lookup import (
 )
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import narrows, obstacle_narrows
-from dubins_traffic.spec.location import locate, moved2
+from dubins_traffic.spec.location import keep_on, locate, moved2, put_in_order
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
     AHEAD,
@@ -43,6 +43,7 @@ from dubins_traffic.spec.tables import (
     BLOCKED_AHEAD,
     CROSS2,
     CROSSERS,
+    DUE,
     EXCUSE,
     FIRST_SINCE,
     FORFEITS,
@@ -128,26 +129,60 @@ def label_trial(
     memory: Memory,
 ) -> None:
     """Label frame `tick` of one trial."""
-    memory.head[0, NOW] = tick % memory.trail.shape[1]
+    memory.head[b, 0, NOW] = tick % memory.trail.shape[1]
     cars = state.count[b]
+    stirred = False
     for n in range(cars):
-        locate(b, n, tick, state, roads, rules, labels, memory)
+        if not keep_on(b, n, tick, state, roads, rules, labels, memory):
+            stirred |= locate(b, n, tick, state, roads, rules, labels, memory)
     some = 0
     for n in range(cars):
-        some |= _stop(b, n, tick, roads, rules, labels, memory)
+        if stirred or memory.link[b, n, DUE] != 0:
+            some |= _stop(b, n, tick, roads, rules, labels, memory)
+        else:
+            some |= np.int64(labels.bits[b, n])
     if some & STOPPED != 0:
-        for n in range(cars):
-            _queue(b, n, tick, roads, rules, labels, memory)
-        for n in range(cars):
-            _stand(b, n, rules, labels, memory)
+        _queue_up(b, tick, cars, roads, rules, labels, memory)
     elif some & STILL != 0:
         for n in range(cars):
             _say_stands(b, n, labels)
     if some & BESIDE != 0 or obstacles.base[b] >= 0:
-        for n in range(cars):
-            _block(b, n, state, roads, obstacles, rules, labels, memory)
+        _look_beside(b, state, roads, obstacles, rules, labels, memory)
+
+
+@jit_inline
+def _queue_up(
+    b: int, tick: int, cars: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
+) -> None:
+    """Order the queues, and say who stands."""
+    head = memory.head[b]
     for n in range(cars):
-        _forget(b, n, roads, rules, labels, memory)
+        _queue(b, n, tick, t, rules, labels, memory)
+    for n in range(cars):
+        lane = labels.lane[b, n]
+        if lane >= 0 and head[lane, LANE] == n:
+            put_in_order(b, lane, memory)
+    for n in range(cars):
+        _stand(b, n, rules, labels, memory)
+    for n in range(cars):
+        if labels.bits[b, n] & STOPPED != 0:
+            head[lane_end(t, rules.whole[b, NET], labels.lane[b, n]), QUEUE] = -1
+
+
+@jit_inline
+def _look_beside(
+    b: int, state: State, roads: RoadTable, obstacles: ObstacleLanes, rules: RuleTable, labels: Labels,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Find who is blocked, overtakes and is left."""
+    head = memory.head[b]
+    for n in range(state.count[b]):
+        memory.link[b, n, NEXT_ON_SEGMENT] = head[labels.segment[b, n], SEGMENT]
+        head[labels.segment[b, n], SEGMENT] = n
+    for n in range(state.count[b]):
+        _block(b, n, state, roads, obstacles, rules, labels, memory)
+    for n in range(state.count[b]):
+        head[labels.segment[b, n], SEGMENT] = -1
 
 
 @jit_inline
@@ -162,17 +197,17 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
     gap2 = memory.measure[b, n, GAP2]
     lane = labels.lane[b, n]
     crosses = labels.crosses[b, n]
-    bits = np.int64(labels.bits[b, n])
+    bits = np.int64(labels.bits[b, n]) & ~CLEAR
     mark[b, n, RANK] = -1
     if gap2 < 0.0:
-        if bits & IN_CROSSING != 0 and memory.head[crosses, CROSSERS] == 1:
+        if bits & IN_CROSSING != 0 and memory.head[b, crosses, CROSSERS] == 1:
             bits |= CLEAR
         bits &= ~STOPPED
         labels.bits[b, n] = bits
         return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
     v = lane_end(t, net, lane)
     own = 1 if crosses == v else 0
-    if memory.head[v, CROSSERS] == own:
+    if memory.head[b, v, CROSSERS] == own:
         bits |= CLEAR
     outside = gap2 >= real[b, CROSS2]
     if not outside or gap2 > real[b, QUEUE2]:
@@ -191,8 +226,8 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
     else:
         mark[b, n, APPROACH_SINCE] = -1
     if bits & STOPPED != 0:
-        memory.link[n, NEXT_IN_QUEUE] = memory.head[v, QUEUE]
-        memory.head[v, QUEUE] = n
+        memory.link[b, n, NEXT_IN_QUEUE] = memory.head[b, v, QUEUE]
+        memory.head[b, v, QUEUE] = n
     labels.bits[b, n] = bits
     return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
 
@@ -204,9 +239,9 @@ def _queue(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: La
         return
     net: int = rules.whole[b, NET]
     v = lane_end(t, net, labels.lane[b, n])
-    if memory.head[v, QUEUE] != n:
+    if memory.head[b, v, QUEUE] != n:
         return
-    clear = memory.head[v, CROSSERS] == 0
+    clear = memory.head[b, v, CROSSERS] == 0
     keep_order(t, rules, labels.lane, memory, b, net, n, clear, tick)
     member = n
     while member >= 0:
@@ -216,7 +251,7 @@ def _queue(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: La
         else:
             flags |= EXCUSED
         labels.bits[b, member] = np.int64(labels.bits[b, member]) | flags
-        member = memory.link[member, NEXT_IN_QUEUE]
+        member = memory.link[b, member, NEXT_IN_QUEUE]
 
 
 @jit
@@ -229,7 +264,7 @@ def _stand(b: int, n: int, rules: RuleTable, labels: Labels, memory: Memory) -> 
     if lane < 0:
         _say_stands(b, n, labels)
         return
-    if memory.head[lane, LANE] != n:
+    if memory.head[b, lane, LANE] != n:
         return
     measure = memory.measure
     start = n
@@ -237,15 +272,15 @@ def _stand(b: int, n: int, rules: RuleTable, labels: Labels, memory: Memory) -> 
     while member >= 0:
         progress = measure[b, member, PROGRESS]
         while measure[b, start, PROGRESS] - progress > rules.real[b, EXCUSE]:
-            start = memory.link[start, NEXT_IN_LANE]
+            start = memory.link[b, start, NEXT_IN_LANE]
         other = start
         while other != member and measure[b, other, PROGRESS] > progress:
             if labels.bits[b, other] & EXCUSED != 0:
                 labels.bits[b, member] = np.int64(labels.bits[b, member]) | EXCUSED
                 break
-            other = memory.link[other, NEXT_IN_LANE]
+            other = memory.link[b, other, NEXT_IN_LANE]
         _say_stands(b, member, labels)
-        member = memory.link[member, NEXT_IN_LANE]
+        member = memory.link[b, member, NEXT_IN_LANE]
 
 
 @jit
@@ -280,7 +315,7 @@ def _block(
     needed = real[b, FREE_NEEDED]
     blocked = False
     beside = False
-    other = memory.head[lane // 2, SEGMENT]
+    other = memory.head[b, lane // 2, SEGMENT]
     while other >= 0:
         if other != n and labels.bits[b, other] & STANDS != 0:
             progress, lateral = lane_coordinates(t, net, lane, state.x[b, other], state.y[b, other])
@@ -292,7 +327,7 @@ def _block(
             if narrows(lateral - half, lateral + half, width, needed):
                 blocked = blocked or 0.0 < ahead <= real[b, BLOCKED_AHEAD]
                 beside = beside or -real[b, OVERTAKING_BEHIND] <= ahead <= real[b, OVERTAKING_AHEAD]
-        other = memory.link[other, NEXT_ON_SEGMENT]
+        other = memory.link[b, other, NEXT_ON_SEGMENT]
     if obstacles.base[b] >= 0:
         length = t.seg[t.seg_off[net] + lane // 2, 4]
         blocked = blocked or obstacle_narrows(
@@ -314,15 +349,3 @@ def _block(
     elif reach < real[b, LEFT_RELEASE]:
         bits &= ~LEFT
     labels.bits[b, n] = bits
-
-
-@jit
-def _forget(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
-    """Empty the lists in which a car has been entered."""
-    lane = labels.lane[b, n]
-    memory.head[labels.segment[b, n], SEGMENT] = -1
-    if labels.crosses[b, n] >= 0:
-        memory.head[labels.crosses[b, n], CROSSERS] = 0
-    if lane >= 0:
-        memory.head[lane, LANE] = -1
-        memory.head[lane_end(t, rules.whole[b, NET], lane), QUEUE] = -1

@@ -1,15 +1,23 @@
-"""Where a car is in a frame: segment, disc, lane state, whether it was still; and the lists by which others find it."""
+"""Where a car is in a frame: segment, disc, lane state, whether it was still; and the lists by which others find it.
+
+Cars move a little in a tick. So with the labels a rectangle is kept in which they are the same for certain; there only
+progress and whether the car was still are found anew (`keep_on`).
+"""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import (
+    CERTAIN,
     distance2,
+    lane_coordinates,
     lane_direction,
     lane_end,
     patch,
@@ -32,19 +40,25 @@ from dubins_traffic.spec.propositions import (
 )
 from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
+    APPROACH2,
     APPROACH_SINCE,
+    CALM_HIGH_X,
+    CALM_HIGH_Y,
+    CALM_LOW_X,
+    CALM_LOW_Y,
     CROSS2,
     CROSSERS,
     CROSSING_DEGREE,
+    DUE,
     GAP2,
     HALF_LENGTH,
     HALF_WIDTH,
     JUDGED3,
     LANE,
     LATERAL,
+    LEFT_SET,
     NET,
     NEXT_IN_LANE,
-    NEXT_ON_SEGMENT,
     NOW,
     PATCH_HIGH_X,
     PATCH_HIGH_Y,
@@ -53,29 +67,35 @@ from dubins_traffic.spec.tables import (
     PATCH_SEGMENT,
     PATCH_VERTEX,
     PROGRESS,
+    QUEUE2,
     RADIUS,
     REACH,
     ROUNDING,
-    SEGMENT,
     STAND_MOVE2,
     STAND_TICKS,
     TOP,
     TURN_BACK,
+    ZONE,
     Memory,
     RuleTable,
 )
 
 RULE3 = STOPPED | CLEAR | AHEAD
 KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
+CALMLY = KEPT | ON_ROAD | IN_CROSSING | CLEAR
+"""Flags of a car that holds on to its labels, but for those that others bring about."""
+FARTHEST = 100.0
+"""Metres up to which a place is said to be far from any that matters."""
 
 
 @jit_inline
 def locate(
     b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
-) -> None:
+) -> bool:
     """Find segment, disc and lane state of a car, and whether it was still; enter it in the lists.
 
-    Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them.
+    Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them. Tells whether the car
+    crosses another vertex than before, or one or none for the first time.
     """
     real = rules.real
     net: int = rules.whole[b, NET]
@@ -121,6 +141,8 @@ def locate(
     if lane != lane_before:
         bits &= ~STOPPED
         memory.mark[b, n, APPROACH_SINCE] = -1
+        _change_lists(b, n, lane_before, lane, memory)
+    stirs = _change_crossing(b, int(labels.crosses[b, n]), crosses, memory)
     labels.segment[b, n] = segment
     labels.at[b, n] = at
     labels.crosses[b, n] = crosses
@@ -131,25 +153,73 @@ def locate(
     measure[TOP] = top
     measure[PROGRESS] = progress
     measure[LATERAL] = lateral
-    if crosses >= 0:
-        memory.head[crosses, CROSSERS] += 1
-    memory.link[n, NEXT_ON_SEGMENT] = memory.head[segment, SEGMENT]
-    memory.head[segment, SEGMENT] = n
-    _reach(b, n, x, y, c, s, lane, lateral, t, rules, memory)
+    spare = _reach(b, n, x, y, c, s, lane, lateral, t, rules, memory)
+    if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
+        spare = 0.0
+    away = sqrt(away2)
+    spare = min(spare, abs(away - real[b, RADIUS]), abs(away - sqrt(real[b, CROSS2])))
+    _keep_calm(x, y, min(spare, abs(sqrt(off2) - t.half_width[net])), row)
+    memory.link[b, n, DUE] = 1
+    return stirs
+
+
+@jit_inline
+def _keep_calm(x: float, y: float, spare: float, row: Floats) -> None:
+    """Keep the rectangle within the patch in `row` in which no point is `spare` metres from (x, y) or farther."""
+    half = 0.7 * spare - CERTAIN
+    row[CALM_LOW_X] = max(row[PATCH_LOW_X], x - half)
+    row[CALM_HIGH_X] = min(row[PATCH_HIGH_X], x + half)
+    row[CALM_LOW_Y] = max(row[PATCH_LOW_Y], y - half)
+    row[CALM_HIGH_Y] = min(row[PATCH_HIGH_Y], y + half)
+
+
+@jit_inline
+def keep_on(
+    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
+) -> bool:
+    """Label a car for which it is known that all is as in the frame before but what changes with every metre.
+
+    Returns False, and does nothing that matters, where it is not known.
+    """
+    x, y = state.x[b, n], state.y[b, n]
+    row = memory.patch[b, n]
+    if not (row[CALM_LOW_X] < x < row[CALM_HIGH_X] and row[CALM_LOW_Y] < y < row[CALM_HIGH_Y]):
+        return False
+    net: int = rules.whole[b, NET]
+    mark = memory.mark[b, n]
+    lane = labels.lane[b, n]
+    if lane >= 0:
+        measure = memory.measure[b, n]
+        progress, _ = lane_coordinates(t, net, lane, x, y)
+        if measure[TOP] - progress >= rules.real[b, TURN_BACK]:
+            return False
+        measure[TOP] = max(measure[TOP], progress)
+        measure[PROGRESS] = progress
+        if mark[ZONE] != 0:
+            measure[GAP2] = vertex_distance2(t, net, lane_end(t, net, lane), x, y)
+    memory.link[b, n, DUE] = mark[ZONE]
+    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | _still(b, n, tick, x, y, rules, memory)
+    return True
 
 
 @jit_inline
 def _reach(
     b: int, n: int, x: float, y: float, c: float, s: float, lane: int, lateral: float, t: RoadTable,
     rules: RuleTable, memory: Memory,
-) -> None:  # fmt: skip
-    """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead."""
+) -> float:  # fmt: skip
+    """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
+
+    Returns metres that a round body may move before it becomes left, or comes to where cars approach and queue, or
+    leaves it.
+    """
     net: int = rules.whole[b, NET]
     real = rules.real[b]
     half_length, half_width = real[HALF_LENGTH], real[HALF_WIDTH]
     round_body = half_length + half_width == 0.0
     reach = 0.0
     gap2 = -1.0
+    zone = 0
+    spare = FARTHEST
     if lane >= 0:
         half = real[ROUNDING]
         if not round_body:
@@ -161,9 +231,15 @@ def _reach(
             gap2 = vertex_distance2(t, net, end, x, y)
             if not round_body:
                 gap2 = distance2_to_vertex(t, net, end, x, y, c, s, half_length, half_width)
-        _enter_in_lane(b, n, lane, memory)
+            outer2 = max(real[APPROACH2], real[QUEUE2])
+            gap = sqrt(gap2)
+            spare = min(abs(gap - sqrt(outer2)), abs(gap - sqrt(real[CROSS2])))
+            zone = 1 if real[CROSS2] <= gap2 <= outer2 else 0
+        spare = min(spare, max(real[LEFT_SET] - reach, 0.0))
     memory.measure[b, n, REACH] = reach
     memory.measure[b, n, GAP2] = gap2
+    memory.mark[b, n, ZONE] = zone
+    return spare
 
 
 @jit_inline
@@ -211,7 +287,7 @@ def _entry(
 def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memory: Memory) -> int:
     """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
     trail = memory.trail
-    now = memory.head[0, NOW]
+    now = memory.head[b, 0, NOW]
     trail[b, now, n, 0] = x
     trail[b, now, n, 1] = y
     if moved2(b, n, tick, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]:
@@ -225,7 +301,7 @@ def moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
     if tick < ago:
         return 1e300
     trail = memory.trail
-    now = memory.head[0, NOW]
+    now = memory.head[b, 0, NOW]
     then = now - ago
     if then < 0:
         then += trail.shape[1]
@@ -234,17 +310,58 @@ def moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
     return dx * dx + dy * dy
 
 
+@jit_inline
+def _change_crossing(b: int, crossed: int, crosses: int, memory: Memory) -> bool:
+    """Count a car that crosses another vertex, or one or none for the first time; tell whether it does."""
+    if crosses == crossed:
+        return False
+    if crossed >= 0:
+        memory.head[b, crossed, CROSSERS] -= 1
+    if crosses >= 0:
+        memory.head[b, crosses, CROSSERS] += 1
+    return True
+
+
 @jit
+def _change_lists(b: int, n: int, before: int, lane: int, memory: Memory) -> None:
+    """Take car n from the list of the lane `before` to that of `lane`; -1 for none."""
+    link = memory.link[b]
+    if before >= 0:
+        other = memory.head[b, before, LANE]
+        if other == n:
+            memory.head[b, before, LANE] = link[n, NEXT_IN_LANE]
+        else:
+            while link[other, NEXT_IN_LANE] != n:
+                other = link[other, NEXT_IN_LANE]
+            link[other, NEXT_IN_LANE] = link[n, NEXT_IN_LANE]
+    if lane >= 0:
+        link[n, NEXT_IN_LANE] = memory.head[b, lane, LANE]
+        memory.head[b, lane, LANE] = n
+
+
+@jit
+def put_in_order(b: int, lane: int, memory: Memory) -> None:
+    """Bring the list of the cars of a lane into order, foremost first."""
+    n = memory.head[b, lane, LANE]
+    memory.head[b, lane, LANE] = -1
+    while n >= 0:
+        following = memory.link[b, n, NEXT_IN_LANE]
+        _enter_in_lane(b, n, lane, memory)
+        n = following
+
+
+@jit_inline
 def _enter_in_lane(b: int, n: int, lane: int, memory: Memory) -> None:
     """Put car n into the list of its lane, foremost first."""
-    progress = memory.measure[b, n, PROGRESS]
-    behind = memory.head[lane, LANE]
+    link, measure = memory.link[b], memory.measure[b]
+    progress = measure[n, PROGRESS]
+    behind = memory.head[b, lane, LANE]
     ahead = -1
-    while behind >= 0 and memory.measure[b, behind, PROGRESS] > progress:
+    while behind >= 0 and measure[behind, PROGRESS] > progress:
         ahead = behind
-        behind = memory.link[behind, NEXT_IN_LANE]
-    memory.link[n, NEXT_IN_LANE] = behind
+        behind = link[behind, NEXT_IN_LANE]
+    link[n, NEXT_IN_LANE] = behind
     if ahead < 0:
-        memory.head[lane, LANE] = n
+        memory.head[b, lane, LANE] = n
     else:
-        memory.link[ahead, NEXT_IN_LANE] = n
+        link[ahead, NEXT_IN_LANE] = n

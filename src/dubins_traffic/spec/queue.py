@@ -32,13 +32,13 @@ RIGHT: float = 1e-9
 @jit
 def foremost(rules: RuleTable, memory: Memory, b: int, n: int, lane: int) -> bool:
     """Tell whether no car of `lane` with larger progress than car n has its body outside the disc ahead."""
-    other = memory.head[lane, LANE]
+    measure = memory.measure[b]
+    own = measure[n, PROGRESS]
+    other = memory.head[b, lane, LANE]
     while other >= 0:
-        if memory.measure[b, other, PROGRESS] <= memory.measure[b, n, PROGRESS]:
-            return True
-        if memory.measure[b, other, GAP2] >= rules.real[b, CROSS2]:
+        if measure[other, PROGRESS] > own and measure[other, GAP2] >= rules.real[b, CROSS2]:
             return False
-        other = memory.link[other, NEXT_IN_LANE]
+        other = memory.link[b, other, NEXT_IN_LANE]
     return True
 
 
@@ -54,12 +54,12 @@ def on_the_right(t: RoadTable, net: int, lane: int, other: int) -> bool:
 
 
 @jit
-def gather(memory: Memory, first: int) -> int:
-    """List the cars of the queue that begins with car `first` in `link[:, MEMBER]`, lowest index first.
+def gather(memory: Memory, b: int, first: int) -> int:
+    """List the cars of the queue that begins with car `first` in `link[b, :, MEMBER]`, lowest index first.
 
     Returns how many there are.
     """
-    link = memory.link
+    link = memory.link[b]
     count = 0
     n = first
     while n >= 0:
@@ -90,7 +90,7 @@ def rank_queue(
     group_ticks
         How much later than the first of a group its last may come.
     """
-    link = memory.link
+    link = memory.link[b]
     mark = memory.mark
     if count == 1:
         mark[b, link[0, MEMBER], RANK] = 0
@@ -125,14 +125,14 @@ def _open_group(memory: Memory, b: int, count: int, group_ticks: int) -> int:
     """Put the unplaced member with the earliest ticket, and all just after, into a group; return its size."""
     earliest = -1
     for k in range(count):
-        n = memory.link[k, MEMBER]
+        n = memory.link[b, k, MEMBER]
         if memory.mark[b, n, RANK] < 0 and (earliest < 0 or memory.mark[b, n, TICKET] < earliest):
             earliest = memory.mark[b, n, TICKET]
     size = 0
     for k in range(count):
-        n = memory.link[k, MEMBER]
+        n = memory.link[b, k, MEMBER]
         if memory.mark[b, n, RANK] < 0 and memory.mark[b, n, TICKET] <= earliest + group_ticks:
-            memory.link[k, GROUP] = 1
+            memory.link[b, k, GROUP] = 1
             size += 1
     return size
 
@@ -141,8 +141,8 @@ def _open_group(memory: Memory, b: int, count: int, group_ticks: int) -> int:
 def _yields(t: RoadTable, net: int, lanes: Ints, memory: Memory, b: int, count: int, n: int) -> bool:
     """Tell whether a member of the present group, not placed yet, is on the right of member n."""
     for k in range(count):
-        other = memory.link[k, MEMBER]
-        if other == n or memory.link[k, GROUP] == 0 or memory.mark[b, other, RANK] >= 0:
+        other = memory.link[b, k, MEMBER]
+        if other == n or memory.link[b, k, GROUP] == 0 or memory.mark[b, other, RANK] >= 0:
             continue
         if on_the_right(t, net, lanes[b, n], lanes[b, other]):
             return True
@@ -167,7 +167,7 @@ def keep_order(
     """
     mark = memory.mark
     group = rules.whole[b, GROUP_TICKS]
-    count = gather(memory, first)
+    count = gather(memory, b, first)
     front = rank_queue(t, net, lanes, memory, b, count, group)
     since = mark[b, front, FIRST_SINCE]
     if clear and since >= 0 and tick - since >= rules.whole[b, FORFEIT_TICKS]:
@@ -176,7 +176,7 @@ def keep_order(
         mark[b, front, FIRST_SINCE] = -1
         front = rank_queue(t, net, lanes, memory, b, count, group)
     for k in range(count):
-        n = memory.link[k, MEMBER]
+        n = memory.link[b, k, MEMBER]
         if n != front or not clear:
             mark[b, n, FIRST_SINCE] = -1
         elif mark[b, n, FIRST_SINCE] < 0:

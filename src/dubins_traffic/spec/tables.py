@@ -55,14 +55,16 @@ TICKET: Final = 1
 FORFEITS: Final = 2
 FIRST_SINCE: Final = 3
 RANK: Final = 4
-MARKS: Final = 5
+ZONE: Final = 5
+MARKS: Final = 6
 
 NEXT_IN_LANE: Final = 0
 NEXT_ON_SEGMENT: Final = 1
 NEXT_IN_QUEUE: Final = 2
 MEMBER: Final = 3
 GROUP: Final = 4
-LINKS: Final = 5
+DUE: Final = 5
+LINKS: Final = 6
 
 LANE: Final = 0
 SEGMENT: Final = 1
@@ -77,7 +79,11 @@ PATCH_LOW_Y: Final = 2
 PATCH_HIGH_Y: Final = 3
 PATCH_SEGMENT: Final = 4
 PATCH_VERTEX: Final = 5
-PATCH: Final = 6
+CALM_LOW_X: Final = 6
+CALM_HIGH_X: Final = 7
+CALM_LOW_Y: Final = 8
+CALM_HIGH_Y: Final = 9
+PATCH: Final = 10
 
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
@@ -107,17 +113,20 @@ class Memory(NamedTuple):
     mark : (B, N, MARKS) int64
         First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
         in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
-        (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none.
+        (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none;
+        whether it is where cars approach and queue (`ZONE`, else 0).
     patch : (B, N, PATCH) float64
-        A rectangle about the place where the centre was last looked up, within which nearest segment and vertex
-        (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty before.
+        A rectangle about the place where the centre was last looked up, in which nearest segment and vertex
+        (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty before. Another in which, too, all that
+        a place says is the same (`CALM_LOW_X` to `CALM_HIGH_Y`).
     trail : (B, M, N, 2) float64
         Positions at the last M ticks, tick k in row k mod M.
-    link : (N, LINKS) int64
-        Scratch: the cars of one lane, segment and queue as linked lists; members and groups of a queue.
-    head : (H, HEADS) int64
-        Scratch: the first car of each lane, segment, queue (-1: none), and how many cars cross a vertex; in the
-        first row, which row of `trail` is the present one (`NOW`).
+    link : (B, N, LINKS) int64
+        The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
+        are to be looked at in this frame (`DUE`). All but the lists of the lanes is scratch.
+    head : (B, H, HEADS) int64
+        The first car of each lane, segment, queue (-1: none), and how many cars cross a vertex; in the first row, which
+        row of `trail` is the present one (`NOW`). Segments and queues are scratch.
     """
 
     measure: Floats
@@ -132,14 +141,14 @@ class Memory(NamedTuple):
         """Return the memory of `trials` x `cars` cars before their first frame."""
         mark = np.full((trials, cars, MARKS), -1, dtype=np.int64)
         mark[:, :, FORFEITS] = 0
-        head = np.full((heads, HEADS), -1, dtype=np.int64)
-        head[:, CROSSERS] = 0
+        head = np.full((trials, heads, HEADS), -1, dtype=np.int64)
+        head[:, :, CROSSERS] = 0
         return Memory(
             np.zeros((trials, cars, MEASURES)),
             mark,
             np.zeros((trials, cars, PATCH)),
             np.zeros((trials, depth, cars, 2)),
-            np.full((cars, LINKS), -1, dtype=np.int64),
+            np.full((trials, cars, LINKS), -1, dtype=np.int64),
             head,
         )
 
