@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dubins_traffic.driving.law_tables import (
     CROSSING,
     DEGREE,
@@ -28,6 +30,12 @@ def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> Way:
     row = drivers.way[b, n]
     if row[IN] != ints[LANE] or row[OUT] != ints[NEXT]:
         keep_way(b, n, roads, drivers)
+    return kept_way(row)
+
+
+@jit_inline
+def kept_way(row: Any) -> Way:
+    """Return the way that a row of `Drivers.way` holds."""
     return Way(
         row[WAY], row[WAY + 1], row[WAY + 2], row[WAY + 3], row[WAY + 4], row[WAY + 5], row[WAY + 6],
         row[WAY + 7], row[WAY + 8], row[WAY + 9], row[WAY + 10], row[WAY + 11],

@@ -14,6 +14,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.coasting import begin_coasting, coast, stop_coasting
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.driving.gates import TRAIL, mind_gate, turn_elsewhere
 from dubins_traffic.driving.kept_ways import way_of
@@ -77,6 +78,9 @@ DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
 
 
+NOBODY, SEEN, ALL = range(3)
+"""Who is in the lists of the segments: nobody, all whom the ego sees, all."""
+
 # Where each table begins and ends among the arrays of a call.
 STATE_END = len(State._fields)
 LABELS_END = STATE_END + len(Labels._fields)
@@ -121,19 +125,25 @@ def decide_trial(
     The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
     given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
     """
-    hidden = list_cars(b, sight2, state, labels, desk)
+    listed = NOBODY
     enough = loss + alone(drivers.build[b])
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = HELD
     for n in range(state.count[b]):
-        if n == 1 and hidden > 0:
+        lonely = apart[n] > enough
+        absent = drivers.ints[b, n, KIND] == ABSENT
+        if absent or (lonely and coast(b, n, state, labels, drivers, desk)):
+            continue
+        if n > 0 and listed == SEEN:
             unlist_cars(b, state, labels, desk)
-            list_cars(b, -1.0, state, labels, desk)
-        if drivers.ints[b, n, KIND] != ABSENT:
-            lonely = apart[n] > enough
-            drive(b, n, tick, lonely, state, labels, roads, obstacles, drivers, desk, commands)
+            listed = NOBODY
+        if listed == NOBODY:
+            hidden = list_cars(b, sight2 if n == 0 else -1.0, state, labels, desk)
+            listed = SEEN if hidden > 0 else ALL
+        drive(b, n, tick, lonely, state, labels, roads, obstacles, drivers, desk, commands)
     catch_up(b, state, drivers, desk, commands)
-    unlist_cars(b, state, labels, desk)
+    if listed != NOBODY:
+        unlist_cars(b, state, labels, desk)
 
 
 @jit_inline
@@ -171,6 +181,7 @@ def drive(
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
     x, y = state.x[b, n], state.y[b, n]
+    stop_coasting(drivers.way[b, n])
     if ints[KIND] == ROUND:
         count_visit(b, n, labels, drivers)
     elif ints[KIND] == NEMESIS:
@@ -181,7 +192,8 @@ def drive(
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
     near = 0
-    if not (lonely and just_drives(ints, floats, drivers.way[b, n])):
+    free = lonely and just_drives(ints, floats, drivers.way[b, n])
+    if not free:
         near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, desk)
     gap, who, close = look_ahead(
         b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, desk
@@ -202,6 +214,8 @@ def drive(
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
     if put_off(b, n, speed, left - offset, px, py, bend, close, labels, obstacles, drivers, desk):
+        if free:
+            begin_coasting(b, n, speed, part, outside, x, y, way, labels, roads, drivers)
         return
     speed, yaw_rate = move(
         b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,

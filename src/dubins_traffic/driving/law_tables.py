@@ -52,9 +52,14 @@ stands makes a car overtake, and what must be free of the right lane, metres; fo
 
 IN, OUT, CROSSING, LENGTH = range(4)
 WAY = 4
-WAYS = 16
+COAST_LOW_X, COAST_HIGH_X, COAST_LOW_Y, COAST_HIGH_Y, COAST_SPEED, COAST_BEND, COAST_LANE, COAST_CROSSES = (
+    range(16, 24)
+)
+WAYS = 24
 """Columns of `Drivers.way`: the two lanes whose way the row holds (-1: none yet), whether there is a crossing between
-them, metres of the first, and from WAY on the fields of the `driving.turn_arcs.Way`.
+them, metres of the first, and from WAY on the fields of the `driving.turn_arcs.Way`. Of a car that
+just drives on (`driving.coasting`): a rectangle in which it goes on so, its speed, m/s, the curvature of its line, 1/m,
+the lane of its lane state and the disc that its body meets.
 """
 
 LONGEST_WAY = 2.21

@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.coasting import note
 from dubins_traffic.driving.law_tables import (
     ASIDE,
     FASTEST,
@@ -87,13 +88,7 @@ def put_off(
     bound = drivers.floats[b, n, ASIDE] != 0.0 or drivers.build[b, TIGHTEST] > 0.0
     if not free or bound or np.int64(labels.bits[b, n]) & LEFT != 0:
         return False
-    row = desk.late[n]
-    row[0] = 1.0
-    row[1] = speed
-    row[2] = left
-    row[3] = px
-    row[4] = py
-    row[5] = bend
+    note(n, speed, left, px, py, bend, desk)
     return True
 
 

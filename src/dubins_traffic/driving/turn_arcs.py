@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_direction, lane_end
 from dubins_traffic.roads.table import RoadTable
 
@@ -109,15 +109,21 @@ def on_way(way: Way, x: float, y: float) -> tuple[int, float, float, float, floa
     along = dx * tx + dy * ty
     past = dx * ux + dy * uy
     if along > 0.0 > past:
-        far = sqrt(dx * dx + dy * dy)
-        ex = dx / far
-        ey = dy / far
-        side = way.side
-        ahead = side * (ex * ty - ey * tx)
-        return THROUGH, 1.0 - ahead, side * (way.radius - far), -side * ey, side * ex
+        return in_arc(way, dx, dy)
     if past < 0.0 or (along <= 0.0 and abs(in_left) < abs(out_left)):
         return BEFORE, along, in_left, tx, ty
     return AFTER, past, out_left, ux, uy
+
+
+@jit_inline
+def in_arc(way: Way, dx: float, dy: float) -> tuple[int, float, float, float, float]:
+    """Return what `on_way` does, of a point that is known to be in the arc, (dx, dy) from its centre."""
+    far = sqrt(dx * dx + dy * dy)
+    ex = dx / far
+    ey = dy / far
+    side = way.side
+    ahead = side * (ex * way.ty - ey * way.tx)
+    return THROUGH, 1.0 - ahead, side * (way.radius - far), -side * ey, side * ex
 
 
 @jit
