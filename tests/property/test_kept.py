@@ -5,6 +5,7 @@ import pytest
 
 from dubins_traffic.campaign.group import Group
 from dubins_traffic.cars.near import CELL, list_near
+from dubins_traffic.cars.state import NONE
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
@@ -13,6 +14,8 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
+from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.spec.tables import CALM_HIGH_X, CALM_HIGH_Y, CALM_LOW_X, CALM_LOW_Y
 
 
 def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
@@ -80,3 +83,44 @@ def test_a_bound_kernel_reads_its_arrays_at_each_call() -> None:
     assert call(2.0) == total(2.0, one, two) == 6.0
     two[:] = 1.0
     assert call(2.0) == 12.0
+
+
+def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() -> None:
+    config = load_config(
+        {
+            "version": 1,
+            "problem_domain": "dubins_traffic",
+            "network": {"grid": {"rows": 3, "columns": 4, "length": 4.0}},
+            "rules": {},
+            "e-agents": [{"type": "lawful", "name": "agent", "count": 6}],
+            "number_trials": 1,
+            "duration": 20,
+        }
+    )
+    instance = draw(config, 1, 0)
+    problem = instance.problem
+    surface = problem.network.surface
+    group = Group([instance], keeps_rules=True)
+    labeller = Labeller([instance])
+    labels = labeller.reset(group.state)
+    random = np.random.default_rng(4)
+    looked = 0
+    for tick in range(1, 300):
+        group.advance()
+        labeller.update(tick, group.state, [()])
+        assert (labels.bits == group.labels.bits).all()
+        for n in range(7):
+            row = labeller.memory.patch[0, n]
+            low, high = row[[CALM_LOW_X, CALM_LOW_Y]], row[[CALM_HIGH_X, CALM_HIGH_Y]]
+            if tick % 10 != n or not (low < high).all():
+                continue
+            looked += 1
+            points = random.uniform(low, high, (20, 2))
+            segment, far = surface.nearest_segment(points)
+            vertex, away = surface.nearest_vertex(points)
+            cross = problem.intersection_radius + problem.car.body.reach
+            assert (segment == labels.segment[0, n]).all()
+            assert (far <= problem.car.lane_width).all()
+            assert (np.where(away < problem.intersection_radius, vertex, NONE) == labels.at[0, n]).all()
+            assert (np.where(away < cross, vertex, NONE) == labels.crosses[0, n]).all()
+    assert looked > 100

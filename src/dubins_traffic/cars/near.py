@@ -75,6 +75,37 @@ def keep_apart(state: State, b: int, tick: int, own: Spacing) -> None:
         _look_round(state, b, tick, own)
 
 
+@jit_inline
+def _distance2(state: State, b: int, i: int, j: int) -> float:
+    """Return the squared distance between the centres of two cars."""
+    dx = state.x[b, j] - state.x[b, i]
+    dy = state.y[b, j] - state.y[b, i]
+    return dx * dx + dy * dy
+
+
+@jit_inline
+def _bucket(kx: int, ky: int, size: int) -> int:
+    return (kx * 73856093 ^ ky * 19349663) & (size - 1)
+
+
+@jit_inline
+def _first_in_cell(n: int, kx: int, ky: int, link: Ints, cell: Ints) -> int:
+    """Return the first car of cell (kx, ky) among car n and those after it in its bucket; -1 if there is none."""
+    while n >= 0 and not (cell[n, 0] == kx and cell[n, 1] == ky):
+        n = link[n]
+    return n
+
+
+@jit_inline
+def _enter_cell(n: int, kx: int, ky: int, head: Ints, link: Ints, cell: Ints) -> None:
+    """Put car n into the bucket of cell (kx, ky)."""
+    cell[n, 0] = kx
+    cell[n, 1] = ky
+    here = _bucket(kx, ky, head.shape[0])
+    link[n] = head[here]
+    head[here] = n
+
+
 @jit
 def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
     n = state.count[b]
@@ -87,9 +118,7 @@ def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
     else:
         for i in range(1, n):
             for j in range(i):
-                dx = state.x[b, j] - state.x[b, i]
-                dy = state.y[b, j] - state.y[b, i]
-                d2 = dx * dx + dy * dy
+                d2 = _distance2(state, b, i, j)
                 apart[i] = min(apart[i], d2)
                 apart[j] = min(apart[j], d2)
     least = CELL
@@ -110,20 +139,13 @@ def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Int
         ky = floor(float(state.y[b, j] / CELL))
         for mx in range(kx - 1, kx + 2):
             for my in range(ky - 1, ky + 2):
-                i = head[_bucket(mx, my, size)]
+                i = _first_in_cell(head[_bucket(mx, my, size)], mx, my, link, cell)
                 while i >= 0:
-                    if cell[i, 0] == mx and cell[i, 1] == my:
-                        dx = state.x[b, j] - state.x[b, i]
-                        dy = state.y[b, j] - state.y[b, i]
-                        d2 = dx * dx + dy * dy
-                        apart[i] = min(apart[i], d2)
-                        apart[j] = min(apart[j], d2)
-                    i = link[i]
-        cell[j, 0] = kx
-        cell[j, 1] = ky
-        here = _bucket(kx, ky, size)
-        link[j] = head[here]
-        head[here] = j
+                    d2 = _distance2(state, b, i, j)
+                    apart[i] = min(apart[i], d2)
+                    apart[j] = min(apart[j], d2)
+                    i = _first_in_cell(link[i], mx, my, link, cell)
+        _enter_cell(j, kx, ky, head, link, cell)
 
 
 @jit
@@ -139,12 +161,11 @@ def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, o
     ky = floor(float(y / CELL))
     for mx in range(kx - 1, kx + 2):
         for my in range(ky - 1, ky + 2):
-            n = own.head[b, _bucket(mx, my, size)]
+            n = _first_in_cell(own.head[b, _bucket(mx, my, size)], mx, my, own.link[b], own.cell[b])
             while n >= 0:
-                if own.cell[b, n, 0] == mx and own.cell[b, n, 1] == my:
-                    own.near[count] = n
-                    count += 1
-                n = own.link[b, n]
+                own.near[count] = n
+                count += 1
+                n = _first_in_cell(own.link[b, n], mx, my, own.link[b], own.cell[b])
     return count
 
 
@@ -215,11 +236,6 @@ def _all_pairs(state: State, b: int, distance: float, pair: Ints) -> int:
 
 
 @jit
-def _bucket(kx: int, ky: int, size: int) -> int:
-    return (kx * 73856093 ^ ky * 19349663) & (size - 1)
-
-
-@jit
 def _cell_pairs(state: State, b: int, distance: float, pair: Ints, head: Ints, link: Ints, cell: Ints) -> int:
     n = state.count[b]
     size = head.shape[0]
@@ -233,20 +249,13 @@ def _cell_pairs(state: State, b: int, distance: float, pair: Ints, head: Ints, l
         ky = floor(float(state.y[b, j] * scale))
         for mx in range(kx - 1, kx + 2):
             for my in range(ky - 1, ky + 2):
-                i = head[_bucket(mx, my, size)]
+                i = _first_in_cell(head[_bucket(mx, my, size)], mx, my, link, cell)
                 while i >= 0:
-                    if cell[i, 0] == mx and cell[i, 1] == my:
-                        dx = state.x[b, j] - state.x[b, i]
-                        dy = state.y[b, j] - state.y[b, i]
-                        if dx * dx + dy * dy < limit:
-                            if found < pair.shape[0]:
-                                pair[found, 0] = i
-                                pair[found, 1] = j
-                            found += 1
-                    i = link[i]
-        cell[j, 0] = kx
-        cell[j, 1] = ky
-        here = _bucket(kx, ky, size)
-        link[j] = head[here]
-        head[here] = j
+                    if _distance2(state, b, i, j) < limit:
+                        if found < pair.shape[0]:
+                            pair[found, 0] = i
+                            pair[found, 1] = j
+                        found += 1
+                    i = _first_in_cell(link[i], mx, my, link, cell)
+        _enter_cell(j, kx, ky, head, link, cell)
     return found

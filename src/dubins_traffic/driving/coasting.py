@@ -23,15 +23,22 @@ from dubins_traffic.driving.law_tables import (
     COAST_LOW_Y,
     COAST_SPEED,
     DISC,
+    FASTEST,
     HOLD,
+    KIND,
     LANE,
     LEFT_SIDE,
+    LENGTH,
+    MIDDLE,
     MOOD,
     PERIOD,
     REACH,
+    ROUND,
+    TIGHTEST,
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.safety import VERGE
 from dubins_traffic.driving.seeing import way_to_go
 from dubins_traffic.driving.turn_arcs import BEFORE, THROUGH, Way, in_arc, on_lane
 from dubins_traffic.kernels.compile import jit_inline
@@ -86,16 +93,25 @@ def stop_coasting(row: Any) -> None:
 
 @jit_inline
 def begin_coasting(
-    b: int, n: int, speed: float, part: int, outside: bool, x: float, y: float, way: Way, labels: Labels,
-    roads: RoadTable, drivers: Drivers,
+    b: int, n: int, speed: float, part: int, left: float, outside: bool, x: float, y: float, way: Way,
+    labels: Labels, roads: RoadTable, drivers: Drivers,
 ) -> None:  # fmt: skip
-    """Keep what a car does whose command has been put off, and where it is certain to do the same."""
+    """Keep what a car does that has nothing around it, and where it is certain to do the same.
+
+    One on its round, which looks at the edges of the road, is followed on its lane only.
+    """
     ints = drivers.ints[b, n]
     build = drivers.build[b]
     row = drivers.way[b, n]
-    if ints[MOOD] & LEFT_SIDE != 0 or drivers.floats[b, n, HOLD] > 0.0:
+    if ints[MOOD] & LEFT_SIDE != 0 or drivers.floats[b, n, HOLD] > 0.0 or build[TIGHTEST] > 0.0:
         return
     spare = FARTHEST
+    if ints[KIND] == ROUND:
+        if part != BEFORE:
+            return
+        to_go = -way_to_go(way, x, y)
+        edge = roads.half_width[drivers.net[b]] - VERGE - abs(left - build[MIDDLE])
+        spare = min(edge, to_go, row[LENGTH] - to_go) - build[FASTEST] * build[PERIOD] - CERTAIN
     if not outside:
         rx, ry = x - way.cx, y - way.cy
         along = rx * way.tx + ry * way.ty

@@ -131,8 +131,10 @@ def decide_trial(
         enough = HELD
     for n in range(state.count[b]):
         lonely = apart[n] > enough
-        absent = drivers.ints[b, n, KIND] == ABSENT
-        if absent or (lonely and coast(b, n, state, labels, drivers, desk)):
+        kind = drivers.ints[b, n, KIND]
+        if kind == ROUND:
+            count_visit(b, n, labels, drivers)
+        if kind == ABSENT or (lonely and coast(b, n, state, labels, drivers, desk)):
             continue
         if n > 0 and listed == SEEN:
             unlist_cars(b, state, labels, desk)
@@ -182,9 +184,7 @@ def drive(
     floats = drivers.floats[b, n]
     x, y = state.x[b, n], state.y[b, n]
     stop_coasting(drivers.way[b, n])
-    if ints[KIND] == ROUND:
-        count_visit(b, n, labels, drivers)
-    elif ints[KIND] == NEMESIS:
+    if ints[KIND] == NEMESIS:
         watch_ego(b, n, labels, drivers)
     way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, drivers, desk)
     part, key, left, px, py = on_way(way, x, y)
@@ -213,9 +213,9 @@ def drive(
     if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
+    if free:
+        begin_coasting(b, n, speed, part, left, outside, x, y, way, labels, roads, drivers)
     if put_off(b, n, speed, left - offset, px, py, bend, close, labels, obstacles, drivers, desk):
-        if free:
-            begin_coasting(b, n, speed, part, outside, x, y, way, labels, roads, drivers)
         return
     speed, yaw_rate = move(
         b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,

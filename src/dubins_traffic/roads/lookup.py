@@ -113,6 +113,25 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
     return best, least
 
 
+@jit_inline
+def _two_nearest(
+    t: RoadTable, net: int, cell: int, vertices: bool, x: float, y: float
+) -> tuple[int, float, float]:
+    """Return the nearest of the segments, or the `vertices`, listed in a cell; how far it is; how far the second is."""
+    start = t.vert_start if vertices else t.seg_start
+    listed = t.vert_item if vertices else t.seg_item
+    best = 0
+    least = second = INFINITE
+    for k in range(start[cell], start[cell + 1]):
+        item = listed[k]
+        d2 = vertex_distance2(t, net, item, x, y) if vertices else distance2(t, net, item, x, y)
+        if d2 < least:
+            best = item
+        second = min(second, max(d2, least))
+        least = min(d2, least)
+    return best, sqrt(least), sqrt(second)
+
+
 @jit
 def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
     """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
@@ -128,25 +147,10 @@ def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
         row[4] = s
         row[5] = v
         return
-    best = 0
-    least = second = INFINITE
-    for k in range(t.seg_start[cell], t.seg_start[cell + 1]):
-        d2 = distance2(t, net, t.seg_item[k], x, y)
-        if d2 < least:
-            best = k
-        second = min(second, max(d2, least))
-        least = min(d2, least)
-    row[4] = t.seg_item[best]
-    spare = sqrt(second) - sqrt(least)
-    least = second = INFINITE
-    for k in range(t.vert_start[cell], t.vert_start[cell + 1]):
-        d2 = vertex_distance2(t, net, t.vert_item[k], x, y)
-        if d2 < least:
-            best = k
-        second = min(second, max(d2, least))
-        least = min(d2, least)
-    row[5] = t.vert_item[best]
-    spare = min(spare, sqrt(second) - sqrt(least))
+    row[4], near, second = _two_nearest(t, net, cell, False, x, y)
+    spare = second - near
+    row[5], near, second = _two_nearest(t, net, cell, True, x, y)
+    spare = min(spare, second - near)
     half = 0.7 * 0.5 * spare - CERTAIN
     side = 1.0 / t.cell_box[net, 2]
     left = t.cell_box[net, 0] + side * int((x - t.cell_box[net, 0]) * t.cell_box[net, 2])

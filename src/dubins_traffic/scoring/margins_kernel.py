@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment
+from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.logic.formula import ticks
 from dubins_traffic.spec.propositions import LEFT, ON_ROAD, OVERTAKING
@@ -92,12 +92,14 @@ def _find_margin(
     begun = False
     road = INFINITE
     line = INFINITE
+    segment = 0
     for f in range(frames):
         x, y, bits = pose[f, 0], pose[f, 1], mark[f, 0]
         if bits & ON_ROAD != 0:
             begun = True
-        if begun:
-            _, square = nearest_segment(roads, net, x, y)
+        # No segment is farther than the one that was nearest before, so often none need be looked for.
+        if begun and half_road - sqrt(distance2(roads, net, segment, x, y)) < road:
+            segment, square = nearest_segment(roads, net, x, y)
             road = min(road, half_road - sqrt(square))
         right = -_beyond(b, pose[f], mark[f], net, roads, cars, table)
         table.signal[f] = right
