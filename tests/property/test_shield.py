@@ -73,7 +73,7 @@ PLACES = st.tuples(
 BLOCKS = st.sampled_from(["nothing", "parked", "disc", "beside"])
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(PHASES, PLACES, BLOCKS, st.integers(0, 4), st.sampled_from(["sure", "law"]))
 def test_nothing_that_is_asked_breaks_a_rule(
     phases: list[Phase],
