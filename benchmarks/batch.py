@@ -1,7 +1,7 @@
 """Full trials in batches, against the motion of the same trials alone, in one run.
 
 That motion is played back: the commands of a run of these trials, through the call that moves batches by themselves.
-Cars meet and wait as they do there, which constant commands would not bring about.
+Cars wait and keep apart as they do there; with constant commands some come so near that contacts are looked for.
 
 A trial: 60 s, 6 `lawful` e-agents, the `rules` ego, a grid of 4 x 5 intersections, all rules judged, scores, no
 records.
