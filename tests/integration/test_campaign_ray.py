@@ -23,9 +23,9 @@ DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=24)
 TRIALS = 2 * 4 * 24
 BOUND = 60.0
 """Seconds within which a cluster must have begun, and one that is lost must have been told."""
-SILENCE = 6.0
+SILENCE = 5.0
 """Seconds after which a silent cluster counts as lost here."""
-WIDE = ("--workers", "6")
+WIDE = ("--workers", "3")
 """`Slow` sleeps most of the time."""
 
 
