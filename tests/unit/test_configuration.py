@@ -284,7 +284,7 @@ RELATIONS = {
     "rules without sight", "rules with small discs", "starts that overlap", "start in an obstacle", "too many cars",
     "impossible network", "huge grid",  "rnd is no file", "huge length", "start far away",
     "crossing roads", "start of nobody", "heading too long", "bad instance", "NaN", "infinite rate",
-    "misspelt key", "misspelt key of an agent",
+    "misspelt key", "misspelt key of an agent", "parameter of an agent beside its type",
 }  # fmt: skip
 
 

@@ -92,7 +92,8 @@ def parse(model: type[M], document: object, *, file: str | None = None, field: s
         details = error.errors(include_url=False)
         first = _translate(model, details[0])
         if len(details) > 1:
-            first.problem += f" (and {len(details) - 1} more faults)"
+            more = len(details) - 1
+            first.problem += f" (and {more} more fault{'s' if more > 1 else ''})"
         raise first.within(file=file, field=field) from None
 
 

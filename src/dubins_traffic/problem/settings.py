@@ -14,6 +14,7 @@ from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
+from dubins_traffic.problem.kinds import KINDS, NAMES_2016
 from dubins_traffic.problem.parts import (
     CarModel,
     DisturbancesModel,
@@ -136,6 +137,14 @@ class AgentEntry(Careful):
             raise fault(
                 "one start for several e-agents", "1, or left out, where start is given", "count", self.count
             )
+        return self
+
+    @model_validator(mode="after")
+    def _parameters_in_place(self) -> AgentEntry:
+        kind = KINDS.get(NAMES_2016.get(self.type, self.type))
+        for key, value in (self.model_extra or {}).items():
+            if kind is not None and key in kind.model_fields:
+                raise fault("a parameter out of place", f"it in parameters: {{{key}: ...}}", key, value)
         return self
 
 
