@@ -143,7 +143,10 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
     ),
     ("misspelt key", base(sensing_raduis=3), "sensing_raduis", "3", "sensing_radius"),
     ("misspelt key of an agent", base(e_agents=[WANDER | {"cuont": 3}]), "e-agents[0].cuont", "3", "count"),
-    ("parameter of an agent beside its type", base(e_agents=[WANDER | {"speed": 0.3}]), "e-agents[0].speed", "0.3", "in parameters"),
+    (
+        "parameter of an agent beside its type",
+        base(e_agents=[WANDER | {"speed": 0.3}]), "e-agents[0].speed", "0.3", "in parameters",
+    ),
     ("unknown key of the car", base(car={"weight": 3}), "car.weight", "3", "one of w, body, bounds"),
     ("car without width", base(car={"w": 0}), "car.w", "0", "> 0"),
     ("two bodies", base(car={"body": {"disc": {}, "rectangle": {"length": 1, "width": 1}}}), "car.body", "{", "either"),

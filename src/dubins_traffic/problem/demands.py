@@ -7,6 +7,7 @@ from typing import Any
 
 from dubins_traffic.cars.body import Car
 from dubins_traffic.errors import InputError
+from dubins_traffic.problem.faults import more_faults
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -49,7 +50,7 @@ def check_demands(
     faults = clearance_faults(network, radius, reach, car.w, rules["segment_slack"])
     if faults:
         first = faults[0]
-        more = f" (and {len(faults) - 1} more faults)" if len(faults) > 1 else ""
+        more = more_faults(len(faults) - 1) if len(faults) > 1 else ""
         error = InputError(
             f"the rules are not defined here: {first.problem}{more}",
             field=first.field,

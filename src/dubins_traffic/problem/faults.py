@@ -78,6 +78,11 @@ def fault(problem: str, expected: str, field: str = "", value: object = None) ->
     return PydanticCustomError("fault", "{problem}", context)
 
 
+def more_faults(count: int) -> str:
+    """Return what a message on one of several faults ends with."""
+    return f" (and {count} more fault{'s' if count > 1 else ''})"
+
+
 def parse(model: type[M], document: object, *, file: str | None = None, field: str | None = None) -> M:
     """Return `document` as a `model`.
 
@@ -92,8 +97,7 @@ def parse(model: type[M], document: object, *, file: str | None = None, field: s
         details = error.errors(include_url=False)
         first = _translate(model, details[0])
         if len(details) > 1:
-            more = len(details) - 1
-            first.problem += f" (and {more} more fault{'s' if more > 1 else ''})"
+            first.problem += more_faults(len(details) - 1)
         raise first.within(file=file, field=field) from None
 
 
