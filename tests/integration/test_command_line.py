@@ -201,6 +201,13 @@ def test_a_table_for_people(run):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_a_table_of_judged_trials_under_the_shield_fits_too(run):
+    out = run("run", "town", "--controller", "lanes", "--shield", "--trials", "1")
+    heading = " ".join(out.split("───")[0].split())
+    assert max(map(len, out.splitlines())) <= 80
+    assert heading.endswith("verdict end 2016 rounds visited sions fault driven gap ticks")
+
+
 def test_scores_of_several_controllers_name_each(run):
     for controller in ("simple", "mine.py:Straight"):
         run("run", CONFIG, "--controller", controller, "--records", controller[:4])

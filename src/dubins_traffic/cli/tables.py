@@ -21,7 +21,7 @@ CELLS: dict[str, Callable[[Score], str]] = {
     "collisions": lambda score: str(len(score.collisions)),
     "at fault": lambda score: str(sum(collision.at_fault for collision in score.collisions)),
     "off road": lambda score: f"{score.driven.off_road_s:.1f} s",
-    "distance": lambda score: f"{score.driven.distance_m:.1f} m",
+    "driven": lambda score: f"{score.driven.distance_m:.1f} m",
     "least gap": lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m",
 }
 """What is shown of a score: heading and cell."""
@@ -33,7 +33,7 @@ JUDGED: dict[str, Callable[[Score], str]] = {
 
 
 SHIELDED: dict[str, Callable[[Score], str]] = {
-    "stepped in": lambda score: str(score.interventions),
+    "shield ticks": lambda score: str(score.interventions),
 }
 """What is shown where a shield has stepped in: in how many ticks."""
 
@@ -114,4 +114,6 @@ def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
 
 def _narrow(text: str, width: int = 0) -> str:
     """Return the words of what is wider than `width` below one another, so that a table fits 80 columns."""
+    if text == "collisions":
+        return "colli-\nsions"
     return text.replace(" ", "\n") if len(text) > width else text
