@@ -142,9 +142,10 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     floats = np.zeros((trials, cars, FLOATS))
     cycle: list[int] = []
     script: list[tuple[float, float, float]] = []
+    elsewhere = KEEP_RULES | {COUNTER, REMOTE}
     for b, instance in enumerate(instances):
         for n, agent in enumerate(instance.e_agents, start=1):
-            if agent.kind in KEEP_RULES | {COUNTER, REMOTE}:
+            if agent.kind in elsewhere:
                 continue
             given = _parameters(agent)
             floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)

@@ -93,22 +93,29 @@ def pack_drivers(
     rows = [_fleet(instances[b], cars) for b in fleets]
     ints = np.stack([own.ints for own in rows])[whose]
     floats = np.stack([own.floats for own in rows])[whose]
+    counts = np.array([len(own) for own, _ in rounds], dtype=np.int64)
+    egos = np.flatnonzero(counts)
+    last = counts.cumsum()
+    ints[egos, EGO, KIND] = ROUND
+    ints[egos, EGO, FIRST] = (last - counts)[egos]
+    ints[egos, EGO, LAST] = last[egos]
+    floats[egos, EGO, SPEED] = [instances[b].problem.car.bounds.speed for b in egos.tolist()]
     stage: list[int] = []
-    for b, (own, _) in enumerate(rounds):
-        if len(own):
-            ints[b, EGO, [KIND, FIRST, LAST]] = ROUND, len(stage), len(stage) + len(own)
-            floats[b, EGO, SPEED] = instances[b].problem.car.bounds.speed
-            stage += own.tolist()
-    lanes = max((distance.shape[1] for _, distance in rounds), default=0)
-    distance = np.full((len(stage), lanes), np.inf)
-    done = 0
-    for own, far in rounds:
-        distance[done : done + len(own), : far.shape[1]] = far
-        done += len(own)
-    numbers: list[int] = whose.tolist()
-    for b, (instance, number) in enumerate(zip(instances, numbers, strict=True)):
-        _add_stages(instance.problem, rows[number], ints[b], stage)
+    for own, _ in rounds:
+        stage += own.tolist()
+    distance = _one_below_another([far for _, far in rounds])
+    _add_stages([instance.problem for instance in instances], rows, whose, ints, stage)
     return drivers_of(instances, net, (ints, floats), np.array(stage, dtype=np.int64), distance)
+
+
+def _one_below_another(tables: Sequence[Floats]) -> Floats:
+    """Return the rows of all tables; narrower ones are filled up with infinities."""
+    widest = max((table.shape[1] for table in tables), default=0)
+    whole = [np.zeros((0, widest))]
+    for table in tables:
+        short = widest - table.shape[1]
+        whole.append(np.pad(table, ((0, 0), (0, short)), constant_values=np.inf) if short else table)
+    return np.concatenate(whole)
 
 
 def drivers_of(
@@ -166,14 +173,26 @@ def _describe(kind: str, given: Mapping[str, Any], fastest: float, ints: Ints, f
         floats[[ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME]] = [given[name] for name in shares]
 
 
-def _add_stages(problem: Problem, own: _Fleet, ints: Ints, stage: list[int]) -> None:
-    """Put the goals of a trial, at which cars may park, and the lanes of its loops into `stage`."""
-    if own.goers:
-        first = len(stage)
-        stage += dict.fromkeys(problem.goal_vertices)
-        ints[own.goers, FIRST] = first
-        ints[own.goers, LAST] = len(stage)
-    for n, cycle in own.loops:
-        ints[n, FIRST] = len(stage)
-        stage += cycle_lanes(problem.network, cycle)
-        ints[n, LAST] = len(stage)
+def _add_stages(
+    problems: Sequence[Problem], fleets: Sequence[_Fleet], whose: Ints, ints: Ints, stage: list[int]
+) -> None:
+    """Put the goals of each trial, at which cars may park, and the lanes of its loops into `stage`.
+
+    Trial b has the cars of fleets[whose[b]], which are described by ints[b].
+    """
+    numbers: list[int] = whose.tolist()
+    goals: list[tuple[int, int]] = []
+    for b, (problem, number) in enumerate(zip(problems, numbers, strict=True)):
+        own, first = fleets[number], len(stage)
+        if own.goers:
+            stage += dict.fromkeys(problem.goal_vertices)
+        goals.append((first, len(stage)))
+        for n, cycle in own.loops:
+            ints[b, n, FIRST] = len(stage)
+            stage += cycle_lanes(problem.network, cycle)
+            ints[b, n, LAST] = len(stage)
+    spans = np.array(goals, dtype=np.int64)
+    for number, own in enumerate(fleets):
+        trials = np.flatnonzero(whose == number)[:, None]
+        for k, column in enumerate((FIRST, LAST)):
+            ints[trials, own.goers, column] = spans[trials, k]

@@ -29,8 +29,10 @@ def stages(problem: Problem) -> tuple[Ints, Floats]:
     found = find_round(graph, problem.goal_vertices)
     if found is None:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-    if found not in graph.stages:
+    kept = graph.stages.get(found)
+    if kept is None:
         targets = [found.lanes[place] for place in found.arrivals]
         distance = np.stack([graph.metres_to(target) for target in targets]) + np.array(graph.length)
-        graph.stages[found] = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
-    return graph.stages[found]
+        kept = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
+        graph.stages[found] = kept
+    return kept

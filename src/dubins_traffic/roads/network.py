@@ -164,7 +164,10 @@ class RoadNetwork:
     def vertices(self, points: Sequence[tuple[int, int]]) -> tuple[int, ...]:
         """Return the numbers of the intersections at lattice points; InputError if there is none at one of them."""
         numbers = self._numbers
-        return tuple([numbers[point] if point in numbers else self.vertex(point) for point in points])
+        try:
+            return tuple([numbers[point] for point in points])
+        except KeyError:
+            return tuple([self.vertex(point) for point in points])
 
     @cached_property
     def points(self) -> Floats:

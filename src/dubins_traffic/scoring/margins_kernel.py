@@ -33,13 +33,12 @@ class MarginTable(NamedTuple):
     """What the margins of each trial depend on.
 
     `line` (B, 2): where `left` rises and where it falls, metres; `window` (B,): ticks within which the ego must be
-    back; `signal` (F,) and `queue` (F,): scratch for the longest trial.
+    back; `signal` (F,): scratch for the longest trial.
     """
 
     line: Floats
     window: Ints
     signal: Floats
-    queue: Ints
 
 
 def margin_table(
@@ -52,7 +51,6 @@ def margin_table(
         line[index],
         np.array(window, dtype=np.int64)[index],
         np.zeros(frames),
-        np.zeros(frames, dtype=np.int64),
     )
 
 
@@ -90,24 +88,24 @@ def _find_margin(
 ) -> None:  # fmt: skip
     half_road = roads.half_width[net]
     begun = False
-    road = INFINITE
     line = INFINITE
     segment = 0
+    farthest = -1.0
     for f in range(frames):
         x, y, bits = pose[f, 0], pose[f, 1], mark[f, 0]
         if bits & ON_ROAD != 0:
             begun = True
         # No segment is farther than the one that was nearest before, so often none need be looked for.
-        if begun and half_road - sqrt(distance2(roads, net, segment, x, y)) < road:
+        if begun and distance2(roads, net, segment, x, y) > farthest:
             segment, square = nearest_segment(roads, net, x, y)
-            road = min(road, half_road - sqrt(square))
+            farthest = max(farthest, square)
         right = -_beyond(b, pose[f], mark[f], net, roads, cars, table)
         table.signal[f] = right
         if bits & OVERTAKING == 0:
             line = min(line, right)
-    found[ROAD] = road
+    found[ROAD] = half_road - sqrt(farthest) if begun else INFINITE
     found[LINE] = line
-    found[RETURN] = _least_of_greatest(table.signal, frames, table.window[b], table.queue)
+    found[RETURN] = _least_of_greatest(table.signal, frames, table.window[b])
 
 
 @jit
@@ -127,23 +125,21 @@ def _beyond(
 
 
 @jit
-def _least_of_greatest(signal: Floats, count: Any, window: Any, queue: Ints) -> Any:
+def _least_of_greatest(signal: Floats, count: Any, window: Any) -> Any:
     """Return the least, over all frames, of the greatest value at the frame and up to `window` frames after it.
 
-    `queue` holds frames to come whose values are greater than all that stand behind them.
+    The last frame has none after it, and what ends there is no less. Any other span counts only once all of it lies
+    below the least so far, so it is looked at again only then.
     """
-    least = INFINITE
-    first = 0
-    last = 0
-    seen = 0
+    least = signal[count - 1]
+    high = -1
     for f in range(count):
-        while seen < count and seen <= f + window:
-            while last > first and signal[queue[last - 1]] <= signal[seen]:
-                last -= 1
-            queue[last] = seen
-            last += 1
-            seen += 1
-        while queue[first] < f:
-            first += 1
-        least = min(least, signal[queue[first]])
+        if signal[f] >= least:
+            high = f
+        elif f - high > window:
+            high = f - window
+            for g in range(high + 1, f + 1):
+                if signal[g] >= signal[high]:
+                    high = g
+            least = signal[high]
     return least

@@ -102,7 +102,7 @@ class Tallied:
             verdict = reach_verdict(
                 instance,
                 rules,
-                sorted([*breaches, *accused(contacts)], key=order),
+                sorted([*breaches, *accused(contacts)], key=order) if breaches or contacts else (),
                 collisions,
                 visits,
                 [row[INSIDE] != 0 for row in goals],
@@ -140,12 +140,12 @@ class Tallied:
 def _visits(instance: Instance, rows: Sequence[Sequence[int]], rounds: int, ticks: int) -> Visits:
     goals = dict.fromkeys(instance.problem.goals)
     rate = instance.problem.rate
-    found = tuple(
+    found = [
         GoalVisits(goal, row[VISITS], max(row[GAP], ticks - row[LAST_VISIT]) / rate)
         for goal, row in zip(goals, rows, strict=True)
-    )
-    visited = sum(row[VISITS] > 0 for row in rows) / len(rows) if rows else 1.0
-    return Visits(found, visited, rounds)
+    ]
+    visited = sum([row[VISITS] > 0 for row in rows]) / len(rows) if rows else 1.0
+    return Visits(tuple(found), visited, rounds)
 
 
 def _collisions(instance: Instance, contacts: Sequence[Contact]) -> tuple[tuple[Collision, ...], int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -78,8 +79,6 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     ints[:, NET] = nets
     floats[:, CLEARANCE] = np.inf
     counts = np.zeros((trials, cars), dtype=np.int64)
-    offsets = np.zeros(trials, dtype=np.int64)
-    goals: list[int] = []
     kinds, index = kinds_of([instance.problem for instance in instances])
     rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
     sizes = [
@@ -91,19 +90,17 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     for number, b in enumerate(fleets):
         names: list[bool] = [agent.name.startswith("agent") for agent in instances[b].e_agents]
         counts[whose == number, 1 : 1 + len(names)] = names
-    for b, instance in enumerate(instances):
-        own = dict.fromkeys(instance.problem.goal_vertices)
-        offsets[b] = len(goals)
-        ints[b, GOALS] = len(own)
-        goals += own
-    goal = np.zeros((len(goals), GOAL_INTS), dtype=np.int64)
-    goal[:, VERTEX] = goals
+    goals = [tuple(dict.fromkeys(instance.problem.goal_vertices)) for instance in instances]
+    ints[:, GOALS] = [len(own) for own in goals]
+    last = ints[:, GOALS].cumsum()
+    goal = np.zeros((last[-1], GOAL_INTS), dtype=np.int64)
+    goal[:, VERTEX] = list(chain.from_iterable(goals))
     sensed = np.full((trials, cars), -1, dtype=np.int64)
     frames = 1 + max(max(1, instance.ticks) for instance in instances)
     return Tally(
         ints,
         floats,
-        offsets,
+        last - ints[:, GOALS],
         goal,
         counts,
         sensed,

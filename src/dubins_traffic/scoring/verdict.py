@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 EGO_RULES = ("1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear")
 """The rules of the ego that a finite run can break."""
+HELD: Final[Status] = "presumably true"
+PENDING: Final[Status] = "presumably false"
+BROKEN: Final[Status] = "false"
+"""What is said of formulas that no finite run can make true."""
 ASSUMPTIONS = ("E1", "E2", "E3", "E4", "E5", "E6")
 _SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
@@ -264,10 +268,10 @@ def reach_verdict(
     from dubins_traffic.driving.rounds import round_time  # compiles; only where there is something to judge
 
     rate = instance.problem.rate
-    violations = tuple(_violation(instance, breach) for breach in breaches)
+    violations = tuple([_violation(instance, breach) for breach in breaches])
     own = [breach for breach in breaches if breach.car == EGO]
     fall = first_fall(breaches, rules, rate) if breaches else None
-    gap = max((goal.longest_gap_s for goal in visits.goals), default=None)
+    gap = max([goal.longest_gap_s for goal in visits.goals], default=None)
     limit = rules.gap_rounds * round_time(instance.problem)
     excuse = None
     if not own:
@@ -314,16 +318,20 @@ def _formulas(
     at_goal: Sequence[bool],
     running: Running,
 ) -> dict[str, Status]:
-    broken = {breach.rule for breach in breaches if breach.car == EGO}
-    found: dict[str, Status] = {rule: _status(rule in broken, rule in running.ego) for rule in EGO_RULES}
+    found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
+    for rule in running.ego.intersection(EGO_RULES):
+        found[rule] = PENDING
+    for rule in {breach.rule for breach in breaches if breach.car == EGO}.intersection(EGO_RULES):
+        found[rule] = BROKEN
     for goal, there in zip(visits.goals, at_goal, strict=True):
-        found[f"1.goal {goal.goal[0]} {goal.goal[1]}"] = _status(False, not there)
+        x, y = goal.goal
+        found[f"1.goal {x} {y}"] = HELD if there else PENDING
     pending = {assumption_of(rule) for rule in running.others}
     others = [breach for breach in breaches if breach.car != EGO]
     for assumption in assumed(rules):
         of_it = [breach for breach in others if assumption_of(breach.rule) == assumption]
         fell = bool(of_it) and first_fall(of_it, rules, rate) is not None
-        found[assumption] = _status(fell, assumption in pending)
+        found[assumption] = BROKEN if fell else PENDING if assumption in pending else HELD
     return found
 
 
@@ -334,7 +342,7 @@ def assumption_of(rule: str) -> str:
 
 def assumed(rules: RuleParameters) -> tuple[str, ...]:
     """Return the parts of the assumption that a problem makes."""
-    return tuple(name for name, switch in _SWITCHES if getattr(rules, switch))
+    return tuple([name for name, switch in _SWITCHES if getattr(rules, switch)])
 
 
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
@@ -352,10 +360,3 @@ def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -
             continue
         return part, breach
     return None
-
-
-def _status(broken: bool, pending: bool) -> Status:
-    """Return the four-valued verdict on a formula that no finite run can make true."""
-    if broken:
-        return "false"
-    return "presumably false" if pending else "presumably true"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +49,8 @@ class Embedded:
         state.count[:] = counts
         state.x[:] = ABSENT * np.arange(1, max(counts) + 1)
         present = np.arange(max(counts)) < state.count[:, None]
-        starts = np.array([pose for instance in instances for pose in instance.starts])
+        poses = chain.from_iterable(instance.starts for instance in instances)
+        starts = np.array(list(chain.from_iterable(poses)), dtype=np.float64).reshape(-1, 4)
         for k, array in enumerate((state.x, state.y, state.c, state.s)):
             array[present] = starts[:, k]
         self.state = state

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import chain
 from typing import NamedTuple, Protocol
 
@@ -285,9 +286,15 @@ def running(trials: Ints, terms: Terms, docket: Docket) -> list[Running]:
     egos: list[list[bool]] = runs[:, EGO].tolist()
     others: list[list[bool]] = np.logical_or.reduce(runs[:, EGO + 1 :], axis=1).tolist()
     return [
-        Running(_named(ego), _named(other) | {"E6"} if goal_taken else _named(other))
+        _hanging(tuple(ego), tuple(other), goal_taken)
         for ego, other, goal_taken in zip(egos, others, taken, strict=True)
     ]
+
+
+@cache
+def _hanging(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Running:
+    """Return what hangs over the cars whose clocks of `_PENDING` run; the trials of a batch share the few there are."""
+    return Running(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
 
 
 def _named(runs: Sequence[bool]) -> frozenset[str]:
