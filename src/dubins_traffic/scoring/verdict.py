@@ -329,9 +329,11 @@ def _formulas(
     pending = {assumption_of(rule) for rule in running.others}
     others = [breach for breach in breaches if breach.car != EGO]
     for assumption in assumed(rules):
+        found[assumption] = PENDING if assumption in pending else HELD
+    for assumption in {assumption_of(breach.rule) for breach in others}.intersection(found):
         of_it = [breach for breach in others if assumption_of(breach.rule) == assumption]
-        fell = bool(of_it) and first_fall(of_it, rules, rate) is not None
-        found[assumption] = BROKEN if fell else PENDING if assumption in pending else HELD
+        if first_fall(of_it, rules, rate) is not None:
+            found[assumption] = BROKEN
     return found
 
 
