@@ -42,7 +42,7 @@ from dubins_traffic.agents.tables import (
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import COUNTER, REMOTE, parameters_of
@@ -143,7 +143,11 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     cycle: list[int] = []
     script: list[tuple[float, float, float]] = []
     elsewhere = KEEP_RULES | {COUNTER, REMOTE}
-    for b, instance in enumerate(instances):
+    fleets, whose = distinct([id(instance.e_agents) for instance in instances])
+    kinds = [{agent.kind for agent in instances[b].e_agents} for b in fleets]
+    driven = np.array([not own <= elsewhere for own in kinds])[whose]
+    for b in np.flatnonzero(driven).tolist():
+        instance = instances[b]
         for n, agent in enumerate(instance.e_agents, start=1):
             if agent.kind in elsewhere:
                 continue

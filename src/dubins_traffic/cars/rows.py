@@ -7,6 +7,7 @@ in which no two bodies can meet during the tick, which is nearly all of them.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -52,13 +53,16 @@ def rows(cars: CarTable, n: int, dt: float) -> Rows:
     curvature = np.where(free, 0.0, 1.0 / np.where(free, 1.0, cars.turning_radius))
     near = 4.0 * far * far
     constants = (cars.speed_low, cars.speed_high, cars.yaw_rate, slack, curvature, far, near)
+    mask = _mask(n)
+    close = np.zeros(mask.shape[1], dtype=np.int64)
+    return Rows(*constants, alike=_alike(np.stack(constants)), mask=mask, close=close)
+
+
+@lru_cache(maxsize=FEW)
+def _mask(n: int) -> Floats:
+    """Return `Rows.mask`, which is only read, for `n` places; batches share it."""
     place = np.arange(RUN * n if n <= FEW else 0) % n
-    return Rows(
-        *constants,
-        alike=_alike(np.stack(constants)),
-        mask=np.array([place + shift < n for shift in range(n)], dtype=np.float64),
-        close=np.zeros(len(place), dtype=np.int64),
-    )
+    return np.array([place + shift < n for shift in range(n)], dtype=np.float64)
 
 
 def _alike(columns: Floats) -> Ints:

@@ -55,7 +55,7 @@ class Tally(NamedTuple):
     goal_off[b] on, each once; `counts` (B, N): 1 for the e-agents that count in the score of 2016; `sensed` (B, N): the
     last tick at which the car was within the ego's sensing radius, -1 before; `before` (B, N, 2): where the cars were
     in the frame before; `left` (B,): whether the ego was left there; `pose` (B, F, 4) and `mark` (B, F, 2): x, y,
-    cosine and sine of the ego in each frame, its flags and lane state.
+    cosine and sine of the ego in each frame so far, its flags and lane state.
     """
 
     ints: Ints
@@ -106,8 +106,8 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
         sensed,
         np.zeros((trials, cars, 2)),
         np.zeros(trials, dtype=np.int64),
-        np.zeros((trials, frames, 4)),
-        np.zeros((trials, frames, 2), dtype=np.int64),
+        np.empty((trials, frames, 4)),
+        np.empty((trials, frames, 2), dtype=np.int64),
     )
 
 
