@@ -185,11 +185,11 @@ def logged(folder: Path) -> tuple[Path, list[Path]]:
     return log, sorted(folder.glob("?/*.mcap"))
 
 
-def converted(folder: Path, made: Path, tries: int = 4) -> tuple[Path, list[Path]]:
+def converted(folder: Path, made: Path, tries: int = 6) -> tuple[Path, list[Path]]:
     """Log and convert trials. On a busy machine the logger may miss a datagram; then the log is refused."""
-    folder = folder / str(tries)
-    folder.mkdir()
-    log, records = logged(folder)
+    own = folder / f"try-{tries}"
+    own.mkdir()
+    log, records = logged(own)
     done = subprocess.run([COMMAND, "convert", str(log), "-o", str(made)], check=False, capture_output=True)
     if done.returncode == 0 or tries == 1:
         assert done.returncode == 0
