@@ -26,7 +26,7 @@ from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.simulators.embedded import Embedded
 
-TRIALS, DURATION, ROUNDS = 128, 60, 3
+TRIALS, DURATION, ROUNDS = 128, 60, 7
 BATCH = 32
 CLOCK_ROUNDS = 7
 

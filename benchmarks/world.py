@@ -10,7 +10,7 @@ from dubins_traffic.campaign.single import Trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 
-ROUNDS = 3
+ROUNDS = 20
 
 
 def measure() -> list[Row]:
