@@ -37,6 +37,9 @@ SHIELDED: dict[str, Callable[[Score], str]] = {
 }
 """What is shown where a shield has stepped in: in how many ticks."""
 
+HYPHENATED = {"collisions": "colli-\nsions"}
+"""Headings that are one word wider than their cells."""
+
 
 def show(sheet: ScoreSheet, *, json: bool) -> None:
     """Print scores on standard output: JSON for machines, else a table."""
@@ -81,7 +84,9 @@ def score_table(sheet: ScoreSheet) -> Table:
     for heading in cells:
         footer = f"{sheet.icra2016_sum:g}" if heading == "ICRA 2016" else ""
         align = "left" if heading in ("end", "verdict") else "right"
-        table.add_column(_narrow(heading), footer=footer, justify=align, no_wrap=True)
+        table.add_column(
+            HYPHENATED.get(heading) or _narrow(heading), footer=footer, justify=align, no_wrap=True
+        )
     for score in sheet.trials:
         leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
         table.add_row(*leading, *(_narrow(cell(score), 10) for cell in cells.values()))
@@ -114,6 +119,4 @@ def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
 
 def _narrow(text: str, width: int = 0) -> str:
     """Return the words of what is wider than `width` below one another, so that a table fits 80 columns."""
-    if text == "collisions":
-        return "colli-\nsions"
     return text.replace(" ", "\n") if len(text) > width else text

@@ -36,7 +36,7 @@ from dubins_traffic.driving.law_tables import (
 )
 from dubins_traffic.driving.passing import BACK, TURNING, along, find_way_past
 from dubins_traffic.driving.shield_checks import bounded, gather_close, may_touch, refusal
-from dubins_traffic.driving.shield_return import drive_alone, drive_by_law, keep, recall, surely_returns
+from dubins_traffic.driving.shield_return import copy_memory, drive_alone, drive_by_law, surely_returns
 from dubins_traffic.driving.shield_tables import (
     AIMED,
     EGO,
@@ -152,12 +152,12 @@ def _law(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
     if left and guards.mark[b, KEPT] != 0:
-        recall(b, drivers, guards)
+        copy_memory(b, drivers, guards.alone)
         law, law_yaw = drive_alone(
             b, tick, labels.lane[b, EGO], state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO],
             roads, obstacles, drivers, guards, desk,
         )  # fmt: skip
-        keep(b, drivers, guards)
+        copy_memory(b, guards.alone, drivers)
         return law, law_yaw
     drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, desk, commands)
     return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.build[b])

@@ -100,25 +100,14 @@ def drive_alone(
 
 
 @jit_inline
-def recall(b: int, drivers: Drivers, guards: Guards) -> None:
-    """Let the law remember in `guards.alone` what it does in `drivers`."""
+def copy_memory(b: int, source: Any, to: Any) -> None:
+    """Let the law remember in `to` what it does in `source`: `Drivers` or `guards.alone`."""
     for k in range(INTS):
-        guards.alone.ints[b, EGO, k] = drivers.ints[b, EGO, k]
+        to.ints[b, EGO, k] = source.ints[b, EGO, k]
     for k in range(FLOATS):
-        guards.alone.floats[b, EGO, k] = drivers.floats[b, EGO, k]
+        to.floats[b, EGO, k] = source.floats[b, EGO, k]
     for k in range(WAYS):
-        guards.alone.way[b, EGO, k] = drivers.way[b, EGO, k]
-
-
-@jit_inline
-def keep(b: int, drivers: Drivers, guards: Guards) -> None:
-    """Let the law remember in `drivers` what it does in `guards.alone`."""
-    for k in range(INTS):
-        drivers.ints[b, EGO, k] = guards.alone.ints[b, EGO, k]
-    for k in range(FLOATS):
-        drivers.floats[b, EGO, k] = guards.alone.floats[b, EGO, k]
-    for k in range(WAYS):
-        drivers.way[b, EGO, k] = guards.alone.way[b, EGO, k]
+        to.way[b, EGO, k] = source.way[b, EGO, k]
 
 
 @jit_inner
@@ -136,7 +125,7 @@ def surely_returns(
     before, _ = lane_coordinates(roads, net, lane, x, y)
     top = guards.memory[b, TOP]
     last = int(min(guards.limit[b, LEFT_TIME], LONGEST) / build[PERIOD])
-    recall(b, drivers, guards)
+    copy_memory(b, drivers, guards.alone)
     for k in range(1, last + 1):
         if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.state, obstacles, build, desk):
             return False
