@@ -103,6 +103,31 @@ def test_a_world_with_so_many_cars_that_they_are_looked_for_in_cells() -> None:
     assert plain(own.score) == plain(single.score)
 
 
+OBSTACLES = [{"disc": {"x": 6.0, "y": -0.3, "radius": 0.2}}, {"disc": {"x": 2.0, "y": 3.7, "radius": 0.2}}]
+PARKS = {"parks": 0.5, "blocks": 0.3, "left": 0.2}
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {
+            "e-agents": [{"type": "lawful", "name": "agent", "count": 3, "parameters": PARKS}],
+            "network": OWN_NETWORKS,
+        },
+        {"e-agents": [], "obstacles": OBSTACLES},
+        {"e-agents": [{"type": "lawful", "name": "agent", "count": 40}]},
+    ],
+    ids=["stands for a while", "nobody but an obstacle", "more cars than a block holds"],
+)
+def test_cars_that_just_drive_on_stop_where_they_do_by_themselves(more) -> None:
+    config = configuration(
+        duration_bounds=[60, 60],
+        **{"network": {"grid": {"rows": 4, "columns": 5, "length": 4.0}}, **more},
+    )
+    for own in run_batch(config, trials=6, seed=SEED).outcomes:
+        assert plain(own.score) == plain(run_trial(draw(config, SEED, own.instance.trial), "rules").score)
+
+
 class Wheel:
     """Drives in a circle; by itself and for whole batches."""
 

@@ -66,24 +66,16 @@ def mind_gate(
     net = drivers.net[b]
     build = drivers.build[b]
     ints = drivers.ints[b, n]
-    v = lane_end(roads, net, ints[LANE])
-    if part != BEFORE or labels.crosses[b, n] == v:
+    if not faces_gate(b, n, part, labels, roads, drivers):
         return speed
-    row = roads.vert_off[net] + v
-    crossing = drivers.way[b, n, CROSSING] != 0.0
     bits = np.int64(labels.bits[b, n])
-    its_turn = crossing and bits & GOES_NOW == GOES_NOW
-    ints[TURN] = ints[TURN] + 1 if its_turn else 0
-    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
-    edge = build[DISC] + build[REACH] + MARGIN
-    to_go = -way_to_go(way, x, y)
-    if to_go - edge >= speed * build[PERIOD]:
+    its_turn = count_turn(bits, drivers.way[b, n], ints)
+    line = to_line(left, x, y, way, build)
+    if line >= speed * build[PERIOD]:
         return speed
-    aside = left - build[MIDDLE]
-    to_line = to_go - sqrt(max(edge * edge - aside * aside, 0.0))
-    if to_line >= speed * build[PERIOD]:
-        return speed
-    if crossing:
+    v = lane_end(roads, net, ints[LANE])
+    row = roads.vert_off[net] + v
+    if drivers.way[b, n, CROSSING] != 0.0:
         free = its_turn and may_go(b, n, tick, state, labels, roads, drivers, desk)
         free = free or ints[MOOD] & ROLLING != 0
     else:
@@ -97,7 +89,32 @@ def mind_gate(
         )
     if bits & LEFT != 0 and ints[MOOD] & LEFT_SIDE == 0:
         free = False
-    return speed if free else max(0.0, to_line) / build[PERIOD]
+    return speed if free else max(0.0, line) / build[PERIOD]
+
+
+@jit_inline
+def faces_gate(b: int, n: int, part: int, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
+    """Tell whether a car is before the disc at the end of its lane."""
+    return part == BEFORE and labels.crosses[b, n] != lane_end(
+        roads, drivers.net[b], drivers.ints[b, n, LANE]
+    )
+
+
+@jit_inline
+def count_turn(bits: Any, way: Any, ints: Any) -> bool:
+    """Tell whether it is the turn of a car before a disc, and count for how long; `way` is its row of `Drivers.way`."""
+    its_turn = way[CROSSING] != 0.0 and bits & GOES_NOW == GOES_NOW
+    ints[TURN] = ints[TURN] + 1 if its_turn else 0
+    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
+    return its_turn
+
+
+@jit_inline
+def to_line(left: float, x: float, y: float, way: Way, build: Any) -> float:
+    """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
+    edge = build[DISC] + build[REACH] + MARGIN
+    aside = left - build[MIDDLE]
+    return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
 
 
 @jit_inline

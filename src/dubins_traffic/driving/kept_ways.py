@@ -14,6 +14,7 @@ from dubins_traffic.driving.law_tables import (
     MIDDLE,
     NEXT,
     OUT,
+    OUT_LENGTH,
     WAY,
     Drivers,
 )
@@ -55,5 +56,6 @@ def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
     degree = roads.degree[roads.vert_off[net] + lane_end(roads, net, ints[LANE])]
     row[CROSSING] = 1.0 if degree >= build[DEGREE] else 0.0
     row[LENGTH] = roads.seg[roads.seg_off[net] + (ints[LANE] >> 1), 4]
+    row[OUT_LENGTH] = roads.seg[roads.seg_off[net] + (ints[NEXT] >> 1), 4]
     for k, value in enumerate(way):
         row[WAY + k] = value

@@ -14,22 +14,21 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.coasting import begin_coasting, coast, stop_coasting
+from dubins_traffic.driving.coasting import coast, cruise, drive_on, keeps_to_road, stop_coasting
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.driving.gates import TRAIL, mind_gate, turn_elsewhere
 from dubins_traffic.driving.kept_ways import way_of
 from dubins_traffic.driving.lane_graph import lane_at
+from dubins_traffic.driving.late import catch_up, put_off
 from dubins_traffic.driving.law_tables import (
     ABSENT,
     ASIDE,
     CROSSING,
     DISC,
-    FASTEST,
     HOLD,
     KIND,
     LANE,
     LEFT_SIDE,
-    LENGTH,
     MIDDLE,
     MOOD,
     NEMESIS,
@@ -37,19 +36,15 @@ from dubins_traffic.driving.law_tables import (
     PERIOD,
     REACH,
     ROUND,
-    SPEED,
     TAILGATING,
-    THROUGH_SPEED,
     UNTIL,
     WAITED,
-    WAY,
     Desk,
     Drivers,
 )
 from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
-    HELD,
     QUEUE_GAP,
     alone,
     gather,
@@ -57,16 +52,14 @@ from dubins_traffic.driving.seeing import (
     wanted_gap,
     way_to_go,
 )
-from dubins_traffic.driving.steering import catch_up, move, put_off
+from dubins_traffic.driving.steering import move
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED, LEFT
 
-SURELY = 1e-6
-"""By how much more than rounding a car has to be sure that it stays on the road, metres."""
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
 asked, and on its way to another exit it might leave the disc outside its lane."""
@@ -125,27 +118,31 @@ def decide_trial(
     The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
     given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
     """
-    listed = NOBODY
+    desk.listed[0] = NOBODY
     enough = loss + alone(drivers.build[b])
     if obstacles.off[b] != obstacles.off[b + 1]:
-        enough = HELD
+        enough = INFINITE
     for n in range(state.count[b]):
         lonely = apart[n] > enough
         kind = drivers.ints[b, n, KIND]
         if kind == ROUND:
             count_visit(b, n, labels, drivers)
-        if kind == ABSENT or (lonely and coast(b, n, state, labels, drivers, desk)):
-            continue
-        if n > 0 and listed == SEEN:
-            unlist_cars(b, state, labels, desk)
-            listed = NOBODY
-        if listed == NOBODY:
-            hidden = list_cars(b, sight2 if n == 0 else -1.0, state, labels, desk)
-            listed = SEEN if hidden > 0 else ALL
-        drive(b, n, tick, lonely, state, labels, roads, obstacles, drivers, desk, commands)
+        if kind != ABSENT and not (lonely and coast(b, n, kind, state, labels, roads, drivers, desk)):
+            drive(b, n, tick, lonely, sight2, state, labels, roads, obstacles, drivers, desk, commands)
     catch_up(b, state, drivers, desk, commands)
-    if listed != NOBODY:
+    if desk.listed[0] != NOBODY:
         unlist_cars(b, state, labels, desk)
+
+
+@jit_inline
+def enlist(b: int, n: int, sight2: float, state: State, labels: Labels, desk: Desk) -> None:
+    """Have those in the lists of the segments by whom car n goes: whom it sees if it is the ego, else all."""
+    if n > 0 and desk.listed[0] == SEEN:
+        unlist_cars(b, state, labels, desk)
+        desk.listed[0] = NOBODY
+    if desk.listed[0] == NOBODY:
+        hidden = list_cars(b, sight2 if n == 0 else -1.0, state, labels, desk)
+        desk.listed[0] = SEEN if hidden > 0 else ALL
 
 
 @jit_inline
@@ -175,7 +172,7 @@ def unlist_cars(b: int, state: State, labels: Labels, desk: Desk) -> None:
 
 @jit_inline
 def drive(
-    b: int, n: int, tick: int, lonely: bool, state: State, labels: Labels, roads: RoadTable,
+    b: int, n: int, tick: int, lonely: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
 ) -> None:  # fmt: skip
     """Write the command of a car; a `lonely` one has nothing around that matters to a car that just drives on."""
@@ -191,9 +188,12 @@ def drive(
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
+    free = lonely and just_drives(ints, floats)
+    if free and drive_on(b, n, part, left, px, py, outside, way, state, labels, roads, drivers, desk):
+        return
+    enlist(b, n, sight2, state, labels, desk)
     near = 0
-    free = lonely and just_drives(ints, floats, drivers.way[b, n])
-    if not free:
+    if not (free and drivers.way[b, n, CROSSING] != 0.0):
         near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, desk)
     gap, who, close = look_ahead(
         b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, desk
@@ -213,38 +213,22 @@ def drive(
     if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
         turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
-    if free:
-        begin_coasting(b, n, speed, part, left, outside, x, y, way, labels, roads, drivers)
-    if put_off(b, n, speed, left - offset, px, py, bend, close, labels, obstacles, drivers, desk):
+    if put_off(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, desk):
         return
     speed, yaw_rate = move(
         b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,
         labels, obstacles, drivers, desk,
     )  # fmt: skip
-    if (
-        speed != 0.0
-        and ints[KIND] == ROUND
-        and strays(b, n, speed, yaw_rate, left, part, state, roads, drivers)
-    ):
+    if speed != 0.0 and ints[KIND] == ROUND and strays(b, n, speed, yaw_rate, way, state, roads, drivers):
         speed = 0.0
     commands[b, n, 0] = speed
     commands[b, n, 1] = yaw_rate
 
 
 @jit_inline
-def just_drives(ints: Any, floats: Any, way: Any) -> bool:
-    """Tell whether a car does nothing for which it looks at cars that are far away."""
-    plain = ints[KIND] != NEMESIS and ints[MOOD] & TAILGATING == 0 and floats[ASIDE] == 0.0
-    return plain and way[CROSSING] != 0.0
-
-
-@jit_inline
-def cruise(hurries: bool, in_disc: bool, build: Any, floats: Any) -> float:
-    """Return the speed at which a car drives if nothing is in its way."""
-    speed = build[FASTEST] if hurries else floats[SPEED]
-    if in_disc:
-        speed = min(max(speed, build[THROUGH_SPEED]), build[FASTEST])
-    return speed
+def just_drives(ints: Any, floats: Any) -> bool:
+    """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
+    return ints[KIND] != NEMESIS and ints[MOOD] & TAILGATING == 0 and floats[ASIDE] == 0.0
 
 
 @jit_inline
@@ -282,23 +266,15 @@ def dawdle(
 
 @jit_inline
 def strays(
-    b: int, n: int, speed: float, yaw_rate: float, left: float, part: int, state: State, roads: RoadTable,
-    drivers: Drivers,
-) -> bool:  # fmt: skip
-    """Tell whether a motion takes the centre off the road, or nearly.
-
-    The look at the roads is spared who is on a lane, and farther from the edge of its road than it drives.
-    """
-    build = drivers.build[b]
+    b: int, n: int, speed: float, yaw_rate: float, way: Way, state: State, roads: RoadTable, drivers: Drivers
+) -> bool:
+    """Tell whether a motion takes the centre off the road, or nearly."""
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    if keeps_to_road(b, n, x, y, way, roads, drivers):
+        return False
     net = drivers.net[b]
     edge = float(roads.half_width[net]) - VERGE
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    row = drivers.way[b, n]
-    if part == BEFORE and abs(left - build[MIDDLE]) + abs(speed) * build[PERIOD] < edge - SURELY:
-        to_go = (row[WAY] - x) * row[WAY + 2] + (row[WAY + 1] - y) * row[WAY + 3]
-        if abs(speed) * build[PERIOD] < to_go < row[LENGTH] - abs(speed) * build[PERIOD]:
-            return False
-    return leaves_road(x, y, c, s, speed, yaw_rate, build[PERIOD], edge, roads, net)
+    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.build[b, PERIOD], edge, roads, net)
 
 
 @jit_inline

@@ -52,14 +52,15 @@ stands makes a car overtake, and what must be free of the right lane, metres; fo
 
 IN, OUT, CROSSING, LENGTH = range(4)
 WAY = 4
-COAST_LOW_X, COAST_HIGH_X, COAST_LOW_Y, COAST_HIGH_Y, COAST_SPEED, COAST_BEND, COAST_LANE, COAST_CROSSES = (
-    range(16, 24)
+COAST_LOW, COAST_HIGH, COAST_PAST, COAST_SPEED, COAST_BEND, COAST_LANE, COAST_CROSSES, OUT_LENGTH = range(
+    16, 24
 )
 WAYS = 24
 """Columns of `Drivers.way`: the two lanes whose way the row holds (-1: none yet), whether there is a crossing between
 them, metres of the first, and from WAY on the fields of the `driving.turn_arcs.Way`. Of a car that
-just drives on (`driving.coasting`): a rectangle in which it goes on so, its speed, m/s, the curvature of its line, 1/m,
-the lane of its lane state and the disc that its body meets.
+just drives on (`driving.coasting`): the stretch on which it goes on so, metres along the first lane from the arc's
+centre (from LOW to HIGH) and along the second (to PAST), its speed, m/s, the curvature of its line, 1/m, the lane of
+its lane state and the disc that its body meets. OUT_LENGTH: metres of the second lane.
 """
 
 LONGEST_WAY = 2.21
@@ -68,6 +69,16 @@ PROMPT = 0.8
 
 ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
 """Bits of MOOD."""
+
+
+DUE, LATE_SPEED, LATE_LEFT, LATE_X, LATE_Y, LATE_BEND, LATE_C, LATE_S, LATE_YAW = range(9)
+LATE = 9
+BLOCK = 32
+"""`Desk.late`: blocks of BLOCK cars, each LATE columns of BLOCK numbers.
+
+DUE: 1 if a command has been put off. Allowed speed, m/s; metres left of the line to follow; its direction (X, Y); its
+curvature, 1/m; the heading (C, S); and the yaw rate that is found, rad/s, as the speed is then found in LATE_SPEED.
+"""
 
 
 class Drivers(NamedTuple):
@@ -93,8 +104,8 @@ class Drivers(NamedTuple):
 
 class Desk(NamedTuple):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
-    lanes that the ego will probably take; `late` (N, 6): commands put off; `apart` (N,): for
-    who does not know how far cars are apart, 0.
+    lanes that the ego will probably take; `late`: commands put off; `apart` (N,): for
+    who does not know how far cars are apart, 0; `listed` (1,): who is in the lists.
     """
 
     head: Ints
@@ -106,6 +117,7 @@ class Desk(NamedTuple):
     chain: Ints
     late: Floats
     apart: Floats
+    listed: Ints
 
 
 def blank(cars: int) -> tuple[Ints, Floats]:
@@ -130,8 +142,9 @@ def desk(cars: int, segments: int) -> Desk:
         queue=np.zeros(2 * segments, dtype=np.int64),
         cost=np.zeros(4),
         chain=np.zeros(4, dtype=np.int64),
-        late=np.zeros((cars, 6)),
+        late=np.zeros((cars + BLOCK - 1) // BLOCK * BLOCK * LATE),
         apart=np.zeros(cars),
+        listed=np.zeros(1, dtype=np.int64),
     )
 
 

@@ -9,18 +9,15 @@ import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.coasting import note
 from dubins_traffic.driving.law_tables import (
     ASIDE,
     FASTEST,
     HALF_LENGTH,
     HALF_WIDTH,
-    KIND,
     LEFT_SIDE,
     MOOD,
     PERIOD,
     REACH,
-    ROUND,
     ROUNDING,
     SLOWEST,
     TIGHTEST,
@@ -31,7 +28,6 @@ from dubins_traffic.driving.law_tables import (
 from dubins_traffic.driving.passing import stays_right
 from dubins_traffic.driving.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.driving.turn_arcs import Way
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.spec.propositions import LEFT
 
@@ -53,18 +49,23 @@ def move(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
     build = drivers.build[b]
-    c, s = state.c[b, n], state.s[b, n]
+    c, s, limit = state.c[b, n], state.s[b, n], build[YAW_MOST]
     passes = drivers.floats[b, n, ASIDE] != 0.0
     steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
     aligned = NIMBLE if passes and left < offset else ALIGNED
-    speed, yaw_rate = steer(c, s, left - offset, px, py, bend, allowed, steep, aligned, build)
+    allowed = slowed(allowed, bend, limit)
+    speed, yaw_rate = steer(
+        c, s, left - offset, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+    )
     if passes or build[TIGHTEST] > 0.0:
         speed, yaw_rate = keep_right(
             b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, desk
         )
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
     if not safe and passes and offset == 0.0:
-        speed, yaw_rate = steer(c, s, 0.0, px, py, bend, allowed, steep, aligned, build)
+        speed, yaw_rate = steer(
+            c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+        )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
     if not safe:
         speed = 0.0
@@ -73,38 +74,6 @@ def move(
         ):
             yaw_rate = 0.0
     return speed, yaw_rate
-
-
-@jit_inline
-def put_off(
-    b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, close: bool, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
-) -> bool:  # fmt: skip
-    """Leave the command of a car with nothing close around it, that just drives on, to `catch_up`, if it is one.
-
-    What is put off is done for one car after another, with nothing between, which takes less time.
-    """
-    free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.ints[b, n, KIND] != ROUND
-    bound = drivers.floats[b, n, ASIDE] != 0.0 or drivers.build[b, TIGHTEST] > 0.0
-    if not free or bound or np.int64(labels.bits[b, n]) & LEFT != 0:
-        return False
-    note(n, speed, left, px, py, bend, desk)
-    return True
-
-
-@jit_inline
-def catch_up(b: int, state: State, drivers: Drivers, desk: Desk, commands: Floats) -> None:
-    """Write the commands that have been put off."""
-    build = drivers.build[b]
-    for n in range(state.count[b]):
-        row = desk.late[n]
-        if row[0] != 0.0:
-            row[0] = 0.0
-            speed, yaw_rate = steer(
-                state.c[b, n], state.s[b, n], row[2], row[3], row[4], row[5], row[1], SLANT, ALIGNED, build
-            )
-            commands[b, n, 0] = speed
-            commands[b, n, 1] = yaw_rate
 
 
 @jit_inline
@@ -128,14 +97,23 @@ def keep_right(
 
 
 @jit_inline
+def slowed(speed: float, bend: float, limit: float) -> float:
+    """Return the speed at which a car follows a line of curvature `bend`, 1/m, with a yaw rate of `limit` at most."""
+    if abs(bend) * speed > 0.8 * limit:
+        return 0.8 * limit / abs(bend)
+    return speed
+
+
+@jit_inline
 def steer(
-    c: float, s: float, left: float, px: float, py: float, bend: float, speed: float,
-    most: float, aligned: float, build: Any,
+    c: float, s: float, left: float, px: float, py: float, bend: float, speed: float, most: float, aligned: float,
+    limit: float, tightest: float, period: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (speed, yaw rate) of a car `left` of the line it should drive, whose direction is (px, py).
 
-    `bend` is the line's curvature, 1/m, `most` the sine of the largest angle to that line, `aligned` the cosine beyond
-    which the car turns in place.
+    `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
+    line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
+    `limit` is its largest yaw rate. All is worked out whatever the case, so that `late.catch_up` has no branches.
     """
     sine = min(max(-left / HURRY, -most), most)
     cosine = sqrt(1.0 - sine * sine)
@@ -143,22 +121,18 @@ def steer(
     hy = py * cosine + px * sine
     cross = c * hy - s * hx
     dot = c * hx + s * hy
-    limit = build[YAW_MOST]
-    if dot < aligned and build[TIGHTEST] == 0.0:
-        turn = limit
-        if dot > 0.0:
-            turn = min(limit, abs(cross) / build[PERIOD])
-        return 0.0, turn if cross >= 0.0 else -turn
-    if abs(bend) * speed > 0.8 * limit:
-        speed = 0.8 * limit / abs(bend)
-    if speed == 0.0:
-        return 0.0, 0.0
+    in_a_tick = abs(cross) / period
+    spin = min(limit, in_a_tick) if dot > 0.0 else limit
+    spin = spin if cross >= 0.0 else -spin
     yaw_rate = speed * bend + GAIN * cross
-    if build[TIGHTEST] > 0.0:
-        limit = min(limit, speed / build[TIGHTEST])
+    if tightest > 0.0:
+        limit = min(limit, speed / tightest)
         if dot < 0.0:
             yaw_rate = limit if cross >= 0.0 else -limit
-    return speed, min(max(yaw_rate, -limit), limit)
+    yaw_rate = min(max(yaw_rate, -limit), limit)
+    yaw_rate = yaw_rate if speed != 0.0 else 0.0
+    turns = dot < aligned and tightest == 0.0
+    return 0.0 if turns or speed == 0.0 else speed, spin if turns else yaw_rate
 
 
 @jit
