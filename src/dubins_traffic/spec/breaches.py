@@ -20,6 +20,7 @@ from dubins_traffic.spec.docket import (
     LEFT_SINCE,
     LEFT_UNBLOCKED,
     MOST_TICKETS,
+    NEVER_DUE,
     OF_CAR,
     OF_RULE,
     OF_TRIAL,
@@ -81,6 +82,13 @@ def run(holds: bool, tick: int, clock: Ints, which: int) -> int:
     if clock[which] < 0:
         clock[which] = tick
     return tick - clock[which]
+
+
+@jit_inline
+def when_due(tick: int, clock: Ints, which: int, ago: int) -> int:
+    """Return the tick in which a run will have gone on for `ago` ticks, `NEVER_DUE` if none will after this one."""
+    due = clock[which] + ago
+    return due if clock[which] >= 0 and due > tick else NEVER_DUE
 
 
 @jit_inner

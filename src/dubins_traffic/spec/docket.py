@@ -67,6 +67,9 @@ CLOCKS: Final = 8
 NEVER: Final = -2
 """In `OFF_ROAD`: the car has never been on the road."""
 
+NEVER_DUE: Final = 1 << 62
+"""A tick that never comes."""
+
 BITS: Final = 0
 LANE: Final = 1
 CROSSES: Final = 2
@@ -114,12 +117,18 @@ class Docket(NamedTuple):
     ----------
     past : (B, N, PAST) int64
         Flags, lane state, disc that the body meets and disc that holds the centre, of the frame before.
+    due : (B, N) int64
+        Tick in which each car has to be looked at though its labels stay as they are and nobody comes near.
     clock : (B, N, CLOCKS) int64
         First tick of the present run of: off the road (ego; `NEVER` before it has been on one), left, left and not
         overtaking, stopped, first at a clear crossing, in a disc with a free exit, standing with a free way, where it
         is: at a vertex or none; -1 where there is no run.
     goal_clock : (G,) int64
         First tick of the present run of a goal being taken; -1 while it is free.
+    goal_due : (B,) int64
+        Tick in which the goals have to be looked at though no car comes or goes.
+    look : (N,) int64
+        Scratch: the cars to be looked at.
     row : (K, COLUMNS) int64
         Breaches found: trial, number of the rule, car, tick, tick since which, vertex, lane.
     filled : (1,) int64
@@ -127,8 +136,11 @@ class Docket(NamedTuple):
     """
 
     past: Ints
+    due: Ints
     clock: Ints
     goal_clock: Ints
+    goal_due: Ints
+    look: Ints
     row: Ints
     filled: Ints
 
@@ -142,8 +154,11 @@ class Docket(NamedTuple):
         room = (MOST * trials * cars + goals) * frames
         return Docket(
             past,
+            np.zeros((trials, cars), dtype=np.int64),
             clock,
             np.full(goals, -1, dtype=np.int64),
+            np.zeros(trials, dtype=np.int64),
+            np.zeros(cars, dtype=np.int64),
             np.zeros((room, COLUMNS), dtype=np.int64),
             np.zeros(1, dtype=np.int64),
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from dubins_traffic.cars.near import Spacing, list_near, lost
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.arrays import Bits, Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -22,12 +22,14 @@ from dubins_traffic.spec.breaches import (
     judge_queue,
     judge_road,
     run,
+    when_due,
 )
 from dubins_traffic.spec.docket import (
     AT,
     AT_SINCE,
     BITS,
     CROSSES,
+    ENTER_TICKS,
     EXIT,
     EXIT_SINCE,
     EXIT_TICKS,
@@ -38,9 +40,11 @@ from dubins_traffic.spec.docket import (
     LANE,
     LEFT_SINCE,
     LONE,
+    NEVER_DUE,
     REST,
     REST_SINCE,
     REST_TICKS,
+    RETURN_TICKS,
     STOPPED_SINCE,
     UNBLOCKED_SINCE,
     WAY,
@@ -55,18 +59,17 @@ from dubins_traffic.spec.propositions import (
     ENTERED,
     IN_CROSSING,
     LEFT,
-    ON_ROAD,
     STANDS,
     STOPPED,
 )
 from dubins_traffic.spec.tables import (
     NET,
+    TICKET,
     Memory,
     RuleTable,
 )
 
 ENTERS = ENTERED | IN_CROSSING
-BUSY = LEFT | STOPPED | STANDS | ENTERED
 FAR: float = 1e300
 
 
@@ -130,54 +133,103 @@ def judge_trial(
     docket: Docket,
 ) -> None:
     """Do as `judge_frame`, of one trial."""
-    row = docket.row
-    filled = docket.filled
     cars = state.count[b]
-    whole = terms.whole[b]
-    past = docket.past[b]
     enough = lost(spacing, b, tick) + terms.real[b, LONE] if obstacles.base[b] < 0 else FAR
-    changed = False
-    for n in range(cars):
-        bits = np.int64(labels.bits[b, n])
-        lane = labels.lane[b, n]
-        v = labels.crosses[b, n]
-        at = labels.at[b, n]
-        own = past[n]
+    count = _list_due(b, tick, cars, enough, spacing, labels, memory, docket)
+    arrived = tick == docket.goal_due[b]
+    for i in range(count):
+        n = docket.look[i]
+        arrived |= docket.past[b, n, AT] != labels.at[b, n]
         lonely = spacing.apart[b, n] > enough
-        if _quiet(n, bits, own) and own[LANE] == lane and own[CROSSES] == v and own[AT] == at:
-            if v >= 0 and n != EGO:
-                _judge_exit(
-                    b, n, tick, lane, v, lonely, spacing, state, roads, obstacles, rules, terms, labels, docket
-                )  # fmt: skip
-            continue
-        changed = True
-        clock = docket.clock[b, n]
-        if bits & LEFT != 0:
-            judge_lane(b, n, tick, bits, lane, whole, clock, row, filled)
-        else:
-            clock[LEFT_SINCE] = -1
-            clock[UNBLOCKED_SINCE] = -1
-        if bits & ENTERS == ENTERS:
-            stopped = False
-            if own[BITS] & STOPPED != 0:
-                stopped = lane_end(roads, rules.whole[b, NET], own[LANE]) == v
-            _judge_entry(b, n, tick, v, stopped, spacing, state, roads, rules, terms, docket)
-        if n == EGO:
-            judge_road(b, tick, bits, lane, clock, row, filled)
-            continue
-        _judge_agent(
+        _judge_car(
+            b, n, tick, lonely, spacing, state, roads, obstacles, rules, terms, labels, memory, docket
+        )  # fmt: skip
+    if arrived:
+        _judge_goals(b, tick, cars, terms, labels, docket)
+    for i in range(count):
+        n = docket.look[i]
+        own = docket.past[b, n]
+        own[BITS] = labels.bits[b, n]
+        own[LANE] = labels.lane[b, n]
+        own[CROSSES] = labels.crosses[b, n]
+        own[AT] = labels.at[b, n]
+
+
+@jit_inline
+def _list_due(
+    b: int,
+    tick: int,
+    cars: int,
+    enough: float,
+    spacing: Spacing,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> int:
+    """List the cars of which something may begin, end or be due in this frame in `docket.look`; return how many.
+
+    These are cars whose labels are not those of the frame before, who have got a ticket, whose clocks have run for
+    long enough, and cars in discs that are not farther than `enough` from all others.
+    """
+    past, due, look = docket.past[b], docket.due[b], docket.look
+    count = 0
+    for n in range(cars):
+        own = past[n]
+        crosses = labels.crosses[b, n]
+        other = (np.int64(labels.bits[b, n]) ^ own[BITS]) | (labels.lane[b, n] ^ own[LANE])
+        other |= (crosses ^ own[CROSSES]) | (labels.at[b, n] ^ own[AT])
+        crowded = (crosses >= 0) & (spacing.apart[b, n] <= enough) & (n != EGO)
+        ticket = memory.mark[b, n, TICKET] == tick
+        look[count] = n
+        count += 1 if (other != 0) | crowded | ticket | (tick >= due[n]) else 0
+    return count
+
+
+@jit_inline
+def _judge_car(
+    b: int,
+    n: int,
+    tick: int,
+    lonely: bool,
+    spacing: Spacing,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleLanes,
+    rules: RuleTable,
+    terms: Terms,
+    labels: Labels,
+    memory: Memory,
+    docket: Docket,
+) -> None:
+    """Judge a car of which something may have begun, and find when it has to be looked at again."""
+    whole = terms.whole[b]
+    clock = docket.clock[b, n]
+    own = docket.past[b, n]
+    bits = np.int64(labels.bits[b, n])
+    lane = labels.lane[b, n]
+    v = labels.crosses[b, n]
+    if bits & LEFT != 0:
+        judge_lane(b, n, tick, bits, lane, whole, clock, docket.row, docket.filled)
+    else:
+        clock[LEFT_SINCE] = -1
+        clock[UNBLOCKED_SINCE] = -1
+    if bits & ENTERS == ENTERS:
+        stopped = False
+        if own[BITS] & STOPPED != 0:
+            stopped = lane_end(roads, rules.whole[b, NET], own[LANE]) == v
+        _judge_entry(b, n, tick, v, stopped, spacing, state, roads, rules, terms, docket)
+    due = when_due(tick, clock, LEFT_SINCE, whole[RETURN_TICKS])
+    if n == EGO:
+        judge_road(b, tick, bits, lane, clock, docket.row, docket.filled)
+    else:
+        again = _judge_agent(
             b, n, tick, bits, lane, v, lonely, spacing, state, roads, obstacles, rules, terms, labels, memory,
             docket,
         )  # fmt: skip
-        if own[AT] != at:
+        due = min(due, again)
+        if own[AT] != labels.at[b, n]:
             clock[AT_SINCE] = tick
-    _judge_goals(b, tick, cars, terms, labels, docket)
-    if changed:
-        for n in range(cars):
-            past[n, BITS] = labels.bits[b, n]
-            past[n, LANE] = labels.lane[b, n]
-            past[n, CROSSES] = labels.crosses[b, n]
-            past[n, AT] = labels.at[b, n]
+    docket.due[b, n] = due
 
 
 @jit
@@ -193,22 +245,16 @@ def _judge_entry(
 
 
 @jit_inline
-def _quiet(n: int, bits: Any, own: Ints) -> bool:
-    """Tell whether nothing runs of a car whose flags are those of the frame before, `own`, but for E4."""
-    return own[BITS] == bits and bits & BUSY == 0 and (n != EGO or bits & ON_ROAD != 0)
-
-
-@jit_inline
 def _judge_goals(b: int, tick: int, cars: int, terms: Terms, labels: Labels, docket: Docket) -> None:
-    """E6: no goal is taken for too long."""
+    """E6: no goal is taken for too long; find when one will be, if no car comes or goes."""
+    ago = terms.whole[b, GOAL_TICKS]
+    due = NEVER_DUE
     for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
         who = at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
-        if who < 0:
-            docket.goal_clock[g] = -1
-        elif docket.goal_clock[g] < 0:
-            docket.goal_clock[g] = tick
-        if who >= 0 and tick - docket.goal_clock[g] == terms.whole[b, GOAL_TICKS]:
+        if run(who >= 0, tick, docket.goal_clock, g) == ago:
             add(b, GOAL, who, tick, docket.goal_clock[g], terms.goal[g], -1, docket.row, docket.filled)
+        due = min(due, when_due(tick, docket.goal_clock, g, ago))
+    docket.goal_due[b] = due
 
 
 @jit_inline
@@ -253,8 +299,11 @@ def _judge_agent(
     labels: Labels,
     memory: Memory,
     docket: Docket,
-) -> None:
-    """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1)."""
+) -> int:
+    """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1).
+
+    Returns the next tick in which more may be due, if its labels stay as they are.
+    """
     whole, row, filled, clock = terms.whole[b], docket.row, docket.filled, docket.clock[b, n]
     if bits & STOPPED != 0:
         ahead = lane_end(roads, rules.whole[b, NET], lane)
@@ -268,13 +317,19 @@ def _judge_agent(
         _judge_exit(
             b, n, tick, lane, v, lonely, spacing, state, roads, obstacles, rules, terms, labels, docket
         )
+    due = when_due(tick, clock, FIRST_SINCE, whole[ENTER_TICKS])
+    due = min(due, when_due(tick, clock, EXIT_SINCE, whole[EXIT_TICKS]))
+    if v >= 0 and clock[EXIT_SINCE] < 0:
+        due = tick + 1
     free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
     if free:
+        due = tick + 1
         free = has_way(
             n, state.count[b], terms.real[b, WAY], labels.lane[b], labels.bits[b], memory.measure[b]
         )
     if run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
         add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
+    return due
 
 
 @jit
