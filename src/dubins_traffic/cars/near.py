@@ -18,6 +18,8 @@ CELL = 4.0
 """Side of the cells in which the nearest of more cars is looked for, metres; beyond that it does not matter."""
 EVERY = 8
 """Ticks after which it is looked anew how far cars are apart."""
+LONG = 1e6
+"""Ticks beyond which it does not matter how many they are."""
 
 
 class Spacing(NamedTuple):
@@ -66,6 +68,14 @@ def unknown(trials: int, cars: int) -> Spacing:
 def lost(own: Spacing, b: int, tick: int) -> float:
     """Return how much nearer two cars of trial b may be in frame `tick` than `apart` says, metres."""
     return 2.0 * (tick - own.since[b]) * own.drift[b]
+
+
+@jit_inline
+def ticks_within(distance: float, own: Spacing, b: int) -> int:
+    """Return for how many ticks, at least 1, no car of trial b drives `distance` metres; 1 if nothing is known."""
+    if distance <= own.drift[b] or own.drift[b] <= 0.0:
+        return 1
+    return int(min(distance / own.drift[b], LONG))
 
 
 @jit_inline

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dubins_traffic.cars.near import Spacing, list_near
+from math import sqrt
+
+from dubins_traffic.cars.near import Spacing, list_near, ticks_within
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
@@ -14,6 +16,7 @@ from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
     FREE_NEEDED,
+    GRAIN,
     HALF_LENGTH,
     HALF_WIDTH,
     LANE_WIDTH,
@@ -39,7 +42,7 @@ def find_exit(
     terms: Terms,
     labels: Labels,
 ) -> bool:
-    """Do what `has_exit` does, by a look at each lane and each of the first `count` cars of `crowd`."""
+    """Do what `look_for_exit` does, by a look at each lane and each of the first `count` cars of `crowd`."""
     real = rules.real[b]
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v
@@ -81,7 +84,7 @@ def find_exit(
 
 
 @jit_inline
-def has_exit(
+def look_for_exit(
     b: int,
     n: int,
     tick: int,
@@ -93,22 +96,30 @@ def has_exit(
     rules: RuleTable,
     terms: Terms,
     labels: Labels,
-) -> bool:
-    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane.
+) -> tuple[bool, int]:
+    """E4: tell whether car n, whose body meets the disc of v, may leave by some lane, and when to ask again.
 
-    Who is near with his centre outside the disc is in the way to one lane at most.
+    Who is near with his centre outside the disc is in the way to one lane at most. Where fewer are near than there are
+    lanes, an exit is free until another one can have come near, or into the disc.
     """
     row = t.vert_off[rules.whole[b, NET]] + v
     vx, vy = t.vert[row, 0], t.vert[row, 1]
-    far2 = terms.real[b, NEAR2]
+    far2, lone = terms.real[b, NEAR2], terms.real[b, LONE]
     near = 0
-    count = list_near(state, b, tick, float(vx), float(vy), terms.real[b, LONE], spacing)
+    nearest2 = beyond2 = lone * lone
+    count = list_near(state, b, tick, float(vx), float(vy), lone, spacing)
     for i in range(count):
         k = spacing.near[i]
+        if k == n:
+            continue
         dx = state.x[b, k] - vx
         dy = state.y[b, k] - vy
-        near += 1 if k != n and dx * dx + dy * dy <= far2 else 0
-        near += 4 if k != n and labels.at[b, k] == v else 0
+        d2 = dx * dx + dy * dy
+        near += 1 if d2 <= far2 else 0
+        near += 4 if labels.at[b, k] == v else 0
+        nearest2 = min(nearest2, d2)
+        beyond2 = min(beyond2, d2 if d2 > far2 else beyond2)
     if near < t.degree[row] and obstacles.base[b] < 0:
-        return True
-    return find_exit(b, n, v, spacing.near, count, state, t, obstacles, rules, terms, labels)
+        spare = min(sqrt(nearest2) - rules.real[b, RADIUS], sqrt(beyond2) - sqrt(far2)) - GRAIN
+        return True, tick + ticks_within(spare, spacing, b)
+    return find_exit(b, n, v, spacing.near, count, state, t, obstacles, rules, terms, labels), tick + 1

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.near import Spacing, list_near, lost
+from dubins_traffic.cars.near import Spacing, list_near
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
@@ -51,7 +51,7 @@ from dubins_traffic.spec.docket import (
     Docket,
     Terms,
 )
-from dubins_traffic.spec.exits import has_exit
+from dubins_traffic.spec.exits import look_for_exit
 from dubins_traffic.spec.frame import label_tables
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
@@ -70,7 +70,6 @@ from dubins_traffic.spec.tables import (
 )
 
 ENTERS = ENTERED | IN_CROSSING
-FAR: float = 1e300
 
 
 # Where each table begins and ends among the arrays of a call.
@@ -134,15 +133,13 @@ def judge_trial(
 ) -> None:
     """Do as `judge_frame`, of one trial."""
     cars = state.count[b]
-    enough = lost(spacing, b, tick) + terms.real[b, LONE] if obstacles.base[b] < 0 else FAR
-    count = _list_due(b, tick, cars, enough, spacing, labels, memory, docket)
+    count = _list_due(b, tick, cars, labels, memory, docket)
     arrived = tick == docket.goal_due[b]
     for i in range(count):
         n = docket.look[i]
         arrived |= docket.past[b, n, AT] != labels.at[b, n]
-        lonely = spacing.apart[b, n] > enough
         _judge_car(
-            b, n, tick, lonely, spacing, state, roads, obstacles, rules, terms, labels, memory, docket
+            b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, docket
         )  # fmt: skip
     if arrived:
         _judge_goals(b, tick, cars, terms, labels, docket)
@@ -156,32 +153,20 @@ def judge_trial(
 
 
 @jit_inline
-def _list_due(
-    b: int,
-    tick: int,
-    cars: int,
-    enough: float,
-    spacing: Spacing,
-    labels: Labels,
-    memory: Memory,
-    docket: Docket,
-) -> int:
+def _list_due(b: int, tick: int, cars: int, labels: Labels, memory: Memory, docket: Docket) -> int:
     """List the cars of which something may begin, end or be due in this frame in `docket.look`; return how many.
 
-    These are cars whose labels are not those of the frame before, who have got a ticket, whose clocks have run for
-    long enough, and cars in discs that are not farther than `enough` from all others.
+    These are cars whose labels are not those of the frame before, who have got a ticket, or whose time has come.
     """
     past, due, look = docket.past[b], docket.due[b], docket.look
     count = 0
     for n in range(cars):
         own = past[n]
-        crosses = labels.crosses[b, n]
         other = (np.int64(labels.bits[b, n]) ^ own[BITS]) | (labels.lane[b, n] ^ own[LANE])
-        other |= (crosses ^ own[CROSSES]) | (labels.at[b, n] ^ own[AT])
-        crowded = (crosses >= 0) & (spacing.apart[b, n] <= enough) & (n != EGO)
+        other |= (labels.crosses[b, n] ^ own[CROSSES]) | (labels.at[b, n] ^ own[AT])
         ticket = memory.mark[b, n, TICKET] == tick
         look[count] = n
-        count += 1 if (other != 0) | crowded | ticket | (tick >= due[n]) else 0
+        count += 1 if (other != 0) | ticket | (tick >= due[n]) else 0
     return count
 
 
@@ -190,7 +175,6 @@ def _judge_car(
     b: int,
     n: int,
     tick: int,
-    lonely: bool,
     spacing: Spacing,
     state: State,
     roads: RoadTable,
@@ -223,7 +207,7 @@ def _judge_car(
         judge_road(b, tick, bits, lane, clock, docket.row, docket.filled)
     else:
         again = _judge_agent(
-            b, n, tick, bits, lane, v, lonely, spacing, state, roads, obstacles, rules, terms, labels, memory,
+            b, n, tick, bits, lane, v, spacing, state, roads, obstacles, rules, terms, labels, memory,
             docket,
         )  # fmt: skip
         due = min(due, again)
@@ -264,7 +248,6 @@ def _judge_exit(
     tick: int,
     lane: int,
     v: int,
-    lonely: bool,
     spacing: Spacing,
     state: State,
     roads: RoadTable,
@@ -273,12 +256,13 @@ def _judge_exit(
     terms: Terms,
     labels: Labels,
     docket: Docket,
-) -> None:
-    """E4, of an e-agent whose body meets the disc of v; if it is `lonely` nobody is in its way."""
-    clock = docket.clock[b, n]
-    free = lonely or has_exit(b, n, tick, v, spacing, state, roads, obstacles, rules, terms, labels)
-    if run(free, tick, clock, EXIT_SINCE) == terms.whole[b, EXIT_TICKS]:
+) -> int:
+    """E4, of an e-agent whose body meets the disc of v; return when to ask again, if its labels stay as they are."""
+    clock, ago = docket.clock[b, n], terms.whole[b, EXIT_TICKS]
+    free, again = look_for_exit(b, n, tick, v, spacing, state, roads, obstacles, rules, terms, labels)
+    if run(free, tick, clock, EXIT_SINCE) == ago:
         add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, docket.row, docket.filled)
+    return min(again, when_due(tick, clock, EXIT_SINCE, ago))
 
 
 @jit_inline
@@ -289,7 +273,6 @@ def _judge_agent(
     bits: Any,
     lane: int,
     v: int,
-    lonely: bool,
     spacing: Spacing,
     state: State,
     roads: RoadTable,
@@ -313,14 +296,12 @@ def _judge_agent(
         clock[FIRST_SINCE] = -1
     if docket.past[b, n, CROSSES] != v or v < 0:
         clock[EXIT_SINCE] = -1
-    if v >= 0:
-        _judge_exit(
-            b, n, tick, lane, v, lonely, spacing, state, roads, obstacles, rules, terms, labels, docket
-        )
     due = when_due(tick, clock, FIRST_SINCE, whole[ENTER_TICKS])
-    due = min(due, when_due(tick, clock, EXIT_SINCE, whole[EXIT_TICKS]))
-    if v >= 0 and clock[EXIT_SINCE] < 0:
-        due = tick + 1
+    if v >= 0:
+        again = _judge_exit(
+            b, n, tick, lane, v, spacing, state, roads, obstacles, rules, terms, labels, docket
+        )  # fmt: skip
+        due = min(due, again)
     free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
     if free:
         due = tick + 1
