@@ -11,11 +11,19 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.roads.lookup import patch
+from dubins_traffic.roads.lookup import nearest_arm, patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
 from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.tables import CALM_HIGH_X, CALM_HIGH_Y, CALM_LOW_X, CALM_LOW_Y
+from dubins_traffic.spec.tables import (
+    CALM_HIGH_X,
+    CALM_HIGH_Y,
+    CALM_LOW_X,
+    CALM_LOW_Y,
+    PATCH_SEGMENT,
+    RING_HIGH,
+    RING_LOW,
+)
 
 
 def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
@@ -23,7 +31,7 @@ def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
     table = pack([network], [0.6])
     random = np.random.default_rng(3)
     row = np.zeros(6)
-    filled = 0
+    filled = forked = 0
     for x, y in random.uniform((-1.0, -1.0), (13.0, 9.0), (400, 2)):
         patch(table, 0, x, y, row)
         if not (row[0] < row[1] and row[2] < row[3]):
@@ -32,9 +40,16 @@ def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
         assert row[0] <= x <= row[1]
         assert row[2] <= y <= row[3]
         points = random.uniform((row[0], row[2]), (row[1], row[3]), (20, 2))
-        assert (network.surface.nearest_segment(points)[0] == row[4]).all()
+        nearest = network.surface.nearest_segment(points)[0]
+        if row[4] < 0:
+            forked += 1
+            assert (network.ends[nearest] == row[5]).any(axis=1).all()
+            assert [nearest_arm(table, 0, int(row[5]), *point)[0] for point in points] == nearest.tolist()
+        else:
+            assert (nearest == row[4]).all()
         assert (network.surface.nearest_vertex(points)[0] == row[5]).all()
     assert filled > 300
+    assert forked > 50
 
 
 @pytest.mark.parametrize("agents", [6, 30])
@@ -63,7 +78,7 @@ def test_no_car_is_nearer_than_is_known(agents) -> None:
         assert (
             own.apart[0] - lost - 1e-6 <= np.minimum(far.min(axis=1), CELL if agents > 24 else np.inf)
         ).all()
-        assert own.least[0] <= own.apart[0].min()
+        assert own.least[0] <= own.apart[0, : agents + 1].min()
         count = list_near(group.state, 0, tick, 4.0, 4.0, 3.0, own)
         near = np.hypot(group.state.x[0] - 4.0, group.state.y[0] - 4.0) <= 3.0
         assert set(np.flatnonzero(near)) <= set(own.near[:count])
@@ -118,6 +133,10 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             points = random.uniform(low, high, (20, 2))
             segment, far = surface.nearest_segment(points)
             vertex, away = surface.nearest_vertex(points)
+            kept = (row[RING_LOW] < away * away) & (away * away < row[RING_HIGH])
+            if row[PATCH_SEGMENT] < 0:
+                kept &= segment == labels.segment[0, n]
+            segment, far, vertex, away = segment[kept], far[kept], vertex[kept], away[kept]
             cross = problem.intersection_radius + problem.car.body.reach
             assert (segment == labels.segment[0, n]).all()
             assert (far <= problem.car.lane_width).all()

@@ -30,6 +30,7 @@ from dubins_traffic.campaign.batch_kernel import (
     run_trials,
 )
 from dubins_traffic.cars.near import Spacing, spacing
+from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Labels, State
 from dubins_traffic.driving.lane_graph import nearest_stage
 from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
@@ -97,7 +98,7 @@ class Group:
         self._rate = instances[0].problem.rate
         problems = [instance.problem for instance in instances]
         simulator = Embedded()
-        self.state: State = simulator.reset(instances)
+        self.state: State = simulator.reset(instances, TOGETHER if keeps_rules else 1)
         trials, places = self.state.x.shape
         labeller = Labeller(instances)
         labeller.begin(trials, places)

@@ -9,7 +9,7 @@ from typing import Any
 
 from dubins_traffic.cars.near import FEW, candidates
 from dubins_traffic.cars.partners import PARTNERS, VACANT, Workspace, part
-from dubins_traffic.cars.rows import Rows, any_near, clip, look, move
+from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
@@ -138,9 +138,12 @@ def step_trial(
         _resolve(state, commands, cars, obstacles, dt, work, b, pairs)
         part(state, cars, obstacles, work, b)
         return MOVED
-    move(
-        state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt, 0, cars_here
-    )  # fmt: skip
+    if n % TOGETHER == 0:
+        move_fours(state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt)
+    else:
+        move(
+            state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt, 0, cars_here
+        )  # fmt: skip
     if work.touching[b] > 0:
         part(state, cars, obstacles, work, b)
     return MOVED

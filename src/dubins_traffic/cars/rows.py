@@ -20,6 +20,8 @@ from dubins_traffic.kernels.trig import advance
 
 RUN = 32
 """Trials that are looked at together: their rows fit the processor's nearest memory."""
+TOGETHER = 4
+"""Cars of one trial that are moved at once, if it has a multiple of as many places."""
 
 
 class Rows(NamedTuple):
@@ -133,3 +135,23 @@ def move(
     speed, yaw = speed[first:last], yaw[first:last]
     for f in range(last - first):
         x[f], y[f], c[f], s[f] = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
+
+
+@jit
+def move_fours(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
+    """Do as `move`, for all places of one trial.
+
+    Four cars are written out, which become one instruction each; a loop would take more at a time than a trial has.
+    """
+    for f in range(0, x.shape[0], TOGETHER):
+        x0, y0, c0, s0 = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
+        g = f + 1
+        x1, y1, c1, s1 = advance(x[g], y[g], c[g], s[g], speed[g], yaw[g], dt)
+        h = f + 2
+        x2, y2, c2, s2 = advance(x[h], y[h], c[h], s[h], speed[h], yaw[h], dt)
+        i = f + 3
+        x3, y3, c3, s3 = advance(x[i], y[i], c[i], s[i], speed[i], yaw[i], dt)
+        x[f], x[g], x[h], x[i] = x0, x1, x2, x3
+        y[f], y[g], y[h], y[i] = y0, y1, y2, y3
+        c[f], c[g], c[h], c[i] = c0, c1, c2, c3
+        s[f], s[g], s[h], s[i] = s0, s1, s2, s3

@@ -100,6 +100,7 @@ def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
 
 def _compiled(function: Callable[P, R], *, inlined: bool = False, inner: bool = False) -> Callable[P, R]:
     library = cast(Any, numba)
+    library.config.SLP_VECTORIZE = 1  # the same steps for several cars become one instruction
     library.config.CACHE_DIR = str(cache_folder())
     linking.install()
     inner = inner or function.__name__.startswith("_")

@@ -16,6 +16,8 @@ from dubins_traffic.roads.table import RoadTable
 INFINITE = float("inf")
 CERTAIN = 1e-6
 """What rounding can't make up, metres."""
+FORKED = 0.6
+"""Where the second segment is less than this farther than the nearest, metres, nearest is one of those at a vertex."""
 
 
 @jit_inline
@@ -114,22 +116,53 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
 
 
 @jit_inline
-def _two_nearest(
-    t: RoadTable, net: int, cell: int, vertices: bool, x: float, y: float
-) -> tuple[int, float, float]:
-    """Return the nearest of the segments, or the `vertices`, listed in a cell; how far it is; how far the second is."""
-    start = t.vert_start if vertices else t.seg_start
-    listed = t.vert_item if vertices else t.seg_item
+def nearest_arm(t: RoadTable, net: int, v: int, x: float, y: float) -> tuple[int, float]:
+    """Return the nearest of the segments that meet in intersection v, as `nearest_segment` does."""
+    row = t.vert_off[net] + v
+    best = 0
+    least = INFINITE
+    for k in range(t.degree[row]):
+        s = t.arms[row, k] >> 1
+        d2 = distance2(t, net, s, x, y)
+        if d2 < least or (d2 == least and s < best):
+            best = s
+            least = d2
+    return best, least
+
+
+@jit_inline
+def _nearest_vertices(t: RoadTable, net: int, cell: int, x: float, y: float) -> tuple[int, float, float]:
+    """Return the nearest of the vertices listed in a cell; how far it is; how far the second is."""
     best = 0
     least = second = INFINITE
-    for k in range(start[cell], start[cell + 1]):
-        item = listed[k]
-        d2 = vertex_distance2(t, net, item, x, y) if vertices else distance2(t, net, item, x, y)
+    for k in range(t.vert_start[cell], t.vert_start[cell + 1]):
+        v = t.vert_item[k]
+        d2 = vertex_distance2(t, net, v, x, y)
         if d2 < least:
-            best = item
+            best = v
         second = min(second, max(d2, least))
         least = min(d2, least)
     return best, sqrt(least), sqrt(second)
+
+
+@jit_inline
+def _nearest_segments(
+    t: RoadTable, net: int, cell: int, v: int, x: float, y: float
+) -> tuple[int, float, float, float]:
+    """Return the nearest of the segments listed in a cell; how far it is, the second, and the nearest not at v."""
+    best = 0
+    least = second = other = INFINITE
+    for k in range(t.seg_start[cell], t.seg_start[cell + 1]):
+        s = t.seg_item[k]
+        d2 = distance2(t, net, s, x, y)
+        if d2 < least:
+            best = s
+        second = min(second, max(d2, least))
+        least = min(d2, least)
+        row = t.seg_off[net] + s
+        if v not in (t.ends[row, 0], t.ends[row, 1]):
+            other = min(other, d2)
+    return best, sqrt(least), sqrt(second), sqrt(other)
 
 
 @jit
@@ -137,7 +170,8 @@ def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
     """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
 
     The rectangle (x from row[0] to row[1], y from row[2] to row[3], its edges not included) lies within the cell of the
-    point, and within the disc in which nothing else can become nearest. It is empty outside the box of cells.
+    point, and within the disc in which nothing else can become nearest. It is empty outside the box of cells. Where it
+    would be small since roads meet, row[4] is -1 instead: nearest is always one of the roads that meet in the vertex.
     """
     row[0] = row[1] = row[2] = row[3] = 0.0
     cell = cell_of(t, net, x, y)
@@ -147,11 +181,13 @@ def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
         row[4] = s
         row[5] = v
         return
-    row[4], near, second = _two_nearest(t, net, cell, False, x, y)
+    vertex, near, second = _nearest_vertices(t, net, cell, x, y)
     spare = second - near
-    row[5], near, second = _two_nearest(t, net, cell, True, x, y)
-    spare = min(spare, second - near)
-    half = 0.7 * 0.5 * spare - CERTAIN
+    segment, near, second, other = _nearest_segments(t, net, cell, vertex, x, y)
+    if second - near < FORKED and near < other:
+        segment = -1
+        second = other
+    half = 0.7 * 0.5 * min(spare, second - near) - CERTAIN
     side = 1.0 / t.cell_box[net, 2]
     left = t.cell_box[net, 0] + side * int((x - t.cell_box[net, 0]) * t.cell_box[net, 2])
     low = t.cell_box[net, 1] + side * int((y - t.cell_box[net, 1]) * t.cell_box[net, 2])
@@ -159,6 +195,8 @@ def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
     row[1] = min(x + half, left + side - CERTAIN)
     row[2] = max(y - half, low + CERTAIN)
     row[3] = min(y + half, low + side - CERTAIN)
+    row[4] = segment
+    row[5] = vertex
 
 
 @jit_inline

@@ -34,8 +34,11 @@ class Embedded:
 
     capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
 
-    def reset(self, instances: Sequence[Instance]) -> State:
-        """Place the cars of a batch of instances, which share one control rate."""
+    def reset(self, instances: Sequence[Instance], grain: int = 1) -> State:
+        """Place the cars of a batch of instances, which share one control rate.
+
+        Each trial has as many places for cars as the largest one needs, rounded up to a multiple of `grain`.
+        """
         rates = {instance.problem.rate for instance in instances}
         if len(rates) != 1:
             raise InputError(
@@ -45,18 +48,19 @@ class Embedded:
         self._cars = pack_cars([instance.problem.car for instance in instances])
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         counts = [len(instance.starts) for instance in instances]
-        state = State.zeros(len(instances), max(counts))
+        places = -(-max(counts) // grain) * grain
+        state = State.zeros(len(instances), places)
         state.count[:] = counts
-        state.x[:] = ABSENT * np.arange(1, max(counts) + 1)
-        present = np.arange(max(counts)) < state.count[:, None]
+        state.x[:] = ABSENT * np.arange(1, places + 1)
+        present = np.arange(places) < state.count[:, None]
         poses = chain.from_iterable(instance.starts for instance in instances)
         starts = np.array(list(chain.from_iterable(poses)), dtype=np.float64).reshape(-1, 4)
         for k, array in enumerate((state.x, state.y, state.c, state.s)):
             array[present] = starts[:, k]
         self.state = state
-        self._work = workspace(len(instances), max(counts))
+        self._work = workspace(len(instances), places)
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
-        self._rows = rows(self._cars, max(counts), 1.0 / self._rate)
+        self._rows = rows(self._cars, places, 1.0 / self._rate)
         self._tick = 0
         self._commands: Floats | None = None
         return state

@@ -72,6 +72,7 @@ from dubins_traffic.spec.tables import (
     STOP_MOVE2,
     STOP_TICKS,
     TICKET,
+    ZONE,
     Memory,
     RuleTable,
 )
@@ -132,15 +133,19 @@ def label_trial(
     memory.head[b, 0, NOW] = tick % memory.trail.shape[1]
     cars = state.count[b]
     stirred = False
+    due = 0
+    some = 0
     for n in range(cars):
         if not keep_on(b, n, tick, state, roads, rules, labels, memory):
             stirred |= locate(b, n, tick, state, roads, rules, labels, memory)
-    some = 0
-    for n in range(cars):
-        if stirred or memory.link[b, n, DUE] != 0:
-            some |= _stop(b, n, tick, roads, rules, labels, memory)
-        else:
+        elif memory.mark[b, n, ZONE] == 0:
             some |= np.int64(labels.bits[b, n])
+            continue
+        memory.link[b, due, DUE] = n
+        due += 1
+    for k in range(cars if stirred else due):
+        n = k if stirred else memory.link[b, k, DUE]
+        some |= _stop(b, n, tick, state, roads, rules, labels, memory)
     if some & STOPPED != 0:
         _queue_up(b, tick, cars, roads, rules, labels, memory)
     elif some & STILL != 0:
@@ -186,7 +191,9 @@ def _look_beside(
 
 
 @jit_inline
-def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> Any:
+def _stop(
+    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
+) -> Any:
     """Find whether a car approaches, has stopped and gets a ticket; enter it in the queue ahead.
 
     Sets CLEAR too, which needs who crosses what. Returns the car's flags so far, with LEFT if it will be left.
@@ -218,11 +225,13 @@ def _stop(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Lab
             mark[b, n, APPROACH_SINCE] = tick
         ago = rules.whole[b, STOP_TICKS]
         long = tick - mark[b, n, APPROACH_SINCE] >= ago
-        if bits & STOPPED == 0 and long and moved2(b, n, tick, ago, memory) <= real[b, STOP_MOVE2]:
-            bits |= STOPPED
-            mark[b, n, TICKET] = tick
-            mark[b, n, FORFEITS] = 0
-            mark[b, n, FIRST_SINCE] = -1
+        if bits & STOPPED == 0 and long:
+            moved = moved2(b, n, tick, state.x[b, n], state.y[b, n], ago, memory)
+            if moved <= real[b, STOP_MOVE2]:
+                bits |= STOPPED
+                mark[b, n, TICKET] = tick
+                mark[b, n, FORFEITS] = 0
+                mark[b, n, FIRST_SINCE] = -1
     else:
         mark[b, n, APPROACH_SINCE] = -1
     if bits & STOPPED != 0:

@@ -20,6 +20,7 @@ from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
     lane_end,
+    nearest_arm,
     patch,
     vertex_distance2,
 )
@@ -49,7 +50,6 @@ from dubins_traffic.spec.tables import (
     CROSS2,
     CROSSERS,
     CROSSING_DEGREE,
-    DUE,
     GAP2,
     HALF_LENGTH,
     HALF_WIDTH,
@@ -70,6 +70,8 @@ from dubins_traffic.spec.tables import (
     QUEUE2,
     RADIUS,
     REACH,
+    RING_HIGH,
+    RING_LOW,
     ROUNDING,
     STAND_MOVE2,
     STAND_TICKS,
@@ -104,9 +106,12 @@ def locate(
     row = memory.patch[b, n]
     if not (row[PATCH_LOW_X] < x < row[PATCH_HIGH_X] and row[PATCH_LOW_Y] < y < row[PATCH_HIGH_Y]):
         patch(t, net, x, y, row)
-    segment = int(row[PATCH_SEGMENT])
     v = int(row[PATCH_VERTEX])
-    off2 = distance2(t, net, segment, x, y)
+    segment = int(row[PATCH_SEGMENT])
+    if segment >= 0:
+        off2 = distance2(t, net, segment, x, y)
+    else:
+        segment, off2 = nearest_arm(t, net, v, x, y)
     away2 = vertex_distance2(t, net, v, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
     round_body = half_length + half_width == 0.0
@@ -153,13 +158,11 @@ def locate(
     measure[TOP] = top
     measure[PROGRESS] = progress
     measure[LATERAL] = lateral
-    spare = _reach(b, n, x, y, c, s, lane, lateral, t, rules, memory)
+    spare = _reach(b, n, x, y, c, s, v, lane, lateral, t, rules, memory)
     if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
-    away = sqrt(away2)
-    spare = min(spare, abs(away - real[b, RADIUS]), abs(away - sqrt(real[b, CROSS2])))
     _keep_calm(x, y, min(spare, abs(sqrt(off2) - t.half_width[net])), row)
-    memory.link[b, n, DUE] = 1
+    _keep_ring(away2, real[b], row)
     return stirs
 
 
@@ -171,6 +174,21 @@ def _keep_calm(x: float, y: float, spare: float, row: Floats) -> None:
     row[CALM_HIGH_X] = min(row[PATCH_HIGH_X], x + half)
     row[CALM_LOW_Y] = max(row[PATCH_LOW_Y], y - half)
     row[CALM_HIGH_Y] = min(row[PATCH_HIGH_Y], y + half)
+
+
+@jit_inline
+def _keep_ring(away2: float, real: Floats, row: Floats) -> None:
+    """Keep between which squared distances of the nearest vertex it is as at `away2`: its discs, who approaches it."""
+    low = -1.0
+    high = FARTHEST * FARTHEST
+    outer2 = max(real[APPROACH2], real[QUEUE2])
+    for edge2 in (real[RADIUS] * real[RADIUS], real[CROSS2], outer2):
+        if edge2 <= away2:
+            low = max(low, edge2)
+        else:
+            high = min(high, edge2)
+    row[RING_LOW] = low
+    row[RING_HIGH] = high
 
 
 @jit_inline
@@ -186,6 +204,13 @@ def keep_on(
     if not (row[CALM_LOW_X] < x < row[CALM_HIGH_X] and row[CALM_LOW_Y] < y < row[CALM_HIGH_Y]):
         return False
     net: int = rules.whole[b, NET]
+    v = int(row[PATCH_VERTEX])
+    if not row[RING_LOW] < vertex_distance2(t, net, v, x, y) < row[RING_HIGH]:
+        return False
+    if row[PATCH_SEGMENT] < 0.0:
+        segment, _ = nearest_arm(t, net, v, x, y)
+        if segment != labels.segment[b, n]:
+            return False
     mark = memory.mark[b, n]
     lane = labels.lane[b, n]
     if lane >= 0:
@@ -197,20 +222,19 @@ def keep_on(
         measure[PROGRESS] = progress
         if mark[ZONE] != 0:
             measure[GAP2] = vertex_distance2(t, net, lane_end(t, net, lane), x, y)
-    memory.link[b, n, DUE] = mark[ZONE]
     labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | _still(b, n, tick, x, y, rules, memory)
     return True
 
 
 @jit_inline
 def _reach(
-    b: int, n: int, x: float, y: float, c: float, s: float, lane: int, lateral: float, t: RoadTable,
+    b: int, n: int, x: float, y: float, c: float, s: float, v: int, lane: int, lateral: float, t: RoadTable,
     rules: RuleTable, memory: Memory,
 ) -> float:  # fmt: skip
     """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
 
     Returns metres that a round body may move before it becomes left, or comes to where cars approach and queue, or
-    leaves it.
+    leaves it, if the crossing is not v, the nearest vertex.
     """
     net: int = rules.whole[b, NET]
     real = rules.real[b]
@@ -232,8 +256,8 @@ def _reach(
             if not round_body:
                 gap2 = distance2_to_vertex(t, net, end, x, y, c, s, half_length, half_width)
             outer2 = max(real[APPROACH2], real[QUEUE2])
-            gap = sqrt(gap2)
-            spare = min(abs(gap - sqrt(outer2)), abs(gap - sqrt(real[CROSS2])))
+            if end != v:
+                spare = max(sqrt(gap2) - sqrt(outer2), 0.0)
             zone = 1 if real[CROSS2] <= gap2 <= outer2 else 0
         spare = min(spare, max(real[LEFT_SET] - reach, 0.0))
     memory.measure[b, n, REACH] = reach
@@ -290,23 +314,24 @@ def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memo
     now = memory.head[b, 0, NOW]
     trail[b, now, n, 0] = x
     trail[b, now, n, 1] = y
-    if moved2(b, n, tick, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]:
-        return STILL
-    return 0
+    return (
+        STILL
+        if moved2(b, n, tick, x, y, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]
+        else 0
+    )
 
 
 @jit_inline
-def moved2(b: int, n: int, tick: int, ago: int, memory: Memory) -> float:
-    """Return the squared distance of the centre from where it was `ago` ticks before; huge before that."""
+def moved2(b: int, n: int, tick: int, x: float, y: float, ago: int, memory: Memory) -> float:
+    """Return the squared distance of the centre (x, y) from where it was `ago` ticks before; huge before that."""
     if tick < ago:
         return 1e300
     trail = memory.trail
-    now = memory.head[b, 0, NOW]
-    then = now - ago
+    then = memory.head[b, 0, NOW] - ago
     if then < 0:
         then += trail.shape[1]
-    dx = trail[b, now, n, 0] - trail[b, then, n, 0]
-    dy = trail[b, now, n, 1] - trail[b, then, n, 1]
+    dx = x - trail[b, then, n, 0]
+    dy = y - trail[b, then, n, 1]
     return dx * dx + dy * dy
 
 

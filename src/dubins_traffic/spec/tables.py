@@ -83,7 +83,9 @@ CALM_LOW_X: Final = 6
 CALM_HIGH_X: Final = 7
 CALM_LOW_Y: Final = 8
 CALM_HIGH_Y: Final = 9
-PATCH: Final = 10
+RING_LOW: Final = 10
+RING_HIGH: Final = 11
+PATCH: Final = 12
 
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
@@ -116,14 +118,15 @@ class Memory(NamedTuple):
         (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none;
         whether it is where cars approach and queue (`ZONE`, else 0).
     patch : (B, N, PATCH) float64
-        A rectangle about the place where the centre was last looked up, in which nearest segment and vertex
-        (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty before. Another in which, too, all that
-        a place says is the same (`CALM_LOW_X` to `CALM_HIGH_Y`).
+        A rectangle about the place where the centre was last looked up, in which nearest segment (-1: one of those
+        that meet in the nearest vertex) and vertex (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty
+        before. Another (`CALM_LOW_X` to `CALM_HIGH_Y`) in which, too, all that a place says is the same while the
+        segment is, and the squared distance from the vertex lies between `RING_LOW` and `RING_HIGH`.
     trail : (B, M, N, 2) float64
         Positions at the last M ticks, tick k in row k mod M.
     link : (B, N, LINKS) int64
         The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
-        are to be looked at in this frame (`DUE`). All but the lists of the lanes is scratch.
+        are to be looked at in this frame, in order (`DUE`). All but the lists of the lanes is scratch.
     head : (B, H, HEADS) int64
         The first car of each lane, segment, queue (-1: none), and how many cars cross a vertex; in the first row, which
         row of `trail` is the present one (`NOW`). Segments and queues are scratch.
