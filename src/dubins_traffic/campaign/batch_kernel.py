@@ -197,7 +197,9 @@ def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
 def _observe(b: int, tick: int, world: World) -> None:
     """Judge and count a frame that has been labelled."""
     docket, tally = world.docket, world.tally
-    count_frame(b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, tally)
+    count_frame(
+        b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
+    )
     if world.terms.whole[b, JUDGED] == 0:
         return
     first = docket.filled[0]

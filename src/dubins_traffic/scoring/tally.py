@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dubins_traffic.cars.near import Spacing, ticks_within
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
@@ -22,15 +23,16 @@ from dubins_traffic.spec.propositions import LEFT, ON_ROAD
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-NET, GOALS, STANDING, OFF_ROAD, DEPARTURES, COLLIDED, OFF_SINCE, OFF_TICKS, SAMPLED, ROUNDS, SEALED = range(
-    11
-)
-INTS = 11
+(
+    NET, GOALS, STANDING, OFF_ROAD, DEPARTURES, COLLIDED, OFF_SINCE, OFF_TICKS, SAMPLED, ROUNDS, SEALED, AGAIN,
+) = range(12)  # fmt: skip
+INTS = 12
 """Columns of `Tally.ints`.
 
 NET: the trial's network. GOALS: how many goals it has. STANDING, OFF_ROAD, DEPARTURES: ticks and frames that
 `scoring.driving` counts. COLLIDED, OFF_SINCE (-1: on the road), OFF_TICKS, SAMPLED: what `scoring.icra2016` counts, its
 rounds last. ROUNDS: by visits. SEALED: 1 once the ego has broken a rule, from when on `Tally.sensed` stays as it is.
+AGAIN: the next tick in which the ego may come to a goal, be in one, or leave the road of 2016.
 """
 
 DISTANCE, CLEARANCE, STILL, RADIUS, SIGHT2 = range(5)
@@ -46,6 +48,8 @@ whether the ego is inside its disc, visits, tick of the last one (0 before the f
 
 ROUNDING = 1e-6
 """What rounding can't make up, metres."""
+FARTHEST = 100.0
+"""Metres beyond which it does not matter how far something is."""
 
 
 class Tally(NamedTuple):
@@ -114,7 +118,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
 @jit_inner
 def count_frame(
     b: int, tick: int, state: State, labels: Labels, roads: RoadTable, cars: CarTable, obstacles: ObstacleTable,
-    tally: Tally,
+    spacing: Spacing, tally: Tally,
 ) -> None:  # fmt: skip
     """Count frame `tick` of trial b."""
     floats = tally.floats[b]
@@ -137,12 +141,10 @@ def count_frame(
     _look_at_cars(b, tick, state, cars, tally)
     if obstacles.off[b] != obstacles.off[b + 1]:
         _look_at_obstacles(b, state, cars, obstacles, floats)
-    _count_goals(b, tick, x, y, roads, tally)
-    on = _on_2016(ints[NET], labels.segment[b, EGO], x, y, roads)
-    if on == (ints[OFF_SINCE] >= 0):
-        if on:
-            ints[OFF_TICKS] += tick - ints[OFF_SINCE]
-        ints[OFF_SINCE] = -1 if on else tick
+    if tick >= ints[AGAIN]:
+        spare = _count_goals(b, tick, x, y, roads, tally)
+        spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
+        ints[AGAIN] = tick + ticks_within(spare - ROUNDING, spacing, b)
     for n in range(state.count[b]):
         tally.before[b, n, 0] = state.x[b, n]
         tally.before[b, n, 1] = state.y[b, n]
@@ -167,20 +169,35 @@ def _others_move(b: int, state: State, tally: Tally) -> bool:
 def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally) -> None:
     """Keep the smallest gap to the cars, who was sensed when, and whether anyone came too near by the rules of 2016."""
     floats = tally.floats[b]
-    ints = tally.ints[b]
     x, y = state.x[b, EGO], state.y[b, EGO]
     reach = floats[CLEARANCE] + 2.0 * cars.reach[b] + 1e-9
     near2 = max(reach * reach, 2.0 * COLLISION_DISTANCE * COLLISION_DISTANCE)
-    sight2 = floats[SIGHT2] if ints[SEALED] == 0 else -1.0
+    sight2 = floats[SIGHT2] if tally.ints[b, SEALED] == 0 else -1.0
+    sensed = tally.sensed[b]
+    near = 0
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         d2 = dx * dx + dy * dy
         if d2 <= sight2:
-            tally.sensed[b, n] = tick
+            sensed[n] = tick
+        if d2 <= near2:
+            near = 1
+    if near != 0:
+        _look_closer(b, near2, state, cars, tally)
+
+
+@jit
+def _look_closer(b: int, near2: float, state: State, cars: CarTable, tally: Tally) -> None:
+    """Look at the cars whose squared distance from the ego is up to `near2`."""
+    floats = tally.floats[b]
+    for n in range(1, state.count[b]):
+        dx = state.x[b, n] - state.x[b, EGO]
+        dy = state.y[b, n] - state.y[b, EGO]
+        d2 = dx * dx + dy * dy
         if d2 <= near2:
             if tally.counts[b, n] != 0 and sqrt(d2) < COLLISION_DISTANCE:
-                ints[COLLIDED] = 1
+                tally.ints[b, COLLIDED] = 1
             if floats[CLEARANCE] > 0.0:
                 gap = _car_gap(b, n, state, cars)
                 floats[CLEARANCE] = min(floats[CLEARANCE], gap)
@@ -268,21 +285,25 @@ def _overlap(
 
 
 @jit_inline
-def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally: Tally) -> None:
-    """Count samples inside the goals' discs, visits, and rounds of both."""
+def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally: Tally) -> float:
+    """Count samples inside the goals' discs, visits, and rounds of both.
+
+    Returns how far the ego is from all these discs, metres; 0 where it is in one.
+    """
     ints = tally.ints[b]
     first = tally.goal_off[b]
     last = first + ints[GOALS]
     offset = roads.vert_off[ints[NET]]
     radius = tally.floats[b, RADIUS]
-    about2 = (radius + ROUNDING) * (radius + ROUNDING)
     some = False
+    spare = FARTHEST
     for g in range(first, last):
         goal = tally.goal[g]
         dx = x - roads.vert[offset + goal[VERTEX], 0]
         dy = y - roads.vert[offset + goal[VERTEX], 1]
-        d2 = dx * dx + dy * dy
-        inside = 1 if d2 < about2 and sqrt(d2) < radius else 0
+        away = sqrt(dx * dx + dy * dy)
+        spare = min(spare, max(away - radius, 0.0))
+        inside = 1 if away < radius else 0
         if inside > 0:
             some = True
             goal[SAMPLE_DONE] = 1
@@ -295,6 +316,7 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
     if some:
         ints[SAMPLED] += _round(tally.goal, first, last, SAMPLE_DONE)
         ints[ROUNDS] += _round(tally.goal, first, last, VISIT_DONE)
+    return spare
 
 
 @jit_inline
@@ -310,20 +332,33 @@ def _round(goal: Ints, first: int, last: int, column: int) -> int:
 
 
 @jit_inline
-def _on_2016(net: int, segment: int, x: float, y: float, roads: RoadTable) -> bool:
-    """Tell whether a point is on the road of 2016: on the nearest segment, or on any."""
+def _count_off_road(
+    b: int, tick: int, x: float, y: float, segment: int, roads: RoadTable, tally: Tally
+) -> float:
+    """Count ticks off the road of 2016; return how far the ego is from the edge of its nearest segment, metres.
+
+    0 where it is not on that one.
+    """
+    ints = tally.ints[b]
+    net: int = ints[NET]
     first = roads.seg_off[net]
-    on = _on_segment(first + segment, x, y, roads)
+    spare = _inside(first + segment, x, y, roads)
+    on = spare >= 0.0
     if not on:
         for k in range(first, roads.seg_off[net + 1]):
-            on = on or _on_segment(k, x, y, roads)
-    return on
+            on = on or _inside(k, x, y, roads) >= 0.0
+    if on == (ints[OFF_SINCE] >= 0):
+        if on:
+            ints[OFF_TICKS] += tick - ints[OFF_SINCE]
+        ints[OFF_SINCE] = -1 if on else tick
+    return max(spare, 0.0)
 
 
 @jit_inline
-def _on_segment(k: int, x: float, y: float, roads: RoadTable) -> bool:
+def _inside(k: int, x: float, y: float, roads: RoadTable) -> float:
+    """Return how far a point is from the edge of segment k of the road of 2016, less than 0 outside it."""
     rx = x - roads.seg[k, 0]
     ry = y - roads.seg[k, 1]
     along = rx * roads.seg[k, 2] + ry * roads.seg[k, 3]
     beside = rx * roads.seg[k, 3] - ry * roads.seg[k, 2]
-    return along >= 0.0 and along <= roads.seg[k, 4] and abs(beside) <= ROAD_HALF_WIDTH
+    return min(along, roads.seg[k, 4] - along, ROAD_HALF_WIDTH - abs(beside))
