@@ -26,6 +26,30 @@ def test_neighbours_are_those_within_the_radius_in_order_of_index() -> None:
     assert wholes[1].tolist() == [1, 0, -1, -1, -1, 0]
 
 
+def test_neighbours_tell_whether_anything_but_places_has_changed() -> None:
+    state, labels = cars_at((0, 0), (1, 0), (2, 0)), Labels.zeros(1, 3)
+    reals, wholes = np.zeros((3, SEEN_REALS)), np.full((3, SEEN_WHOLES), -1, dtype=np.int64)
+
+    def look() -> int:
+        return neighbours(0, 0, 5.0, reals, wholes, *state, *labels)
+
+    assert [look(), look()] == [3, -3]
+    state.x[0, 1] = 1.5
+    assert look() == -3
+    assert reals[1, 0] == 1.5
+    for change in (
+        lambda: state.x[0].put(2, 6.0),
+        lambda: labels.bits[0].put(1, 4),
+        lambda: state.x[0].put(2, 2.0),
+    ):
+        change()
+        count = look()
+        assert count in (2, 3)
+        assert look() == -count
+    assert wholes[:, 0].tolist() == [0, 1, 2]
+    assert wholes[1, 5] == 4
+
+
 def test_noise_has_the_asked_size_and_keeps_headings_unit() -> None:
     rows = []
     for tick in range(3000):

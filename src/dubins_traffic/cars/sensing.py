@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import NONE, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
@@ -27,38 +27,47 @@ def neighbours(b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, 
     """Write the viewer and then the other cars within `radius` of it, by index, into two arrays; return the number.
 
     A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
-    segment, at, crosses, lane, bits. `arrays` are those of State and of Labels, one after another.
+    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. `arrays` are those of State and
+    of Labels, one after another. Where `wholes` was as it is now already, minus the number is returned.
     """
     state = State(*arrays[:STATE_END])
     labels = Labels(*arrays[STATE_END:])
     limit = radius * radius
     x = state.x[b, viewer]
     y = state.y[b, viewer]
-    _view(state, labels, b, viewer, reals[0], wholes[0])
+    other = _view(state, labels, b, viewer, reals[0], wholes[0])
     count = 1
     for n in range(state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         if n != viewer and dx * dx + dy * dy <= limit:
-            _view(state, labels, b, n, reals[count], wholes[count])
+            other |= _view(state, labels, b, n, reals[count], wholes[count])
             count += 1
-    return count
+    if count < wholes.shape[0]:
+        other |= wholes[count, 0] ^ NONE
+        wholes[count, 0] = NONE
+    return count if other != 0 else -count
 
 
 @jit
-def _view(state: State, labels: Labels, b: int, n: int, reals: Floats, wholes: Ints) -> None:
+def _view(state: State, labels: Labels, b: int, n: int, reals: Floats, wholes: Ints) -> int:
+    """Write car n into a row of each array; return 0 if that of `wholes` stays as it was."""
     reals[0] = state.x[b, n]
     reals[1] = state.y[b, n]
     reals[2] = state.c[b, n]
     reals[3] = state.s[b, n]
     reals[4] = state.speed[b, n]
     reals[5] = state.yaw_rate[b, n]
+    bits = np.int64(labels.bits[b, n])
+    other = (wholes[0] ^ n) | (wholes[1] ^ labels.segment[b, n]) | (wholes[2] ^ labels.at[b, n])
+    other |= (wholes[3] ^ labels.crosses[b, n]) | (wholes[4] ^ labels.lane[b, n]) | (wholes[5] ^ bits)
     wholes[0] = n
     wholes[1] = labels.segment[b, n]
     wholes[2] = labels.at[b, n]
     wholes[3] = labels.crosses[b, n]
     wholes[4] = labels.lane[b, n]
-    wholes[5] = np.int64(labels.bits[b, n])
+    wholes[5] = bits
+    return other
 
 
 @jit

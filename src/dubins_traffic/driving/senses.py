@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbours, scan
-from dubins_traffic.cars.state import EGO, Labels, Observation, Pose, Propositions, SensedCar, State, Twist
+from dubins_traffic.cars.state import (
+    EGO,
+    NONE,
+    Labels,
+    Observation,
+    Pose,
+    Propositions,
+    SensedCar,
+    State,
+    Twist,
+)
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound
@@ -57,7 +67,8 @@ class Senses:
         self._radius = problem.sensing_radius if radius is None else radius
         self._rate = problem.rate
         self._reals = np.zeros((len(instance.starts), SEEN_REALS))
-        self._wholes = np.zeros((len(instance.starts), SEEN_WHOLES), dtype=np.int64)
+        self._wholes = np.full((len(instance.starts), SEEN_WHOLES), NONE, dtype=np.int64)
+        self._seen: list[tuple[str, int, Propositions]] = []
         noise = instance.disturbances
         self._noisy = car == EGO and (noise.position_noise > 0.0 or noise.heading_noise > 0.0)
         self._laser = laser or problem.laser
@@ -78,6 +89,9 @@ class Senses:
             first = (0, 0, 0.0, self._reals, self._wholes)
             self._look = bound(neighbours, first, (*state, *labels))
         count = self._look(0, self._car, self._radius, self._reals, self._wholes)
+        if count > 0:
+            self._seen = self._labelled(count)
+        count = len(self._seen)
         if self._noisy:
             noise = self._instance.disturbances
             blur(
@@ -86,37 +100,24 @@ class Senses:
             )  # fmt: skip
         if self._laser is not None:
             self._sweep(tick, state, self._laser)
-        reals = self._reals[:count].tolist()
-        wholes = self._wholes[:count].tolist()
-        own, labelled = reals[0], wholes[0]
-        return Observation(
-            tick,
-            tick / self._rate,
-            new(Pose, own[:4]),
-            new(Twist, own[4:]),
-            new(Propositions, labelled[1:]),
-            self._sensed(reals, wholes),
-            self._scan,
-        )
-
-    def _sensed(self, reals: list[list[float]], wholes: list[list[int]]) -> tuple[SensedCar, ...]:
-        names, body = self._names, self._body
-        return tuple(
+        reals: list[list[float]] = self._reals[:count].tolist()
+        body = self._body
+        others = tuple(
             [
-                new(
-                    SensedCar,
-                    (
-                        names[whole[0]],
-                        whole[0],
-                        new(Pose, real[:4]),
-                        new(Twist, real[4:]),
-                        body,
-                        new(Propositions, whole[1:]),
-                    ),
+                new(SensedCar, (name, car, new(Pose, (x, y, c, s)), new(Twist, (speed, yaw)), body, labelled))
+                for (name, car, labelled), (x, y, c, s, speed, yaw) in zip(
+                    self._seen[1:], reals[1:], strict=True
                 )
-                for real, whole in zip(reals[1:], wholes[1:], strict=True)
             ]
         )
+        x, y, c, s, speed, yaw = reals[0]
+        pose, twist, labelled = new(Pose, (x, y, c, s)), new(Twist, (speed, yaw)), self._seen[0][2]
+        return new(Observation, (tick, tick / self._rate, pose, twist, labelled, others, self._scan))
+
+    def _labelled(self, count: int) -> list[tuple[str, int, Propositions]]:
+        """Return name, index and propositions of the first `count` cars seen, which stay the same for most ticks."""
+        wholes: list[list[int]] = self._wholes[:count].tolist()
+        return [(self._names[whole[0]], whole[0], new(Propositions, whole[1:])) for whole in wholes]
 
     def sweep(self, state: State) -> Floats:
         """Return the ranges of a laser sweep in `state`, (rays,), metres, from right to left.
