@@ -16,6 +16,7 @@ from dubins_traffic.driving.gates import GOES_NOW, MARGIN, count_turn, faces_gat
 from dubins_traffic.driving.kept_ways import kept_way
 from dubins_traffic.driving.late import note
 from dubins_traffic.driving.law_tables import (
+    ALONE,
     COAST_BEND,
     COAST_CROSSES,
     COAST_HIGH,
@@ -45,7 +46,7 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.safety import VERGE
-from dubins_traffic.driving.seeing import way_to_go
+from dubins_traffic.driving.seeing import meets_nobody, way_to_go
 from dubins_traffic.driving.steering import slowed
 from dubins_traffic.driving.turn_arcs import AFTER, THROUGH, Way, in_arc, on_lane
 from dubins_traffic.kernels.compile import jit_inline
@@ -59,11 +60,12 @@ EVERYWHERE = 1e9
 
 @jit_inline
 def coast(
-    b: int, n: int, kind: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
-) -> bool:
+    b: int, n: int, kind: int, company: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
+    desk: Desk,
+) -> bool:  # fmt: skip
     """Put off the command of a car that still just drives on as it did; tell whether it does.
 
-    Nothing is around the car that matters to it.
+    Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
     """
     row = drivers.way[b, n]
     x, y = state.x[b, n], state.y[b, n]
@@ -80,9 +82,11 @@ def coast(
         return False
     bend = row[COAST_BEND]
     if bend == 0.0:
-        _, _, left, px, py = on_lane(way, x, y)
+        part, key, left, px, py = on_lane(way, x, y)
     else:
-        _, _, left, px, py = in_arc(way, dx, dy)
+        part, key, left, px, py = in_arc(way, dx, dy)
+    if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.build[b]):
+        return False
     note(b, n, row[COAST_SPEED], left, px, py, bend, state, desk)
     return True
 

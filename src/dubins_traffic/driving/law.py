@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.coasting import coast, cruise, drive_on, keeps_to_road, stop_coasting
@@ -22,8 +23,10 @@ from dubins_traffic.driving.lane_graph import lane_at
 from dubins_traffic.driving.late import catch_up, put_off
 from dubins_traffic.driving.law_tables import (
     ABSENT,
+    ALONE,
     ASIDE,
     CROSSING,
+    CROWDED,
     DISC,
     HOLD,
     KIND,
@@ -37,6 +40,7 @@ from dubins_traffic.driving.law_tables import (
     REACH,
     ROUND,
     TAILGATING,
+    UNSURE,
     UNTIL,
     WAITED,
     Desk,
@@ -49,6 +53,7 @@ from dubins_traffic.driving.seeing import (
     alone,
     gather,
     look_ahead,
+    meets_nobody,
     wanted_gap,
     way_to_go,
 )
@@ -120,15 +125,21 @@ def decide_trial(
     """
     desk.listed[0] = NOBODY
     enough = loss + alone(drivers.build[b])
+    others = UNSURE if state.count[b] <= FEW else CROWDED
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
+        others = CROWDED
     for n in range(state.count[b]):
-        lonely = apart[n] > enough
+        company = others if apart[n] > 0.0 else CROWDED
+        if apart[n] > enough:
+            company = ALONE
         kind = drivers.ints[b, n, KIND]
         if kind == ROUND:
             count_visit(b, n, labels, drivers)
-        if kind != ABSENT and not (lonely and coast(b, n, kind, state, labels, roads, drivers, desk)):
-            drive(b, n, tick, lonely, sight2, state, labels, roads, obstacles, drivers, desk, commands)
+        if kind == ABSENT:
+            continue
+        if company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, desk):
+            drive(b, n, tick, company, sight2, state, labels, roads, obstacles, drivers, desk, commands)
     catch_up(b, state, drivers, desk, commands)
     if desk.listed[0] != NOBODY:
         unlist_cars(b, state, labels, desk)
@@ -172,10 +183,10 @@ def unlist_cars(b: int, state: State, labels: Labels, desk: Desk) -> None:
 
 @jit_inline
 def drive(
-    b: int, n: int, tick: int, lonely: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
+    b: int, n: int, tick: int, company: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
 ) -> None:  # fmt: skip
-    """Write the command of a car; a `lonely` one has nothing around that matters to a car that just drives on."""
+    """Write the command of a car; `company` says what is known of the cars around it."""
     build = drivers.build[b]
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
@@ -188,7 +199,9 @@ def drive(
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    free = lonely and just_drives(ints, floats)
+    free = company != CROWDED and just_drives(ints, floats)
+    if free and company != ALONE:
+        free = meets_nobody(b, n, part, key, left, x, y, way, state, build)
     if free and drive_on(b, n, part, left, px, py, outside, way, state, labels, roads, drivers, desk):
         return
     enlist(b, n, sight2, state, labels, desk)

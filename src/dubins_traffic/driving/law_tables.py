@@ -71,6 +71,11 @@ ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
 """Bits of MOOD."""
 
 
+ALONE, UNSURE, CROWDED = range(3)
+"""What is known of the cars around one: that they make no difference to it; nothing, but it can be found by looking at
+all of them; nothing.
+"""
+
 DUE, LATE_SPEED, LATE_LEFT, LATE_X, LATE_Y, LATE_BEND, LATE_C, LATE_S, LATE_YAW = range(9)
 LATE = 9
 BLOCK = 32

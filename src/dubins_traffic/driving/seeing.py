@@ -52,6 +52,8 @@ HALF_TURN = 3.1
 SIGHT = 3.0
 """What is farther away than this does not matter to a car's next tick, metres."""
 HELD = 1e9
+CLOSE = 0.2
+"""The gap up to which a car is looked at for whether a motion might bring about a contact, metres."""
 AWARE = 0.06
 """A car takes note of what is up to this much farther away than the gap it keeps, metres."""
 
@@ -67,6 +69,32 @@ def alone(build: Any) -> float:
     """Return metres between the centres beyond which another car makes no difference to one that just drives on."""
     widest = max(MOVING_GAP, STANDING_GAP, FACING_GAP)
     return 2.0 * build[REACH] + widest + AWARE + build[FASTEST] * build[PERIOD]
+
+
+@jit_inline
+def corridor(left: float, wide: float) -> tuple[float, float]:
+    """Return from where to where, left of the way, a car at `left` minds what is ahead: `wide` about it and the way."""
+    return left - wide if left < 0.0 else -wide, left + wide if left > 0.0 else wide
+
+
+@jit_inline
+def meets_nobody(
+    b: int, n: int, part: int, key: float, left: float, x: float, y: float, way: Way, state: State, build: Any
+) -> bool:
+    """Tell whether no car of the trial makes a difference to one that just drives on: is close, or ahead on its way."""
+    far, touch = alone(build), 2.0 * build[REACH] + CLOSE
+    low, high = corridor(left, 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE)
+    for j in range(state.count[b]):
+        dx = state.x[b, j] - x
+        dy = state.y[b, j] - y
+        d2 = dx * dx + dy * dy
+        if d2 > far * far or j == n:
+            continue
+        there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+        behind = there < part or (there == part and its_key <= key)
+        if d2 < touch * touch or not (behind or its_left < low or its_left > high):
+            return False
+    return True
 
 
 @jit_inline
@@ -118,8 +146,7 @@ def look_ahead(
     """
     reach = build[REACH]
     wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE
-    low = left - wide if left < 0.0 else -wide
-    high = left + wide if left > 0.0 else wide
+    low, high = corridor(left, wide)
     passing = floats[ASIDE] != 0.0
     if passing and way_to_go(way, x, y) < floats[UNTIL]:
         low = min(left, floats[ASIDE]) - 0.1
@@ -127,7 +154,7 @@ def look_ahead(
     gap = HELD
     who = -1
     close = False
-    touch = 2.0 * reach + 0.2
+    touch = 2.0 * reach + CLOSE
     for k in range(near):
         j = desk.near[k]
         dx = state.x[b, j] - x
