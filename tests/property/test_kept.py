@@ -14,13 +14,17 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import nearest_arm, patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
+from dubins_traffic.spec.holding import column
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.tables import (
+    CALM,
     CALM_HIGH_X,
     CALM_HIGH_Y,
     CALM_LOW_X,
     CALM_LOW_Y,
-    PATCH_SEGMENT,
+    FORK_SURE,
+    FORK_X,
+    FORK_Y,
     RING_HIGH,
     RING_LOW,
 )
@@ -119,13 +123,13 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
     labeller = Labeller([instance])
     labels = labeller.reset(group.state)
     random = np.random.default_rng(4)
-    looked = 0
+    looked = certain = doubtful = 0
     for tick in range(1, 300):
         group.advance()
         labeller.update(tick, group.state, [()])
         assert (labels.bits == group.labels.bits).all()
         for n in range(7):
-            row = labeller.memory.patch[0, n]
+            row = labeller.memory.calm[0, [column(n, k) for k in range(CALM)]]
             low, high = row[[CALM_LOW_X, CALM_LOW_Y]], row[[CALM_HIGH_X, CALM_HIGH_Y]]
             if tick % 10 != n or not (low < high).all():
                 continue
@@ -134,8 +138,11 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             segment, far = surface.nearest_segment(points)
             vertex, away = surface.nearest_vertex(points)
             kept = (row[RING_LOW] < away * away) & (away * away < row[RING_HIGH])
-            if row[PATCH_SEGMENT] < 0:
-                kept &= segment == labels.segment[0, n]
+            sure = (np.abs(points - row[[FORK_X, FORK_Y]]) < row[FORK_SURE]).all(axis=1)
+            assert (segment[sure] == labels.segment[0, n]).all()
+            kept &= segment == labels.segment[0, n]
+            certain += int((kept & sure).sum())
+            doubtful += int((kept & ~sure).sum())
             segment, far, vertex, away = segment[kept], far[kept], vertex[kept], away[kept]
             cross = problem.intersection_radius + problem.car.body.reach
             assert (segment == labels.segment[0, n]).all()
@@ -143,3 +150,5 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             assert (np.where(away < problem.intersection_radius, vertex, NONE) == labels.at[0, n]).all()
             assert (np.where(away < cross, vertex, NONE) == labels.crosses[0, n]).all()
     assert looked > 100
+    assert certain > 1000
+    assert doubtful > 50

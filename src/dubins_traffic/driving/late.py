@@ -12,7 +12,6 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.law_tables import (
     ASIDE,
-    BLOCK,
     DUE,
     KIND,
     LATE,
@@ -32,12 +31,9 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.steering import ALIGNED, SLANT, slowed, steer
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.spec.propositions import LEFT
-
-WIDE = 8
-"""How many cars the processor takes at once; it counts on blocks being filled up to a multiple of this."""
 
 
 @jit_inline

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
 from dubins_traffic.spec.judged import kinds_of
 from dubins_traffic.spec.parameters import RuleParameters
 
@@ -78,7 +78,6 @@ all of them; nothing.
 
 DUE, LATE_SPEED, LATE_LEFT, LATE_X, LATE_Y, LATE_BEND, LATE_C, LATE_S, LATE_YAW = range(9)
 LATE = 9
-BLOCK = 32
 """`Desk.late`: blocks of BLOCK cars, each LATE columns of BLOCK numbers.
 
 DUE: 1 if a command has been put off. Allowed speed, m/s; metres left of the line to follow; its direction (X, Y); its

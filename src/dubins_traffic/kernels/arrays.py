@@ -12,6 +12,11 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Ints: TypeAlias = npt.NDArray[np.int64]
 Bits: TypeAlias = npt.NDArray[np.uint32]
 
+BLOCK = 32
+"""Cars whose columns stand together where a kernel takes several at once; the columns are so many numbers apart."""
+WIDE = 8
+"""How many of these are taken at once: loops run to a multiple of it."""
+
 
 def distinct(keys: Sequence[Hashable]) -> tuple[list[int], Ints]:
     """Return where each distinct key stands first, and the number of each key among these, (B,).

@@ -17,7 +17,8 @@ from dubins_traffic.roads.lookup import (
 )
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import narrows, obstacle_narrows
-from dubins_traffic.spec.location import keep_on, locate, moved2, put_in_order
+from dubins_traffic.spec.holding import holds_on, look_who_holds
+from dubins_traffic.spec.location import locate, moved2, put_in_order
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
     AHEAD,
@@ -59,7 +60,6 @@ from dubins_traffic.spec.tables import (
     NEXT_IN_LANE,
     NEXT_IN_QUEUE,
     NEXT_ON_SEGMENT,
-    NOW,
     OVERTAKING_AHEAD,
     OVERTAKING_BEHIND,
     PROGRESS,
@@ -130,13 +130,13 @@ def label_trial(
     memory: Memory,
 ) -> None:
     """Label frame `tick` of one trial."""
-    memory.head[b, 0, NOW] = tick % memory.trail.shape[1]
+    look_who_holds(b, tick, state, rules, memory)
     cars = state.count[b]
     stirred = False
     due = 0
     some = 0
     for n in range(cars):
-        if not keep_on(b, n, tick, state, roads, rules, labels, memory):
+        if not holds_on(b, n, roads, rules, labels, memory):
             stirred |= locate(b, n, tick, state, roads, rules, labels, memory)
         elif memory.mark[b, n, ZONE] == 0:
             some |= np.int64(labels.bits[b, n])

@@ -1,7 +1,6 @@
-"""Where a car is in a frame: segment, disc, lane state, whether it was still; and the lists by which others find it.
+"""Where a car is in a frame: segment, disc and lane state; and the lists by which others find it.
 
-Cars move a little in a tick. So with the labels a rectangle is kept in which they are the same for certain; there only
-progress and whether the car was still are found anew (`keep_on`).
+Most cars hold on to what they had in the frame before (`spec.holding`); this is for the others.
 """
 
 from __future__ import annotations
@@ -12,12 +11,9 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import (
-    CERTAIN,
     distance2,
-    lane_coordinates,
     lane_direction,
     lane_end,
     nearest_arm,
@@ -25,6 +21,7 @@ from dubins_traffic.roads.lookup import (
     vertex_distance2,
 )
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.spec.holding import FARTHEST, KEPT, hold, still, trust_fork
 from dubins_traffic.spec.lane_state import lane_state
 from dubins_traffic.spec.propositions import (
     AHEAD,
@@ -34,8 +31,6 @@ from dubins_traffic.spec.propositions import (
     IN_CROSSING,
     LEFT,
     ON_ROAD,
-    OVERTAKING,
-    STILL,
     STOPPED,
     TURNED,
 )
@@ -43,10 +38,6 @@ from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
     APPROACH2,
     APPROACH_SINCE,
-    CALM_HIGH_X,
-    CALM_HIGH_Y,
-    CALM_LOW_X,
-    CALM_LOW_Y,
     CROSS2,
     CROSSERS,
     CROSSING_DEGREE,
@@ -70,11 +61,7 @@ from dubins_traffic.spec.tables import (
     QUEUE2,
     RADIUS,
     REACH,
-    RING_HIGH,
-    RING_LOW,
     ROUNDING,
-    STAND_MOVE2,
-    STAND_TICKS,
     TOP,
     TURN_BACK,
     ZONE,
@@ -83,11 +70,6 @@ from dubins_traffic.spec.tables import (
 )
 
 RULE3 = STOPPED | CLEAR | AHEAD
-KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
-CALMLY = KEPT | ON_ROAD | IN_CROSSING | CLEAR
-"""Flags of a car that holds on to its labels, but for those that others bring about."""
-FARTHEST = 100.0
-"""Metres up to which a place is said to be far from any that matters."""
 
 
 @jit_inline
@@ -110,8 +92,9 @@ def locate(
     segment = int(row[PATCH_SEGMENT])
     if segment >= 0:
         off2 = distance2(t, net, segment, x, y)
+        surely = FARTHEST
     else:
-        segment, off2 = nearest_arm(t, net, v, x, y)
+        segment, off2, surely = nearest_arm(t, net, v, x, y)
     away2 = vertex_distance2(t, net, v, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
     round_body = half_length + half_width == 0.0
@@ -152,7 +135,7 @@ def locate(
     labels.at[b, n] = at
     labels.crosses[b, n] = crosses
     labels.lane[b, n] = lane
-    labels.bits[b, n] = bits | _still(b, n, tick, x, y, rules, memory)
+    labels.bits[b, n] = bits | still(b, n, memory)
 
     measure = memory.measure[b, n]
     measure[TOP] = top
@@ -161,69 +144,9 @@ def locate(
     spare = _reach(b, n, x, y, c, s, v, lane, lateral, t, rules, memory)
     if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
-    _keep_calm(x, y, min(spare, abs(sqrt(off2) - t.half_width[net])), row)
-    _keep_ring(away2, real[b], row)
+    hold(b, n, x, y, away2, lane, min(spare, abs(sqrt(off2) - t.half_width[net])), t, rules, memory)
+    trust_fork(n, x, y, surely, memory.calm[b])
     return stirs
-
-
-@jit_inline
-def _keep_calm(x: float, y: float, spare: float, row: Floats) -> None:
-    """Keep the rectangle within the patch in `row` in which no point is `spare` metres from (x, y) or farther."""
-    half = 0.7 * spare - CERTAIN
-    row[CALM_LOW_X] = max(row[PATCH_LOW_X], x - half)
-    row[CALM_HIGH_X] = min(row[PATCH_HIGH_X], x + half)
-    row[CALM_LOW_Y] = max(row[PATCH_LOW_Y], y - half)
-    row[CALM_HIGH_Y] = min(row[PATCH_HIGH_Y], y + half)
-
-
-@jit_inline
-def _keep_ring(away2: float, real: Floats, row: Floats) -> None:
-    """Keep between which squared distances of the nearest vertex it is as at `away2`: its discs, who approaches it."""
-    low = -1.0
-    high = FARTHEST * FARTHEST
-    outer2 = max(real[APPROACH2], real[QUEUE2])
-    for edge2 in (real[RADIUS] * real[RADIUS], real[CROSS2], outer2):
-        if edge2 <= away2:
-            low = max(low, edge2)
-        else:
-            high = min(high, edge2)
-    row[RING_LOW] = low
-    row[RING_HIGH] = high
-
-
-@jit_inline
-def keep_on(
-    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
-) -> bool:
-    """Label a car for which it is known that all is as in the frame before but what changes with every metre.
-
-    Returns False, and does nothing that matters, where it is not known.
-    """
-    x, y = state.x[b, n], state.y[b, n]
-    row = memory.patch[b, n]
-    if not (row[CALM_LOW_X] < x < row[CALM_HIGH_X] and row[CALM_LOW_Y] < y < row[CALM_HIGH_Y]):
-        return False
-    net: int = rules.whole[b, NET]
-    v = int(row[PATCH_VERTEX])
-    if not row[RING_LOW] < vertex_distance2(t, net, v, x, y) < row[RING_HIGH]:
-        return False
-    if row[PATCH_SEGMENT] < 0.0:
-        segment, _ = nearest_arm(t, net, v, x, y)
-        if segment != labels.segment[b, n]:
-            return False
-    mark = memory.mark[b, n]
-    lane = labels.lane[b, n]
-    if lane >= 0:
-        measure = memory.measure[b, n]
-        progress, _ = lane_coordinates(t, net, lane, x, y)
-        if measure[TOP] - progress >= rules.real[b, TURN_BACK]:
-            return False
-        measure[TOP] = max(measure[TOP], progress)
-        measure[PROGRESS] = progress
-        if mark[ZONE] != 0:
-            measure[GAP2] = vertex_distance2(t, net, lane_end(t, net, lane), x, y)
-    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | _still(b, n, tick, x, y, rules, memory)
-    return True
 
 
 @jit_inline
@@ -308,20 +231,6 @@ def _entry(
 
 
 @jit_inline
-def _still(b: int, n: int, tick: int, x: float, y: float, rules: RuleTable, memory: Memory) -> int:
-    """Remember where the car is; return STILL if it is near where it was `stand_time` ago, else 0."""
-    trail = memory.trail
-    now = memory.head[b, 0, NOW]
-    trail[b, now, n, 0] = x
-    trail[b, now, n, 1] = y
-    return (
-        STILL
-        if moved2(b, n, tick, x, y, rules.whole[b, STAND_TICKS], memory) <= rules.real[b, STAND_MOVE2]
-        else 0
-    )
-
-
-@jit_inline
 def moved2(b: int, n: int, tick: int, x: float, y: float, ago: int, memory: Memory) -> float:
     """Return the squared distance of the centre (x, y) from where it was `ago` ticks before; huge before that."""
     if tick < ago:
@@ -330,8 +239,8 @@ def moved2(b: int, n: int, tick: int, x: float, y: float, ago: int, memory: Memo
     then = memory.head[b, 0, NOW] - ago
     if then < 0:
         then += trail.shape[1]
-    dx = x - trail[b, then, n, 0]
-    dy = y - trail[b, then, n, 1]
+    dx = x - trail[b, then, 0, n]
+    dy = y - trail[b, then, 1, n]
     return dx * dx + dy * dy
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
 
 if TYPE_CHECKING:
     from dubins_traffic.spec.parameters import RuleParameters
@@ -79,13 +79,12 @@ PATCH_LOW_Y: Final = 2
 PATCH_HIGH_Y: Final = 3
 PATCH_SEGMENT: Final = 4
 PATCH_VERTEX: Final = 5
-CALM_LOW_X: Final = 6
-CALM_HIGH_X: Final = 7
-CALM_LOW_Y: Final = 8
-CALM_HIGH_Y: Final = 9
-RING_LOW: Final = 10
-RING_HIGH: Final = 11
-PATCH: Final = 12
+PATCH: Final = 6
+
+CALM_LOW_X, CALM_HIGH_X, CALM_LOW_Y, CALM_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, RING_HIGH = range(8)
+FROM_X, FROM_Y, AXIS_X, AXIS_Y, BASE, SIGN, TOP_SO_FAR, FORK_X, FORK_Y, FORK_SURE = range(8, 18)
+HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(18, 26)
+CALM: Final = 26
 
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
@@ -120,9 +119,16 @@ class Memory(NamedTuple):
     patch : (B, N, PATCH) float64
         A rectangle about the place where the centre was last looked up, in which nearest segment (-1: one of those
         that meet in the nearest vertex) and vertex (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty
-        before. Another (`CALM_LOW_X` to `CALM_HIGH_Y`) in which, too, all that a place says is the same while the
-        segment is, and the squared distance from the vertex lies between `RING_LOW` and `RING_HIGH`.
-    trail : (B, M, N, 2) float64
+        before.
+    calm : (B, C) float64
+        Columns of BLOCK cars each, see `spec.holding.column`. Where all that a place says is the same, as far as the
+        nearest segment is: within a rectangle (`CALM_LOW_X` to `CALM_HIGH_Y`), and at squared distances from a vertex
+        (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and `SIGN`
+        times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far. Where the
+        nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y. Of this
+        frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
+        whether it holds on to its labels, and whether it was still.
+    trail : (B, M, 2, N) float64
         Positions at the last M ticks, tick k in row k mod M.
     link : (B, N, LINKS) int64
         The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
@@ -135,6 +141,7 @@ class Memory(NamedTuple):
     measure: Floats
     mark: Ints
     patch: Floats
+    calm: Floats
     trail: Floats
     link: Ints
     head: Ints
@@ -150,7 +157,8 @@ class Memory(NamedTuple):
             np.zeros((trials, cars, MEASURES)),
             mark,
             np.zeros((trials, cars, PATCH)),
-            np.zeros((trials, depth, cars, 2)),
+            np.zeros((trials, -(-cars // BLOCK) * BLOCK * CALM)),
+            np.zeros((trials, depth, 2, cars)),
             np.full((trials, cars, LINKS), -1, dtype=np.int64),
             head,
         )
