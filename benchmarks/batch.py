@@ -99,12 +99,12 @@ def _drawn(config: Configuration) -> tuple[list[Instance], float]:
 
 
 def _commands(instances: list[Instance]) -> list[Floats]:
-    """Return the commands of all cars in each tick of a run."""
+    """Return the commands of all cars in each tick of a run; a group may have more places than cars."""
     group = Group(instances, keeps_rules=True)
     played: list[Floats] = []
     while len(group.active):
         group.advance()
-        played.append(group.commands.copy())
+        played.append(group.commands[:, : len(instances[0].starts)].copy())
     return played
 
 

@@ -141,3 +141,21 @@ def test_pairs_beyond_the_buffer_are_not_lost() -> None:
     commands = [(1000.0, 0.0)] + [(0.0, 0.0)] * 59
     _, contacts = drive(scene(starts, car), 1, *commands)
     assert [(c.car, c.other) for c in contacts] == [(0, 1)]
+
+
+@pytest.mark.parametrize(
+    "lay_out", [np.asfortranarray, np.float32, lambda commands: commands[:, ::-1][:, ::-1]]
+)
+def test_commands_of_any_layout_do_the_same(lay_out) -> None:
+    instance = scene([pose(0.0, 0.0, 0.0), pose(2.0, 1.0, 0.5)])
+    plain, other = Embedded(), Embedded()
+    state, same = plain.reset([instance, instance]), other.reset([instance, instance])
+    commands = np.array([[[0.5, 1.0], [9.0, -0.5]], [[0.25, 0.0], [0.5, 99.0]]])
+    for asked in (commands, 0.5 * commands, commands[::-1].copy()):
+        own = asked.copy()
+        given = lay_out(asked.copy())
+        plain.step(own)
+        other.step(given)
+        assert (given == own.astype(given.dtype)).all()
+        assert (state.x == same.x).all()
+        assert (state.s == same.s).all()

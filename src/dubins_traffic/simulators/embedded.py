@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -62,26 +62,30 @@ class Embedded:
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
         self._rows = rows(self._cars, places, 1.0 / self._rate)
         self._tick = 0
-        self._commands: Floats | None = None
+        self._call: Callable[..., int] | None = None
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
         """Clip `commands` (B, N, 2) in place, move for one tick and return the contacts of each trial."""
+        if not (commands.dtype == np.float64 and commands.flags.carray):
+            copied = np.array(commands, dtype=np.float64, order="C")
+            found = self.step(copied)
+            commands[...] = copied
+            return found
         trials = len(self._none)
         contacts: list[tuple[Contact, ...]] = self._none
         self._tick += 1
-        if commands is not self._commands:
-            self._commands = commands
-            self._bind()
+        call = self._call or self._bind(commands)
         done = 0
         while done < trials:
-            reached = self._call(done, 1.0 / self._rate, commands)
+            reached = call(done, 1.0 / self._rate, commands)
             if self._work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
                 self._work = enlarged(self._work)
-                self._bind()
+                call = self._bind(commands)
+        self._call = call
         return contacts
 
     @property
@@ -92,9 +96,9 @@ class Embedded:
     def close(self) -> None:
         """Nothing is held outside memory."""
 
-    def _bind(self) -> None:
+    def _bind(self, commands: Floats) -> Callable[..., int]:
         arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)
-        self._call = bound(step, (0, 0.0, self._commands), arrays)
+        return bound(step, (0, 0.0, commands), arrays)
 
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)
