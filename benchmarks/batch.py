@@ -27,7 +27,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.simulators.embedded import Embedded
 
 TRIALS, DURATION, ROUNDS = 128, 60, 7
-BATCH = 32
+BATCH = 64
 CLOCK_ROUNDS = 7
 
 

@@ -17,6 +17,12 @@ from dubins_traffic.roads.table import pack
 from dubins_traffic.spec.holding import column
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.tables import (
+    ALONG_HIGH,
+    ALONG_LOW,
+    ASIDE_HIGH,
+    ASIDE_LOW,
+    AXIS_X,
+    AXIS_Y,
     CALM,
     CALM_HIGH_X,
     CALM_HIGH_Y,
@@ -25,19 +31,24 @@ from dubins_traffic.spec.tables import (
     FORK_SURE,
     FORK_X,
     FORK_Y,
+    FROM_X,
+    FROM_Y,
     RING_HIGH,
     RING_LOW,
+    VERTEX_X,
+    VERTEX_Y,
 )
 
 
-def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
+@pytest.mark.parametrize("radius", [1.2, 9.0])
+def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch(radius) -> None:
     network = RoadNetwork.grid(3, 4, 4.0)
     table = pack([network], [0.6])
     random = np.random.default_rng(3)
     row = np.zeros(6)
     filled = forked = 0
     for x, y in random.uniform((-1.0, -1.0), (13.0, 9.0), (400, 2)):
-        patch(table, 0, x, y, row)
+        patch(table, 0, x, y, radius, row)
         if not (row[0] < row[1] and row[2] < row[3]):
             continue
         filled += 1
@@ -51,7 +62,8 @@ def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch() -> None:
             assert [nearest_arm(table, 0, int(row[5]), *point)[0] for point in points] == nearest.tolist()
         else:
             assert (nearest == row[4]).all()
-        assert (network.surface.nearest_vertex(points)[0] == row[5]).all()
+        vertex, away = network.surface.nearest_vertex(points)
+        assert ((vertex == row[5]) | (away > radius)).all()
     assert filled > 300
     assert forked > 50
 
@@ -137,7 +149,12 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             points = random.uniform(low, high, (20, 2))
             segment, far = surface.nearest_segment(points)
             vertex, away = surface.nearest_vertex(points)
-            kept = (row[RING_LOW] < away * away) & (away * away < row[RING_HIGH])
+            to_vertex = np.hypot(*(points - row[[VERTEX_X, VERTEX_Y]]).T) ** 2
+            kept = (row[RING_LOW] < to_vertex) & (to_vertex < row[RING_HIGH])
+            offset = points - row[[FROM_X, FROM_Y]]
+            along, aside = offset @ row[[AXIS_X, AXIS_Y]], offset @ (row[[AXIS_Y, AXIS_X]] * (-1.0, 1.0))
+            kept &= (row[ALONG_LOW] < along) & (along < row[ALONG_HIGH])
+            kept &= (row[ASIDE_LOW] < aside) & (aside < row[ASIDE_HIGH])
             sure = (np.abs(points - row[[FORK_X, FORK_Y]]) < row[FORK_SURE]).all(axis=1)
             assert (segment[sure] == labels.segment[0, n]).all()
             kept &= segment == labels.segment[0, n]

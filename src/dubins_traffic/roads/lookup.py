@@ -16,7 +16,7 @@ from dubins_traffic.roads.table import RoadTable
 INFINITE = float("inf")
 CERTAIN = 1e-6
 """What rounding can't make up, metres."""
-FORKED = 0.6
+FORKED = 1.2
 """Where the second segment is less than this farther than the nearest, metres, nearest is one of those at a vertex."""
 
 
@@ -170,12 +170,13 @@ def _nearest_segments(
 
 
 @jit
-def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
+def patch(t: RoadTable, net: int, x: float, y: float, radius: float, row: Floats) -> None:
     """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
 
     The rectangle (x from row[0] to row[1], y from row[2] to row[3], its edges not included) lies within the cell of the
     point, and within the disc in which nothing else can become nearest. It is empty outside the box of cells. Where it
     would be small since roads meet, row[4] is -1 instead: nearest is always one of the roads that meet in the vertex.
+    Another vertex may become nearest as long as all are more than `radius` metres away.
     """
     row[0] = row[1] = row[2] = row[3] = 0.0
     cell = cell_of(t, net, x, y)
@@ -186,7 +187,7 @@ def patch(t: RoadTable, net: int, x: float, y: float, row: Floats) -> None:
         row[5] = v
         return
     vertex, near, second = _nearest_vertices(t, net, cell, x, y)
-    spare = second - near
+    spare = max(second - near, 2.0 * (near - radius))
     segment, near, second, other = _nearest_segments(t, net, cell, vertex, x, y)
     if second - near < FORKED and near < other:
         segment = -1

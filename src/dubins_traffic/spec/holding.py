@@ -28,7 +28,11 @@ from dubins_traffic.spec.propositions import (
     STOPPED,
 )
 from dubins_traffic.spec.tables import (
+    ALONG_HIGH,
+    ALONG_LOW,
     APPROACH2,
+    ASIDE_HIGH,
+    ASIDE_LOW,
     AWAY2,
     AXIS_X,
     AXIS_Y,
@@ -48,6 +52,8 @@ from dubins_traffic.spec.tables import (
     HERE_X,
     HERE_Y,
     HOLDS,
+    LATERAL,
+    LEFT_SET,
     NET,
     NOW,
     PATCH_HIGH_X,
@@ -60,6 +66,7 @@ from dubins_traffic.spec.tables import (
     RADIUS,
     RING_HIGH,
     RING_LOW,
+    ROUNDING,
     SIGN,
     STAND_MOVE2,
     STAND_TICKS,
@@ -84,6 +91,7 @@ IF_NEAREST = 2.0
 """Value of HOLDS of a car that holds on to its labels if the nearest of the roads that meet is still the same."""
 FARTHEST = 100.0
 """Metres up to which a place is said to be far from any that matters."""
+HUGE = 1e300
 
 
 @jit_inline
@@ -117,7 +125,10 @@ def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Me
             along = rx * calm[k + BLOCK * AXIS_X] + ry * calm[k + BLOCK * AXIS_Y]
             progress = calm[k + BLOCK * BASE] + calm[k + BLOCK * SIGN] * along
             top = calm[k + BLOCK * TOP_SO_FAR]
-            inside &= top - progress < back
+            inside &= (top - progress < back) & (calm[k + BLOCK * ALONG_LOW] < along)
+            inside &= along < calm[k + BLOCK * ALONG_HIGH]
+            aside = calm[k + BLOCK * AXIS_X] * ry - calm[k + BLOCK * AXIS_Y] * rx
+            inside &= (calm[k + BLOCK * ASIDE_LOW] < aside) & (aside < calm[k + BLOCK * ASIDE_HIGH])
             half = calm[k + BLOCK * FORK_SURE]
             rx = x - calm[k + BLOCK * THEN_X]
             ry = y - calm[k + BLOCK * THEN_Y]
@@ -201,7 +212,8 @@ def hold(
     """Keep where a car that has been located is sure to hold on to its labels.
 
     It does while it is less than `spare` metres from (x, y), in the patch, where the squared distance from its vertex
-    compares with all radii that matter as `away2` does, and the nearest road is the same.
+    compares with all radii that matter as `away2` does, the nearest road is the same, and it is no farther aside in its
+    lane than `_keep_strip` says.
     """
     net: int = rules.whole[b, NET]
     row = memory.patch[b, n]
@@ -216,6 +228,7 @@ def hold(
     calm[column(n, VERTEX_Y)] = float(t.vert[vertex, 1])
     _keep_ring(n, away2, rules.real[b], calm)
     _keep_axis(n, net, lane, t, calm)
+    _keep_strip(b, n, lane, t, rules, memory)
     calm[column(n, TOP_SO_FAR)] = memory.measure[b, n, TOP]
 
 
@@ -253,3 +266,37 @@ def _keep_axis(n: int, net: int, lane: int, t: RoadTable, calm: Floats) -> None:
     calm[column(n, AXIS_Y)] = t.seg[k, 3]
     calm[column(n, BASE)] = t.seg[k, 4] if back else 0.0
     calm[column(n, SIGN)] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+
+
+@jit_inline
+def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memory: Memory) -> None:
+    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds."""
+    net: int = rules.whole[b, NET]
+    calm = memory.calm[b]
+    low = begin = -HUGE
+    high = end = HUGE
+    if lane >= 0:
+        half = t.half_width[net]
+        back = lane & 1 != 0
+        lateral = memory.measure[b, n, LATERAL]
+        aside = -lateral if back else lateral
+        if abs(aside) <= half:
+            low = CERTAIN - half
+            high = half - CERTAIN
+        elif aside > 0.0:
+            low = half + CERTAIN
+        else:
+            high = -half - CERTAIN
+        most = rules.real[b, LEFT_SET] - rules.real[b, ROUNDING] - CERTAIN
+        if lateral >= most:
+            low = high
+        elif back:
+            low = max(low, -most)
+        else:
+            high = min(high, most)
+        begin = CERTAIN
+        end = t.seg[t.seg_off[net] + (lane >> 1), 4] - CERTAIN
+    calm[column(n, ASIDE_LOW)] = low
+    calm[column(n, ASIDE_HIGH)] = high
+    calm[column(n, ALONG_LOW)] = begin
+    calm[column(n, ALONG_HIGH)] = end

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import (
     distance2,
@@ -47,7 +48,6 @@ from dubins_traffic.spec.tables import (
     JUDGED3,
     LANE,
     LATERAL,
-    LEFT_SET,
     NET,
     NEXT_IN_LANE,
     NOW,
@@ -85,16 +85,9 @@ def locate(
     net: int = rules.whole[b, NET]
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
-    row = memory.patch[b, n]
-    if not (row[PATCH_LOW_X] < x < row[PATCH_HIGH_X] and row[PATCH_LOW_Y] < y < row[PATCH_HIGH_Y]):
-        patch(t, net, x, y, row)
-    v = int(row[PATCH_VERTEX])
-    segment = int(row[PATCH_SEGMENT])
-    if segment >= 0:
-        off2 = distance2(t, net, segment, x, y)
-        surely = FARTHEST
-    else:
-        segment, off2, surely = nearest_arm(t, net, v, x, y)
+    v, segment, off2, surely = _look_up(
+        net, x, y, sqrt(real[b, CROSS2]) + half_length + half_width, t, memory.patch[b, n]
+    )
     away2 = vertex_distance2(t, net, v, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
     round_body = half_length + half_width == 0.0
@@ -144,9 +137,30 @@ def locate(
     spare = _reach(b, n, x, y, c, s, v, lane, lateral, t, rules, memory)
     if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
-    hold(b, n, x, y, away2, lane, min(spare, abs(sqrt(off2) - t.half_width[net])), t, rules, memory)
+    if lane < 0:
+        spare = min(spare, abs(sqrt(off2) - t.half_width[net]))
+    hold(b, n, x, y, away2, lane, spare, t, rules, memory)
     trust_fork(n, x, y, surely, memory.calm[b])
     return stirs
+
+
+@jit_inline
+def _look_up(
+    net: int, x: float, y: float, radius: float, t: RoadTable, row: Floats
+) -> tuple[int, int, float, float]:
+    """Return (vertex, segment, off2, surely): the nearest of each, by the patch in `row`, which is renewed if need be.
+
+    The vertex is the nearest one if any is within `radius` metres. off2 is the squared distance from the segment, which
+    is the nearest for `surely` metres along x and along y, as long as the patch holds.
+    """
+    if not (row[PATCH_LOW_X] < x < row[PATCH_HIGH_X] and row[PATCH_LOW_Y] < y < row[PATCH_HIGH_Y]):
+        patch(t, net, x, y, radius, row)
+    v = int(row[PATCH_VERTEX])
+    segment = int(row[PATCH_SEGMENT])
+    if segment >= 0:
+        return v, segment, distance2(t, net, segment, x, y), FARTHEST
+    segment, off2, surely = nearest_arm(t, net, v, x, y)
+    return v, segment, off2, surely
 
 
 @jit_inline
@@ -182,7 +196,6 @@ def _reach(
             if end != v:
                 spare = max(sqrt(gap2) - sqrt(outer2), 0.0)
             zone = 1 if real[CROSS2] <= gap2 <= outer2 else 0
-        spare = min(spare, max(real[LEFT_SET] - reach, 0.0))
     memory.measure[b, n, REACH] = reach
     memory.measure[b, n, GAP2] = gap2
     memory.mark[b, n, ZONE] = zone

@@ -83,8 +83,9 @@ PATCH: Final = 6
 
 CALM_LOW_X, CALM_HIGH_X, CALM_LOW_Y, CALM_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, RING_HIGH = range(8)
 FROM_X, FROM_Y, AXIS_X, AXIS_Y, BASE, SIGN, TOP_SO_FAR, FORK_X, FORK_Y, FORK_SURE = range(8, 18)
-HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(18, 26)
-CALM: Final = 26
+ASIDE_LOW, ASIDE_HIGH, ALONG_LOW, ALONG_HIGH = range(18, 22)
+HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(22, 30)
+CALM: Final = 30
 
 GRAIN = 1e-9
 """Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
@@ -124,7 +125,8 @@ class Memory(NamedTuple):
         Columns of BLOCK cars each, see `spec.holding.column`. Where all that a place says is the same, as far as the
         nearest segment is: within a rectangle (`CALM_LOW_X` to `CALM_HIGH_Y`), and at squared distances from a vertex
         (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and `SIGN`
-        times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far. Where the
+        times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far; between
+        which metres to the left of that axis, and along it, it is on the road and not left as it is now. Where the
         nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y. Of this
         frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
         whether it holds on to its labels, and whether it was still.
