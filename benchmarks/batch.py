@@ -1,13 +1,14 @@
-"""Full trials in batches, against the motion of the same trials alone, in one run.
+"""Full trials in batches, against the motion of the same cars alone, in one run.
 
-That motion is played back: the commands of a run of these trials, through the call that moves batches by themselves.
-Cars wait and keep apart as they do there; with constant commands some come so near that contacts are looked for.
+Motion alone is the call that moves batches, contacts and all, given commands: first speeds and yaw rates that stay,
+each car its own, as in the table of `benchmarks.overview`; then, for comparison, the commands of these very trials,
+played back. There cars wait and keep apart, so that no two of them come so near that contacts are looked for.
 
 A trial: 60 s, 6 `lawful` e-agents, the `rules` ego, a grid of 4 x 5 intersections, all rules judged, scores, no
 records.
-Times are of this process's processor time. Only two threads are measured by the clock: all trials twice over, in groups
-of 16, on one thread and on two in turn, and the best round of each counts, since whatever else the machine does falls
-on one of them only.
+Times are of this process's processor time. Only two threads are measured by the clock: all trials four times over, on
+one thread and on two in turn, and the best round of each counts, since whatever else the machine does falls on one of
+them only.
 """
 
 from __future__ import annotations
@@ -55,22 +56,26 @@ def measure() -> list[Row]:
     list(outcomes(instances[:2]))
     steps = TRIALS * len(instances[0].starts) * instances[0].ticks
     played = _commands(instances)
-    motion = _motion(instances, played)
+    staying = [circling(played[0].shape[:2])] * len(played)
+    motion, back = _motion(instances, staying), _motion(instances, played)
     kernel = min(_kernel(instances) for _ in range(ROUNDS))
     whole = min(_whole(instances) for _ in range(ROUNDS))
     rounds = [(_clock(instances, 1), _clock(instances, 2)) for _ in range(CLOCK_ROUNDS)]
     one, two = (min(seconds[k] for seconds in rounds) for k in (0, 1))
     return [
-        Row("motion alone, same trials", f"{steps / motion:.2e} car-steps/s", "", True),
+        Row("motion alone, commands that stay", f"{steps / motion:.2e} car-steps/s", "", True),
+        Row("motion alone, the trials' commands played back", f"{steps / back:.2e} car-steps/s", "", True),
         Row(
             "drivers, motion, labels, referee, metrics: the compiled pass",
-            f"{steps / kernel:.2e} car-steps/s = {motion / kernel:.2f} of motion alone",
+            f"{steps / kernel:.2e} car-steps/s = {motion / kernel:.2f} of motion,"
+            f" {back / kernel:.2f} of it played back",
             "",
             True,
         ),
         Row(
             "with tables, rounds, scores and verdicts of each trial",
-            f"{steps / whole:.2e} car-steps/s = {TRIALS / whole:.0f} trials/s, {motion / whole:.2f} of motion",
+            f"{steps / whole:.2e} car-steps/s = {TRIALS / whole:.0f} trials/s, {motion / whole:.2f} of motion,"
+            f" {back / whole:.2f} of it played back",
             ">= 8e6 car-steps/s, >= 600 trials/s, >= 1/6 of motion",
             steps / whole >= 8e6 and TRIALS / whole >= 600 and motion / whole >= 1.0 / 6.0,
         ),
@@ -106,6 +111,14 @@ def _commands(instances: list[Instance]) -> list[Floats]:
         group.advance()
         played.append(group.commands[:, : len(instances[0].starts)].copy())
     return played
+
+
+def circling(shape: tuple[int, ...]) -> Floats:
+    """Return commands that stay for so many trials and cars: 0.4 m/s, and yaw rates between -1 and 1 rad/s."""
+    commands = np.zeros((*shape, 2))
+    commands[..., 0] = 0.4
+    commands[..., 1] = np.random.default_rng(1).uniform(-1.0, 1.0, shape)
+    return commands
 
 
 def _motion(instances: list[Instance], played: list[Floats]) -> float:
@@ -149,5 +162,5 @@ def _whole(instances: list[Instance]) -> float:
 
 def _clock(instances: list[Instance], threads: int) -> float:
     began = perf_counter()
-    list(outcomes(2 * instances, batch=BATCH // 2, threads=threads))
+    list(outcomes(4 * instances, batch=BATCH, threads=threads))
     return perf_counter() - began

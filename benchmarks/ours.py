@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.batch import configuration
+from benchmarks.batch import circling, configuration
 from benchmarks.motion import bare
 from benchmarks.rates import BATCH, MOTION, WORLD, Rate
 from dubins_traffic.campaign.batch import outcomes
@@ -82,20 +82,13 @@ def _bare(cars: int) -> float:
 def _motion(instances: Sequence[Instance]) -> float:
     simulator = Embedded()
     state = simulator.reset(instances)
-    commands = _circling(state.x.shape)
+    commands = circling(state.x.shape)
 
     def work() -> None:
         for _ in range(MOVED):
             simulator.step(commands)
 
     return _best(state.x.size * MOVED, work)
-
-
-def _circling(shape: tuple[int, ...]) -> Floats:
-    commands = np.zeros((*shape, 2))
-    commands[..., 0] = 0.4
-    commands[..., 1] = np.random.default_rng(1).uniform(-1.0, 1.0, shape)
-    return commands
 
 
 def _batch(instances: Sequence[Instance]) -> float:
@@ -118,7 +111,7 @@ def gazebo(cars: int) -> Rate:
     instance = trials(cars)[0]
     starts = tuple(Pose(2.0 * (n % 8), 2.0 * (n // 8), 1.0, 0.0) for n in range(cars))
     try:
-        took = _stepped(replace(instance, starts=starts), _circling((1, cars)))
+        took = _stepped(replace(instance, starts=starts), circling((1, cars)))
     except DubinsTrafficError as error:
         return Rate(what, cars, None, str(error))
     return Rate(what, cars, cars * STEPPED / took)

@@ -7,6 +7,7 @@ from dubins_traffic.campaign.group import Group
 from dubins_traffic.cars.near import CELL, list_near
 from dubins_traffic.cars.state import NONE
 from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.problem.configuration import load_config
@@ -14,7 +15,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import nearest_arm, patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
-from dubins_traffic.spec.holding import column
+from dubins_traffic.spec.holding import place
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.tables import (
     ALONG_HIGH,
@@ -141,7 +142,7 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
         labeller.update(tick, group.state, [()])
         assert (labels.bits == group.labels.bits).all()
         for n in range(7):
-            row = labeller.memory.calm[0, [column(n, k) for k in range(CALM)]]
+            row = labeller.memory.calm[0, [place(n) + k * BLOCK for k in range(CALM)]]
             low, high = row[[CALM_LOW_X, CALM_LOW_Y]], row[[CALM_HIGH_X, CALM_HIGH_Y]]
             if tick % 10 != n or not (low < high).all():
                 continue

@@ -22,7 +22,7 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.driving.law import decide_trial as decide_lawful
 from dubins_traffic.driving.law_tables import Desk, Drivers
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.scoring.tally import CLEARANCE, SEALED, Tally, count_frame
 from dubins_traffic.spec.docket import JUDGED, OF_CAR, Docket, Terms
@@ -83,7 +83,7 @@ class World(NamedTuple):
     spacing: Spacing
 
 
-@jit
+@jit_wide
 def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: World) -> None:
     """Run each of the trials `active` for up to `most` ticks, as far as it goes.
 

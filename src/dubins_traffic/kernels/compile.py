@@ -98,14 +98,22 @@ def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, inner=True)
 
 
-def _compiled(function: Callable[P, R], *, inlined: bool = False, inner: bool = False) -> Callable[P, R]:
+def jit_wide(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `jit` does, and make the same steps for several cars one instruction: the compiler takes longer."""
+    return _compiled(function, wide=True)
+
+
+def _compiled(
+    function: Callable[P, R], *, inlined: bool = False, inner: bool = False, wide: bool = False
+) -> Callable[P, R]:
     library = cast(Any, numba)
-    library.config.SLP_VECTORIZE = 1  # the same steps for several cars become one instruction
     library.config.CACHE_DIR = str(cache_folder())
     linking.install()
     inner = inner or function.__name__.startswith("_")
     if inner or inlined:
         linking.mark_inner(function.__module__, function.__qualname__)
+    if wide:
+        linking.mark_wide(function.__module__, function.__qualname__)
     compiler = library.njit(
         cache=True,
         error_model="numpy",

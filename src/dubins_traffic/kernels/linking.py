@@ -25,23 +25,34 @@ FOR_PYTHON = "_ZN7cpython"
 _inner: set[str] = set()
 """How the names of compiled functions begin that only other kernels call."""
 
+_wide: set[str] = set()
+"""How the names of entries begin in which straight code, not only loops, is put into vectors."""
+
 
 def mark_inner(module: str, name: str) -> None:
     """Note that the function `name` of `module` is only called from other kernels."""
-    parts = (*module.split("."), name)
-    _inner.add("_ZN" + "".join(f"{len(part)}{part}" for part in parts))
+    _inner.add(_mangled(module, name))
+
+
+def mark_wide(module: str, name: str) -> None:
+    """Note that straight code of the function `name` of `module`, and of all that it calls, is put into vectors."""
+    _wide.add(_mangled(module, name))
+
+
+def _mangled(module: str, name: str) -> str:
+    return "_ZN" + "".join(f"{len(part)}{part}" for part in (*module.split("."), name))
 
 
 def install() -> None:
     """Let Numba put our kernels together as said above; to be called before any is compiled."""
-    from numba.core import codegen, types  # pyright: ignore[reportMissingTypeStubs]
+    from numba.core import codegen, config, types  # pyright: ignore[reportMissingTypeStubs]
     from numba.np import arrayobj  # pyright: ignore[reportMissingTypeStubs]
 
-    _optimise_whole(cast(Any, codegen).CPUCodeLibrary)
+    _optimise_whole(cast(Any, codegen).CPUCodeLibrary, cast(Any, config))
     _index_plainly(cast(Any, arrayobj), cast(Any, types).intp)
 
 
-def _optimise_whole(library: Any) -> None:
+def _optimise_whole(library: Any, config: Any) -> None:
     optimise = getattr(library, "_optimize_final_module", None)
     if optimise is None or hasattr(optimise, "of_kernels"):
         return
@@ -50,13 +61,19 @@ def _optimise_whole(library: Any) -> None:
         defined = [function for function in self._final_module.functions if not function.is_declaration]
         ours = [function for function in defined if MARK in function.name]
         own = [function.name for function in ours if function.linkage.name == "external"]
+        names = {name.partition("B")[0] for name in own if not name.startswith(FOR_PYTHON)}
         if own:
-            if all(name.partition("B")[0] in _inner for name in own if not name.startswith(FOR_PYTHON)):
+            if names <= _inner:
                 return
             for function in ours:
                 if function.linkage.name == "linkonce_odr":
                     function.linkage = "internal"
-        optimise(self)
+        usual = config.SLP_VECTORIZE
+        config.SLP_VECTORIZE = int(usual or not names.isdisjoint(_wide))
+        try:
+            optimise(self)
+        finally:
+            config.SLP_VECTORIZE = usual
 
     cast(Any, optimise_kernels).of_kernels = True
     library._optimize_final_module = optimise_kernels

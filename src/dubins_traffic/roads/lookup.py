@@ -115,7 +115,7 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
     return best, least
 
 
-@jit_inline
+@jit
 def nearest_arm(t: RoadTable, net: int, v: int, x: float, y: float) -> tuple[int, float, float]:
     """Return the nearest of the segments that meet in intersection v, as `nearest_segment` does, and a distance.
 

@@ -95,9 +95,9 @@ HUGE = 1e300
 
 
 @jit_inline
-def column(n: int, k: int) -> int:
-    """Return where column k of car n stands in a row of `Memory.calm`."""
-    return (n & -BLOCK) * CALM + k * BLOCK + (n & (BLOCK - 1))
+def place(n: int) -> int:
+    """Return where car n stands in the first column of a row of `Memory.calm`; column k is k * BLOCK farther."""
+    return (n & -BLOCK) * CALM + (n & (BLOCK - 1))
 
 
 @jit_inline
@@ -152,18 +152,20 @@ def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) ->
     x, y, present, past = state.x[b], state.y[b], memory.trail[b, now], memory.trail[b, then]
     if places % TOGETHER == 0:
         for n in range(0, places, TOGETHER):
-            _copy(past[0], n, calm, column(n, THEN_X))
-            _copy(past[1], n, calm, column(n, THEN_Y))
-            _copy(x, n, calm, column(n, HERE_X))
-            _copy(y, n, calm, column(n, HERE_Y))
+            k = place(n)
+            _copy(past[0], n, calm, k + BLOCK * THEN_X)
+            _copy(past[1], n, calm, k + BLOCK * THEN_Y)
+            _copy(x, n, calm, k + BLOCK * HERE_X)
+            _copy(y, n, calm, k + BLOCK * HERE_Y)
             _copy(x, n, present[0], n)
             _copy(y, n, present[1], n)
         return
     for n in range(places):
-        calm[column(n, THEN_X)] = past[0, n]
-        calm[column(n, THEN_Y)] = past[1, n]
-        calm[column(n, HERE_X)] = present[0, n] = x[n]
-        calm[column(n, HERE_Y)] = present[1, n] = y[n]
+        k = place(n)
+        calm[k + BLOCK * THEN_X] = past[0, n]
+        calm[k + BLOCK * THEN_Y] = past[1, n]
+        calm[k + BLOCK * HERE_X] = present[0, n] = x[n]
+        calm[k + BLOCK * HERE_Y] = present[1, n] = y[n]
 
 
 @jit_inline
@@ -176,7 +178,7 @@ def _copy(source: Floats, n: int, target: Floats, k: int) -> None:
 @jit_inline
 def still(b: int, n: int, memory: Memory) -> int:
     """Return STILL if car n is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
-    return STILL if memory.calm[b, column(n, WAS_STILL)] != 0.0 else 0
+    return STILL if memory.calm[b, place(n) + BLOCK * WAS_STILL] != 0.0 else 0
 
 
 @jit_inline
@@ -186,20 +188,21 @@ def holds_on(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, mem
     Returns False, and does nothing that matters, where it is not known. After `look_who_holds`.
     """
     calm = memory.calm[b]
-    holds = calm[column(n, HOLDS)]
+    k = place(n)
+    holds = calm[k + BLOCK * HOLDS]
     if holds == 0.0:
         return False
     if holds == IF_NEAREST:
-        x, y = calm[column(n, HERE_X)], calm[column(n, HERE_Y)]
+        x, y = calm[k + BLOCK * HERE_X], calm[k + BLOCK * HERE_Y]
         segment, _, surely = nearest_arm(t, rules.whole[b, NET], int(memory.patch[b, n, PATCH_VERTEX]), x, y)
         if segment != labels.segment[b, n]:
             return False
         trust_fork(n, x, y, surely, calm)
     measure = memory.measure[b, n]
-    measure[TOP] = calm[column(n, TOP_SO_FAR)]
-    measure[PROGRESS] = calm[column(n, WAY_SO_FAR)]
+    measure[TOP] = calm[k + BLOCK * TOP_SO_FAR]
+    measure[PROGRESS] = calm[k + BLOCK * WAY_SO_FAR]
     if memory.mark[b, n, ZONE] != 0:
-        measure[GAP2] = calm[column(n, AWAY2)]
+        measure[GAP2] = calm[k + BLOCK * AWAY2]
     labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(b, n, memory)
     return True
 
@@ -218,30 +221,32 @@ def hold(
     net: int = rules.whole[b, NET]
     row = memory.patch[b, n]
     calm = memory.calm[b]
+    k = place(n)
     half = 0.7 * spare - CERTAIN
-    calm[column(n, CALM_LOW_X)] = max(row[PATCH_LOW_X], x - half)
-    calm[column(n, CALM_HIGH_X)] = min(row[PATCH_HIGH_X], x + half)
-    calm[column(n, CALM_LOW_Y)] = max(row[PATCH_LOW_Y], y - half)
-    calm[column(n, CALM_HIGH_Y)] = min(row[PATCH_HIGH_Y], y + half)
+    calm[k + BLOCK * CALM_LOW_X] = max(row[PATCH_LOW_X], x - half)
+    calm[k + BLOCK * CALM_HIGH_X] = min(row[PATCH_HIGH_X], x + half)
+    calm[k + BLOCK * CALM_LOW_Y] = max(row[PATCH_LOW_Y], y - half)
+    calm[k + BLOCK * CALM_HIGH_Y] = min(row[PATCH_HIGH_Y], y + half)
     vertex = t.vert_off[net] + int(row[PATCH_VERTEX])
-    calm[column(n, VERTEX_X)] = float(t.vert[vertex, 0])
-    calm[column(n, VERTEX_Y)] = float(t.vert[vertex, 1])
-    _keep_ring(n, away2, rules.real[b], calm)
-    _keep_axis(n, net, lane, t, calm)
+    calm[k + BLOCK * VERTEX_X] = float(t.vert[vertex, 0])
+    calm[k + BLOCK * VERTEX_Y] = float(t.vert[vertex, 1])
+    _keep_ring(k, away2, rules.real[b], calm)
+    _keep_axis(k, net, lane, t, calm)
     _keep_strip(b, n, lane, t, rules, memory)
-    calm[column(n, TOP_SO_FAR)] = memory.measure[b, n, TOP]
+    calm[k + BLOCK * TOP_SO_FAR] = memory.measure[b, n, TOP]
 
 
 @jit_inline
 def trust_fork(n: int, x: float, y: float, surely: float, calm: Floats) -> None:
     """Keep that the nearest road is the same up to `surely` metres from (x, y), along x and along y."""
-    calm[column(n, FORK_X)] = x
-    calm[column(n, FORK_Y)] = y
-    calm[column(n, FORK_SURE)] = surely
+    k = place(n)
+    calm[k + BLOCK * FORK_X] = x
+    calm[k + BLOCK * FORK_Y] = y
+    calm[k + BLOCK * FORK_SURE] = surely
 
 
 @jit_inline
-def _keep_ring(n: int, away2: float, real: Floats, calm: Floats) -> None:
+def _keep_ring(k: int, away2: float, real: Floats, calm: Floats) -> None:
     """Keep between which squared distances of its vertex a car is at `away2`: of its discs, and who approaches it."""
     low = -1.0
     high = FARTHEST * FARTHEST
@@ -251,21 +256,21 @@ def _keep_ring(n: int, away2: float, real: Floats, calm: Floats) -> None:
             low = max(low, edge2)
         else:
             high = min(high, edge2)
-    calm[column(n, RING_LOW)] = low
-    calm[column(n, RING_HIGH)] = high
+    calm[k + BLOCK * RING_LOW] = low
+    calm[k + BLOCK * RING_HIGH] = high
 
 
 @jit_inline
-def _keep_axis(n: int, net: int, lane: int, t: RoadTable, calm: Floats) -> None:
+def _keep_axis(k: int, net: int, lane: int, t: RoadTable, calm: Floats) -> None:
     """Keep the segment along which a car makes progress, as `roads.lookup.lane_coordinates` measures it."""
-    k = t.seg_off[net] + (max(lane, 0) >> 1)
+    row = t.seg_off[net] + (max(lane, 0) >> 1)
     back = lane >= 0 and lane & 1 != 0
-    calm[column(n, FROM_X)] = t.seg[k, 0]
-    calm[column(n, FROM_Y)] = t.seg[k, 1]
-    calm[column(n, AXIS_X)] = t.seg[k, 2]
-    calm[column(n, AXIS_Y)] = t.seg[k, 3]
-    calm[column(n, BASE)] = t.seg[k, 4] if back else 0.0
-    calm[column(n, SIGN)] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    calm[k + BLOCK * FROM_X] = t.seg[row, 0]
+    calm[k + BLOCK * FROM_Y] = t.seg[row, 1]
+    calm[k + BLOCK * AXIS_X] = t.seg[row, 2]
+    calm[k + BLOCK * AXIS_Y] = t.seg[row, 3]
+    calm[k + BLOCK * BASE] = t.seg[row, 4] if back else 0.0
+    calm[k + BLOCK * SIGN] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
 
 
 @jit_inline
@@ -296,7 +301,8 @@ def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memor
             high = min(high, most)
         begin = CERTAIN
         end = t.seg[t.seg_off[net] + (lane >> 1), 4] - CERTAIN
-    calm[column(n, ASIDE_LOW)] = low
-    calm[column(n, ASIDE_HIGH)] = high
-    calm[column(n, ALONG_LOW)] = begin
-    calm[column(n, ALONG_HIGH)] = end
+    k = place(n)
+    calm[k + BLOCK * ASIDE_LOW] = low
+    calm[k + BLOCK * ASIDE_HIGH] = high
+    calm[k + BLOCK * ALONG_LOW] = begin
+    calm[k + BLOCK * ALONG_HIGH] = end

@@ -122,7 +122,7 @@ class Memory(NamedTuple):
         that meet in the nearest vertex) and vertex (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty
         before.
     calm : (B, C) float64
-        Columns of BLOCK cars each, see `spec.holding.column`. Where all that a place says is the same, as far as the
+        Columns of BLOCK cars each, see `spec.holding.place`. Where all that a place says is the same, as far as the
         nearest segment is: within a rectangle (`CALM_LOW_X` to `CALM_HIGH_Y`), and at squared distances from a vertex
         (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and `SIGN`
         times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far; between
