@@ -124,7 +124,7 @@ def circling(shape: tuple[int, ...]) -> Floats:
 def _motion(instances: list[Instance], played: list[Floats]) -> float:
     """Return the seconds in which the cars move, without those in which their commands are copied to one array.
 
-    A call with another array than the one before would look at the types of all its arguments.
+    So their commands are in the nearest memory, as those of the pass are.
     """
     commands = np.zeros_like(played[0])
     copying: list[float] = []

@@ -1,7 +1,8 @@
 """Which cars hold on to their labels in a frame, found for all cars of a trial at once (compiled).
 
-Cars move a little in a tick. So with its labels a rectangle about a car is kept, and a ring about the nearest vertex,
-in which the labels are the same for certain; there only its progress and whether it was still are found anew.
+Cars move a little in a tick. So with its labels a rectangle about a car is kept, a ring about the nearest vertex, and a
+strip of its lane, in which the labels are the same for certain; there only its progress and whether it was still are
+found anew.
 
 What is kept stands in `Memory.calm`, in columns a fixed number of cars apart, and nothing in the loop over the cars is
 a branch: so the compiler sees that several may be taken at once.

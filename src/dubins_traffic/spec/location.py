@@ -170,8 +170,8 @@ def _reach(
 ) -> float:  # fmt: skip
     """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
 
-    Returns metres that a round body may move before it becomes left, or comes to where cars approach and queue, or
-    leaves it, if the crossing is not v, the nearest vertex.
+    Returns metres that a round body may move before it comes to where cars approach and queue, if the crossing is not
+    v, the nearest vertex; 0 where it is there.
     """
     net: int = rules.whole[b, NET]
     real = rules.real[b]
