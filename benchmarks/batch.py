@@ -6,9 +6,9 @@ played back. There cars wait and keep apart, so that no two of them come so near
 
 A trial: 60 s, 6 `lawful` e-agents, the `rules` ego, a grid of 4 x 5 intersections, all rules judged, scores, no
 records.
-Times are of this process's processor time. Only two threads are measured by the clock: all trials four times over, on
-one thread and on two in turn, and the best round of each counts, since whatever else the machine does falls on one of
-them only.
+Times are of this process's processor time. Only two threads are measured by the clock: all trials four times over, in
+groups of half the size, on one thread and on two in turn, and the best round of each counts, since whatever else the
+machine does falls on one of them only.
 """
 
 from __future__ import annotations
@@ -162,5 +162,5 @@ def _whole(instances: list[Instance]) -> float:
 
 def _clock(instances: list[Instance], threads: int) -> float:
     began = perf_counter()
-    list(outcomes(4 * instances, batch=BATCH, threads=threads))
+    list(outcomes(4 * instances, batch=BATCH // 2, threads=threads))
     return perf_counter() - began
