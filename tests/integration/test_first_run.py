@@ -22,10 +22,10 @@ def run(folder, record_folder):
 
 def test_a_first_run_gives_the_bytes_of_later_ones(tmp_path) -> None:
     first = run(tmp_path / "cache", tmp_path / "first")
-    kernels = len(list((tmp_path / "cache").rglob("*.nbi")))
+    kernels = len(list((tmp_path / "cache").rglob("*.kernel")))
     assert kernels > 50
     assert run(tmp_path / "cache", tmp_path / "second") == first
-    assert len(list((tmp_path / "cache").rglob("*.nbi"))) == kernels
+    assert len(list((tmp_path / "cache").rglob("*.kernel"))) == kernels
     assert not list((tmp_path / "cache").rglob("*.tmp*"))
 
 
@@ -44,7 +44,7 @@ def test_a_companion_works_only_where_nothing_is_compiled(tmp_path) -> None:
         [sys.executable, "-c", COMPANION], env=variables, check=True, capture_output=True, text=True
     )
     assert ran.stdout == "0 None\n"
-    assert len(list(tmp_path.rglob("*.nbi"))) > 50
+    assert len(list(tmp_path.rglob("*.kernel"))) > 50
 
 
 def test_a_companion_is_ended_with_the_first_run(tmp_path, monkeypatch) -> None:

@@ -1,13 +1,15 @@
 """The compiler's settings, and where compiled kernels are kept.
 
-Numba's cache looks at the file of the compiled function only, not at the files of the functions it calls. The
-cache folder is therefore named by a hash of all sources that hold kernels and of the versions of the compiler.
+What is compiled depends on the functions that a kernel calls and the constants that it reads, wherever they stand. The
+cache folder is therefore named by a hash of all sources that hold kernels, of those that they import, and of the
+versions of the compiler.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -21,17 +23,26 @@ import numpy as np
 from platformdirs import user_cache_path
 
 from dubins_traffic.kernels import linking
+from dubins_traffic.kernels.store import PACKAGE, SUFFIX, KernelCache
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-PACKAGE = Path(__file__).resolve().parents[1]
+_IMPORT = re.compile(rb"^from dubins_traffic\.([\w.]+) import", re.MULTILINE)
 
 
 def sources() -> list[Path]:
-    """Return the source files of the package that hold kernels, in order."""
-    files = sorted(PACKAGE.rglob("*.py"))
-    return [file for file in files if file.parent.name == "kernels" or b"@jit" in file.read_bytes()]
+    """Return the files of the package that hold kernels, and all that these import when they are loaded, in order."""
+    text = {file: file.read_bytes() for file in PACKAGE.rglob("*.py")}
+    found = {file for file in text if file.parent.name == "kernels" or b"@jit" in text[file]}
+    waiting = list(found)
+    while waiting:
+        for name in _IMPORT.findall(text[waiting.pop()]):
+            file = PACKAGE.joinpath(*name.decode().split(".")).with_suffix(".py")
+            if file in text and file not in found:
+                found.add(file)
+                waiting.append(file)
+    return sorted(found)
 
 
 def fingerprint() -> str:
@@ -66,8 +77,7 @@ def nothing_compiled() -> bool:
     if cast(Any, numba).config.DISABLE_JIT:
         return False
     try:
-        folders = list(cache_folder().iterdir())
-        return all(next(folder.glob("*.nbi"), None) is None for folder in folders)
+        return not any(file.suffix == SUFFIX for file in cache_folder().iterdir())
     except OSError:
         return False
 
@@ -107,7 +117,6 @@ def _compiled(
     function: Callable[P, R], *, inlined: bool = False, inner: bool = False, wide: bool = False
 ) -> Callable[P, R]:
     library = cast(Any, numba)
-    library.config.CACHE_DIR = str(cache_folder())
     linking.install()
     inner = inner or function.__name__.startswith("_")
     if inner or inlined:
@@ -115,7 +124,6 @@ def _compiled(
     if wide:
         linking.mark_wide(function.__module__, function.__qualname__)
     compiler = library.njit(
-        cache=True,
         error_model="numpy",
         nogil=True,
         forceinline=inlined,
@@ -123,4 +131,7 @@ def _compiled(
         no_cfunc_wrapper=True,
         no_cpython_wrapper=inner,
     )
-    return cast(Callable[P, R], compiler(function))
+    compiled = compiler(function)
+    if not library.config.DISABLE_JIT:
+        compiled._cache = KernelCache(function, cache_folder())
+    return cast(Callable[P, R], compiled)
