@@ -1,59 +1,28 @@
 """The compiler's settings, and where compiled kernels are kept.
 
-What is compiled depends on the functions that a kernel calls and the constants that it reads, wherever they stand. The
-cache folder is therefore named by a hash of all sources that hold kernels, of those that they import, and of the
-versions of the compiler.
+The cache folder is named by the versions of the compiler; each folder in it by a module and a hash of its text and of
+all that it imports (`kernels.sources`). What is compiled depends on the functions that a kernel calls and the constants
+that it reads, wherever they stand.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
-import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
-import llvmlite  # pyright: ignore[reportMissingTypeStubs]
 import numba
-import numpy as np
 from platformdirs import user_cache_path
 
 from dubins_traffic.kernels import linking
-from dubins_traffic.kernels.store import PACKAGE, SUFFIX, KernelCache
+from dubins_traffic.kernels.sources import PACKAGE, kernel_files, source_hash, versions_hash
+from dubins_traffic.kernels.store import KernelCache
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-_IMPORT = re.compile(rb"^from dubins_traffic\.([\w.]+) import", re.MULTILINE)
-
-
-def sources() -> list[Path]:
-    """Return the files of the package that hold kernels, and all that these import when they are loaded, in order."""
-    text = {file: file.read_bytes() for file in PACKAGE.rglob("*.py")}
-    found = {file for file in text if file.parent.name == "kernels" or b"@jit" in text[file]}
-    waiting = list(found)
-    while waiting:
-        for name in _IMPORT.findall(text[waiting.pop()]):
-            file = PACKAGE.joinpath(*name.decode().split(".")).with_suffix(".py")
-            if file in text and file not in found:
-                found.add(file)
-                waiting.append(file)
-    return sorted(found)
-
-
-def fingerprint() -> str:
-    """Return a hash of all kernel sources and of the versions that compile them."""
-    digest = hashlib.sha256()
-    for part in (sys.version, numba.__version__, llvmlite.__version__, np.__version__):
-        digest.update(part.encode())
-    for file in sources():
-        digest.update(str(file.relative_to(PACKAGE)).encode())
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 @cache
@@ -61,13 +30,13 @@ def cache_folder() -> Path:
     """Return a folder for compiled kernels that can be written: the user's cache, else a temporary one."""
     root = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(root) if root else user_cache_path("dubins-traffic") / "kernels"
-    folder = base / fingerprint()
+    folder = base / versions_hash()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / fingerprint()
+        folder = Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / versions_hash()
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 
@@ -77,9 +46,16 @@ def nothing_compiled() -> bool:
     if cast(Any, numba).config.DISABLE_JIT:
         return False
     try:
-        return not any(file.suffix == SUFFIX for file in cache_folder().iterdir())
+        present = {path.name for path in cache_folder().iterdir()}
     except OSError:
         return False
+    return present.isdisjoint(module_folder(file).name for file in kernel_files())
+
+
+def module_folder(file: Path) -> Path:
+    """Return the folder for the compiled kernels of a file, of this package or another."""
+    name = ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
+    return cache_folder() / f"{name}-{source_hash(file)}"
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
@@ -133,5 +109,5 @@ def _compiled(
     )
     compiled = compiler(function)
     if not library.config.DISABLE_JIT:
-        compiled._cache = KernelCache(function, cache_folder())
+        compiled._cache = KernelCache(function, module_folder(Path(function.__code__.co_filename)))
     return cast(Callable[P, R], compiled)

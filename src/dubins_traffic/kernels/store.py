@@ -2,8 +2,8 @@
 
 Numba's own cache is keyed by the path and the time of a source, so that the same version in another environment
 compiles all anew; and it loads a damaged file as it is, which ends the process. Here a kernel's file lies in a folder
-named by the sources of all kernels (`kernels.compile.cache_folder`), is named by the kernel and its argument types,
-and begins with the hash of what follows. A file that does not fit its hash is removed, and the kernel compiled again.
+named by its module's sources (`kernels.compile.module_folder`), is named by the kernel and its argument types, and
+begins with the hash of what follows. A file that does not fit its hash is removed, and the kernel compiled again.
 """
 
 from __future__ import annotations
@@ -23,9 +23,6 @@ from numba.core import caching, compiler, serialize  # pyright: ignore[reportMis
 SUFFIX = ".kernel"
 """Ending of the files of compiled kernels."""
 
-PACKAGE = Path(__file__).resolve().parents[1]
-"""The folder of the package."""
-
 _DIGEST = hashlib.sha256().digest_size
 _library = cast(Any, caching)
 _compiler = cast(Any, compiler)
@@ -39,7 +36,7 @@ class KernelFiles:
     folder : Path
         Where they are kept.
     name : str
-        Module and name of the kernel.
+        Name of the kernel.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -111,15 +108,12 @@ class KernelCache(_library._Cache):
     function : callable
         The kernel's Python function.
     folder : Path
-        A folder named by all that decides what the package's kernels are compiled to, except the types of the
-        arguments and the processor. A kernel of another package is told apart by the text of its file too.
+        A folder named by all that decides what the kernels of a module are compiled to, except the types of the
+        arguments and the processor.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._files = KernelFiles(folder, f"{function.__module__}.{function.__qualname__}")
-        file = Path(function.__code__.co_filename)
-        ours = PACKAGE in file.parents or not file.is_file()
-        self._source = "" if ours else hashlib.sha256(file.read_bytes()).hexdigest()
+        self._files = KernelFiles(folder, function.__qualname__)
         self._line = function.__code__.co_firstlineno
         self._enabled = True
         self.folder = folder
@@ -155,4 +149,4 @@ class KernelCache(_library._Cache):
         self._files.flush()
 
     def _key(self, sig: Any, codegen: Any) -> object:
-        return self._source, self._line, sig, codegen.magic_tuple()
+        return self._line, sig, codegen.magic_tuple()
