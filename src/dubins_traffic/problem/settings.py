@@ -158,7 +158,8 @@ class RandomNetwork(Strict):
         description="number of segments, N - 1 up to floor(2N - 2 sqrt N)"
     )
     min_angle: Annotated[float, Field(gt=0, le=math.pi)] = Field(
-        default=math.pi / 3, description="smallest angle between two segments at an intersection, rad"
+        default=math.pi / 3,
+        description="smallest angle between two segments at an intersection, rad, or what the rules need if larger",
     )
     rigid_motion: bool = Field(default=False, description="whether the network is turned and moved at random")
 

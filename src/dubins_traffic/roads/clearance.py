@@ -1,7 +1,8 @@
-"""Room to judge rules 2 and 3: how far apart segments and intersections must be (RULES, *Ground*)."""
+"""Room to judge rules 2 and 3: how far apart segments, intersections and arms must be (RULES, *Ground*)."""
 
 from __future__ import annotations
 
+from math import acos, pi
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -18,25 +19,56 @@ ROUNDING = 1e-9
 
 
 class Clearances(NamedTuple):
-    """Least metres: length of a segment, between intersections, from an intersection to a segment beside it."""
+    """What a network must keep.
+
+    Attributes
+    ----------
+    length, apart, aside : float
+        Least metres: length of a segment, between intersections, from an intersection to a segment beside it.
+    cosine : float
+        Two segments that meet make an angle with a smaller cosine.
+    """
 
     length: float
     apart: float
     aside: float
+    cosine: float
+
+    def in_units(self, unit: float) -> Clearances:
+        """Return the same for a lattice whose unit is `unit` metres."""
+        return Clearances(self.length / unit, self.apart / unit, self.aside / unit, self.cosine)
 
 
 class Tight(NamedTuple):
-    """What falls short: segments (K,), pairs of intersections (K, 2), intersections and segments (K, 2)."""
+    """What falls short.
+
+    Attributes
+    ----------
+    short : (K,) int64
+        Segments.
+    close : (K, 2) int64
+        Pairs of intersections.
+    beside : (K, 2) int64
+        Intersections and segments.
+    sharp : (K, 3) int64
+        Intersections and two segments that meet there.
+    """
 
     short: Ints
     close: Ints
     beside: Ints
+    sharp: Ints
 
 
 def clearances(radius: float, reach: float, w: float, slack: float = SEGMENT_SLACK) -> Clearances:
-    """Return what RULES demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`."""
+    """Return what RULES demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`.
+
+    The roads of two arms that are 2 asin(2w / (R + rho)) apart or less overlap beyond the disc: a car would get from
+    one to the other beside the all-way stop.
+    """
     both = radius + reach
-    return Clearances(2.0 * both + slack, 2.0 * both, both + 2.0 * w)
+    sine = 2.0 * w / both
+    return Clearances(2.0 * both + slack, 2.0 * both, both + 2.0 * w, 1.0 - 2.0 * sine * sine)
 
 
 def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
@@ -61,7 +93,24 @@ def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
         s, v = s[loose], v[loose]
         far = distances(points[v], a[s], b[s])
         beside.append(np.stack([v, s], axis=-1)[far < least.aside - ROUNDING])
-    return Tight(short, _distinct(close), _distinct(beside))
+    return Tight(short, _distinct(close), _distinct(beside), _sharp(points, ends, least.cosine))
+
+
+def _sharp(points: Floats, ends: Ints, cosine: float) -> Ints:
+    """Return intersections and pairs of segments that make an angle there whose cosine is not below `cosine`."""
+    hub = np.concatenate([ends[:, 0], ends[:, 1]])
+    tip = np.concatenate([ends[:, 1], ends[:, 0]])
+    order = np.argsort(hub, kind="stable")
+    hub, tip, segment = hub[order], tip[order], order % max(len(ends), 1)
+    step = points[tip] - points[hub]
+    step /= _norm(step)[:, None]
+    found: list[Ints] = []
+    for gap in (1, 2, 3):
+        same = np.flatnonzero(hub[:-gap] == hub[gap:]) if len(hub) > gap else np.empty(0, dtype=np.int64)
+        other = same + gap
+        acute = (step[same] * step[other]).sum(axis=1) > cosine - ROUNDING
+        found.append(np.stack([hub[same], segment[same], segment[other]], axis=-1)[acute])
+    return np.concatenate(found)
 
 
 def clearance_faults(
@@ -101,6 +150,8 @@ def clearance_faults(
     for v, s in _couples(found.beside):
         gap = float(distances(points[v], points[ends[s, 0]], points[ends[s, 1]]))
         faults.append(_fault(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside))
+    for v, first, second in found.sharp.tolist():
+        faults.append(_sharp_fault(network, v, first, second, least.cosine))
     return faults
 
 
@@ -125,3 +176,15 @@ def _couples(rows: Ints) -> list[tuple[int, int]]:
 
 def _fault(problem: str, s: int, value: float, least: float) -> InputError:
     return InputError(problem, field=f"segments[{s}]", value=value, expected=f"at least {least:.6g} m")
+
+
+def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: float) -> InputError:
+    low, high = sorted((first, second))
+    step = [network.points[network.ends[s].sum() - v] - network.points[v] for s in (low, high)]
+    between = float((step[0] * step[1]).sum() / (_norm(step[0]) * _norm(step[1])))
+    return InputError(
+        f"too sharp an angle with segments[{low}] at {list(network.intersections[v])}",
+        field=f"segments[{high}]",
+        value=round(180.0 * acos(min(max(between, -1.0), 1.0)) / pi, 2),
+        expected=f"more than {180.0 * acos(cosine) / pi:.4g} degrees",
+    )

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import ceil, floor, isfinite, pi
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
+from dubins_traffic.roads.clearance import LEAST_RADIUS, ROUNDING, SEGMENT_SLACK, Clearances, clearances
 from dubins_traffic.roads.growth import Sketch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.rnd import extent
@@ -74,7 +75,8 @@ def random_network(
     intersections, segments : int
         N and M, with N - 1 <= M <= floor(2 N - 2 sqrt(N)).
     minimum_angle : float
-        Least angle between two segments at an intersection, radians, in (0, pi].
+        Least angle between two segments at an intersection, radians, in (0, pi]. Where the rules of the road
+        need a larger one, that counts (61.3 degrees by default).
     w, radius, reach, slack : float
         Width w of cars, intersection radius R (default 1 m * w / 0.3), reach rho of bodies, and by how much a
         segment must be longer than 2 (R + rho); metres.
@@ -91,7 +93,8 @@ def random_network(
     _check_sizes(minimum_angle, w, radius, reach, slack)
     metres = clearances(radius, reach, w, slack)
     unit = float(f"{metres.length / UNITS:.2g}")
-    least = Clearances(*(distance / unit for distance in metres))
+    wider = sincos(minimum_angle)[0] + 2.0 * ROUNDING
+    least = metres.in_units(unit)._replace(cosine=min(metres.cosine, wider))
     points, roads = _draw(draws, intersections, segments, least, minimum_angle)
     low_x, low_y = min(x for x, _ in points), min(y for _, y in points)
     moved = [(x - low_x, y - low_y) for x, y in points]
@@ -162,7 +165,7 @@ def _draw(draws: Draws, count: int, roads: int, least: Clearances, minimum_angle
                     return sketch.points, sketch.roads
             largest = max(largest, len(sketch.roads))
     if grid:
-        return weave(draws, count, roads, least, minimum_angle)
+        return weave(draws, count, roads, least)
     problem = f"can't be placed at angles of at least {180.0 * minimum_angle / pi:.6g} degrees"
     raise InputError(
         problem, field="segments", value=roads, expected=f"at most {largest}, the most that were placed"

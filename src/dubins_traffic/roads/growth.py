@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from math import ceil, floor, pi, sqrt
 
-from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.checks import LARGEST_DEGREE
-from dubins_traffic.roads.clearance import Clearances
+from dubins_traffic.roads.clearance import ROUNDING, Clearances
 
 LONGEST = 1.8
 """Roads are at most this many times as long as they must be."""
@@ -27,7 +26,7 @@ class Sketch:
     least : Clearances
         In lattice units.
     minimum_angle : float
-        Least angle between two roads at an intersection, radians.
+        Least angle between two roads at an intersection, radians: says how often to try.
     """
 
     def __init__(self, least: Clearances, minimum_angle: float) -> None:
@@ -35,7 +34,7 @@ class Sketch:
         self.roads: list[tuple[int, int]] = []
         self._least = least
         self._longest = LONGEST * least.length
-        self._cosine = sincos(minimum_angle)[0] + 1e-12
+        self._cosine = least.cosine - ROUNDING
         self._tries = ceil(TRIES * pi / max(pi - minimum_angle, 0.02))
         self._arms: list[list[int]] = []
         self._near_points: dict[Point, list[int]] = {}

@@ -7,7 +7,6 @@ from math import ceil, isqrt
 
 import numpy as np
 
-from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.checks import meetings
@@ -26,7 +25,7 @@ Site = tuple[int, int]
 
 
 def weave(
-    draws: Draws, count: int, roads: int, least: Clearances, minimum_angle: float
+    draws: Draws, count: int, roads: int, least: Clearances
 ) -> tuple[list[Site], list[tuple[int, int]]]:
     """Return `count` lattice points and `roads` roads between them, as pairs of their numbers.
 
@@ -37,20 +36,18 @@ def weave(
     count, roads : int
         count - 1 <= roads <= floor(2 count - 2 sqrt(count)), what the densest outline has.
     least : Clearances
-        In lattice units.
-    minimum_angle : float
-        At most pi / 2, radians.
+        In lattice units; its angle at most pi / 2.
     """
     sites, couples = _outline(draws, count, roads)
     ends = np.array(_choose(draws, count, couples, roads), dtype=np.int64)
-    pitch = ceil(PITCH * max(least))
+    pitch = ceil(PITCH * max(least.length, least.apart, least.aside))
     grid = pitch * np.array(sites, dtype=np.float64)
     shift = np.array([[draws.uniform(-1.0, 1.0) for _ in range(2)] for _ in range(count)]) * SHIFT * pitch
     scale = np.ones(count)
     points = grid
     for k in range(count + ROUNDS + 1):
         points = grid + np.rint(scale[:, None] * shift)
-        bad = _in_the_way(points, ends, least, minimum_angle)
+        bad = _in_the_way(points, ends, least)
         if not bad.any():
             break
         scale[bad] = scale[bad] * 0.75 if k < ROUNDS else 0.0
@@ -137,9 +134,7 @@ def _choose(draws: Draws, count: int, couples: list[tuple[int, int]], roads: int
     return tree + others[: roads - len(tree)]
 
 
-def _in_the_way(
-    points: Floats, ends: Ints, least: Clearances, minimum_angle: float
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _in_the_way(points: Floats, ends: Ints, least: Clearances) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Return which points have a part in something that is too close, too sharp or crosses."""
     bad = np.zeros(len(points), dtype=np.bool_)
     found = tight(points, ends, least)
@@ -149,23 +144,5 @@ def _in_the_way(
     bad[ends[found.beside[:, 1]].ravel()] = True
     segment = np.concatenate([points[ends[:, 0]], points[ends[:, 1]]], axis=1).astype(np.int64)
     bad[ends[meetings(segment).ravel()].ravel()] = True
-    for sharp in _sharp(points, ends, sincos(minimum_angle)[0]):
-        bad[sharp] = True
+    bad[ends[found.sharp[:, 1:].ravel()].ravel()] = True
     return bad
-
-
-def _sharp(points: Floats, ends: Ints, cosine: float) -> list[Ints]:
-    """Return intersections and their neighbours where two roads make an angle of a larger cosine."""
-    hub = np.concatenate([ends[:, 0], ends[:, 1]])
-    tip = np.concatenate([ends[:, 1], ends[:, 0]])
-    order = np.argsort(hub, kind="stable")
-    hub, tip = hub[order], tip[order]
-    step = points[tip] - points[hub]
-    step /= np.sqrt((step * step).sum(axis=1))[:, None]
-    found: list[Ints] = []
-    for gap in (1, 2, 3):
-        same = np.flatnonzero(hub[:-gap] == hub[gap:]) if len(hub) > gap else np.empty(0, dtype=np.int64)
-        other = same + gap
-        acute = (step[same] * step[other]).sum(axis=1) > cosine + 1e-12
-        found += [hub[same[acute]], tip[same[acute]], tip[other[acute]]]
-    return found
