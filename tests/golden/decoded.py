@@ -1,0 +1,54 @@
+"""Records, scores and replays as bytes that hold their meaning: no versions, no layout, no wall-clock time."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+
+import dubins_traffic as dt
+from dubins_traffic.viewer.replay import replay_page
+from tests.recordings import REALS, WHOLE
+
+_DATA = re.compile(r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', re.DOTALL)
+_LEFT_OUT = ("record", "time_to_begin_s", "wall", "act_latency_s")
+
+
+def plain(value: object) -> bytes:
+    """Return JSON with sorted keys; numbers by their shortest exact text."""
+    return json.dumps(value, sort_keys=True, default=_simple, separators=(",", ":")).encode()
+
+
+def _simple(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def decoded_score(score: dt.Score) -> bytes:
+    """Return a score without the record's place and what a wall clock measured."""
+    document = score.to_json()
+    return plain({name: document[name] for name in document if name not in _LEFT_OUT})
+
+
+def decoded_record(record: dt.Record) -> bytes:
+    """Return instance, frames, contacts, events and ending of a record."""
+    frames = record.frames
+    parts = [
+        plain(dt.instance_to_document(record.instance)),
+        plain([frames.first, frames.rate, record.controller]),
+    ]
+    parts += [getattr(frames, name).tobytes() for name in (*REALS, *WHOLE, "bits")]
+    parts.append(
+        plain([list(map(repr, frames.contacts)), list(map(repr, frames.events)), repr(record.ending)])
+    )
+    parts.append(plain([[len(block), len(block.contacts), len(block.events)] for block in record.blocks]))
+    return b"\n".join(parts)
+
+
+def replay_data(record: dt.Record) -> bytes:
+    """Return the data that a replay page carries."""
+    page = replay_page(record.instance, record.frames, record.ending)
+    found = _DATA.search(page)
+    assert found is not None
+    return plain(json.loads(found.group(1)))
