@@ -32,7 +32,9 @@ class Judge:
             for n, facts in enumerate(frame):
                 facts["leaves"], facts["shared"] = self.may_leave(k, n), self.shared(k, n)
                 facts["exit"] = facts["leaves"] and not facts["shared"]
-                facts["way"] = self.way(k, n)
+                facts["way"], facts["stays"] = self.way(k, n), False
+        for n in self.cars:
+            self.note_stays(n)
 
     def note(self, car: Car) -> dict[str, Any]:
         toward = -1 if car.lane is None else self.reference.toward(car.lane)
@@ -42,6 +44,17 @@ class Judge:
             "progress": 0.0 if car.lane is None else self.reference.s(car),
             "left_by": self.reference.lateral_range(car.lane, car)[1] if car.lane else 0.0,
         }  # fmt: skip
+
+    def note_stays(self, n: int) -> None:
+        """E4: note the frames in which a car has been in a disc with a free exit for longer than it may."""
+        for v in range(len(self.reference.points)):
+            for run in self.runs(
+                lambda k, v=v: self.past[k][n]["leaves"] and self.past[k][n]["crosses"] == v
+            ):
+                spent = 0
+                for k in run:
+                    spent += k > run.start and not self.past[k][n]["shared"]
+                    self.past[k][n]["stays"] = spent >= self.ticks(self.rules.exit_time)
 
     def arms(self, v: int) -> list[tuple[int, int]]:
         return [(s, ends.index(v)) for s, ends in enumerate(self.reference.ends) if v in ends]
@@ -66,13 +79,13 @@ class Judge:
         s, lateral = self.reference.coordinates(arm, *spot)
         return math.hypot(s - self.problem.intersection_radius, lateral + self.problem.car.w)
 
-    def takes(self, k: int, other: int, v: int, arm: tuple[int, int]) -> bool:
+    def takes(self, k: int, other: int, v: int, arm: tuple[int, int], gap: float) -> bool:
         """Whether a centre outside the disc of v is in a lane out of it, near the disc."""
         facts = self.past[k][other]
         s, lateral = self.reference.coordinates(arm, *facts["spot"])
         far = math.dist(facts["spot"], self.reference.points[v]) - self.problem.intersection_radius
         inside = -self.reference.w2 <= lateral <= 0 and s > 0 and facts["segment"] == arm[0]
-        return facts["at"] != v and inside and far <= self.rules.exit_gap
+        return facts["at"] != v and inside and far <= gap
 
     def free(self, k: int, n: int, v: int, arm: tuple[int, int]) -> bool:
         facts = self.past[k]
@@ -83,7 +96,7 @@ class Judge:
             if facts[other]["at"] == v and self.mouth(arm, facts[other]["spot"]) < own:
                 self.fired["nearer"] += 1
                 return False
-            if self.takes(k, other, v, arm):
+            if self.takes(k, other, v, arm, self.rules.exit_gap):
                 return False
         radius = self.problem.intersection_radius
         for obstacle in self.problem.obstacles:
@@ -164,7 +177,8 @@ class Judge:
                 if self.free(k, n, v, arm):
                     return False
                 away = self.mouth(arm, self.past[k][0]["spot"])
-                near = near or away <= self.rules.goal_gap or self.takes(k, 0, v, arm)
+                gap = self.rules.goal_gap
+                near = near or away <= gap or self.takes(k, 0, v, arm, gap)
         return near
 
     def ticks(self, duration: float) -> int:

@@ -1,4 +1,4 @@
-"""Random trials, judged by the referee and by the slow reference: `python -m tests.judge_trials 500` compares so many."""
+"""Random trials before the referee and the slow reference: `python -m tests.judge_trials 500` compares so many."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CLAUSES = {
     "lingers", "nearer", "narrow exit", "way back", "same tick", "ego in the bend", "one in the bend", "full bend",
     "stopped again", "E4 paused", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 }  # fmt: skip
-"""What is to happen in some trial: rules broken, and the clauses by which a rule does not speak or time does not count."""
+"""What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""
 
 
 def random_trial(number: int) -> tuple[Instance, list[Frame]]:
