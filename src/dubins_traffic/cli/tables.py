@@ -21,7 +21,7 @@ Scores: TypeAlias = "Sequence[Score]"
 
 WIDTH = 80
 """Columns of a terminal into which a table fits, unless told otherwise."""
-NOTE = "Controllers are ranked by counted rounds; ICRA 2016 counts samples (docs/scores.md)."
+NOTE = "Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md)."
 """What stands below a table."""
 
 
