@@ -5,10 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from io import StringIO
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
 
+from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.report import terminal, worst
+from dubins_traffic.campaign.report.comparison import Comparison, compare
+from dubins_traffic.campaign.table import read
 from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
@@ -178,3 +185,63 @@ def test_the_score_of_2016_is_not_defined_off_the_grid() -> None:
     feed(kite, make_frames(kite, [(40.0, -12.0)] * 4), scorer)
     assert scorer.result().icra2016 is None
     assert scorer.result().paper_score == 2 * 6 * 1
+
+
+# Of campaigns
+
+
+def campaign_of(folder: Path, *found: tuple[End, Score]) -> tuple[Comparison, Any]:
+    """Return the comparison of a campaign of two trials each of `lanes` and `simple`, and its table."""
+    campaign = Campaign.from_document(
+        {"version": 0, "trials": 2, "controllers": ["lanes", "simple"], "configurations": ["demo"]}
+    )
+    made = [rows.row(k, Ending(end, 3), own, {}) for k, (end, own) in enumerate(found)]
+    part = folder / "part.parquet"
+    part.write_bytes(rows.encoded(rows.columns(made)))
+    results = read(folder, campaign, [part])
+    return compare(campaign, results), results
+
+
+def told(comparison: Comparison) -> str:
+    stream = StringIO()
+    for one in terminal.tables(comparison):
+        Console(width=80, file=stream).print(one)
+    return stream.getvalue()
+
+
+def test_a_campaign_ranks_by_counted_rounds_and_puts_who_gave_up_last(tmp_path: Path) -> None:
+    quits = End.GAVE_UP, scored(rounds=9, counted_rounds=0, verdict=verdict("unfinished"))
+    drives = End.DURATION, scored(rounds=1, counted_rounds=1, verdict=verdict())
+    comparison, results = campaign_of(tmp_path, quits, quits, drives, drives)
+    assert comparison.controllers == ["simple", "lanes"]
+    assert [standing.controller for standing in comparison.standings] == ["simple", "lanes"]
+    assert {(one.first, one.second) for one in comparison.differences} == {("simple", "lanes")}
+    assert worst.order(results).tolist() == [0, 1, 2, 3]
+    why = worst.why(results.to_pylist()[0])
+    assert why == "100% of the goals visited, 0 of 9 rounds count, gave up after 0.1 s"
+
+
+def test_a_ranking_of_the_worst_knows_no_excuse(tmp_path: Path) -> None:
+    breach = replace(BREACH, car="ego")
+    excused = replace(verdict("excused"), violations=(breach, breach))
+    violated = replace(verdict("violated"), violations=(breach,))
+    found = [(End.DURATION, scored(verdict=own)) for own in (violated, excused)]
+    assert worst.order(campaign_of(tmp_path, *found)[1]).tolist() == [1, 0], "more breaches are worse"
+
+
+def test_a_campaign_counts_near_and_broken_assumptions_and_says_what_is_not_defined(tmp_path: Path) -> None:
+    found = [
+        (End.DURATION, scored(verdict=own, icra2016=None))
+        for own in (replace(verdict("excused"), near=True), verdict("excused"), verdict(), verdict())
+    ]
+    comparison, _ = campaign_of(tmp_path, *found)
+    assert (comparison.broken, comparison.judged) == (2, 4)
+    own = {standing.controller: standing for standing in comparison.standings}
+    assert (own["lanes"].near.count, own["lanes"].near.total, own["simple"].near.total) == (1, 2, 0)
+    assert [(own[name].clean.count, own[name].clean.total) for name in own] == [(0, 2), (2, 2)]
+    lines = told(comparison).split("\n")
+    assert any("excused, near" in line and "50.0%" in line for line in lines)
+    assert any("ICRA" in line and "not defined" in line for line in lines)
+    (tmp_path / "other").mkdir()
+    defined, _ = campaign_of(tmp_path / "other", *((end, replace(own, icra2016=4.0)) for end, own in found))
+    assert "not defined" not in told(defined)

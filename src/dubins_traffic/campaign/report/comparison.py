@@ -80,6 +80,8 @@ class Level:
 class Comparison:
     """A campaign compared: `trials` of `total` have rows, `metrics` are those of which there are values.
 
+    `undefined` are those that are defined for none of the trials.
+
     `controllers` are ranked by their counted rounds a trial, most first, where a trial that came to nothing has none;
     all else follows that order. The e-agents broke the assumption in `broken` of the `judged` trials.
     """
@@ -91,6 +93,7 @@ class Comparison:
     broken: int
     judged: int
     metrics: Sequence[Metric]
+    undefined: Sequence[Metric]
     standings: Sequence[Standing]
     differences: Sequence[Difference]
     levels: Sequence[Level]
@@ -130,6 +133,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         int((fallen > 0).sum()),
         int((~np.isnan(fallen)).sum()),
         known,
+        [metric for metric in METRICS if metric.bounded and metric not in known],
         [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
         list(_differences(campaign, results, chosen, known, values)),
         list(_levels(results, factors, chosen, known, values)),

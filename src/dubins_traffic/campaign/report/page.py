@@ -143,7 +143,9 @@ def _metrics(comparison: Comparison) -> str:
             estimate = standing.estimates[metric.column]
             first = f'<th rowspan="{many}" scope="rowgroup">{_heading(metric)}</th>' if k == 0 else ""
             body.append([first, _name(standing, k), *_estimate(estimate), _count(estimate.count)])
-    return _table(head, body, "grouped") + f"<p>{HOW}</p>"
+    undefined = ", ".join(metric.name for metric in comparison.undefined)
+    note = f"<p>Not defined for these trials: {_text(undefined)}.</p>" if undefined else ""
+    return _table(head, body, "grouped") + note + f"<p>{HOW}</p>"
 
 
 def _differences(comparison: Comparison) -> str:

@@ -50,6 +50,8 @@ def _metrics(comparison: Comparison) -> Table:
             mean = (shown(one.mean), _interval(one.mean_interval))
             median = (shown(one.median), _interval(one.median_interval))
             table.add_row(metric.heading if k == 0 else "", standing.controller, *mean, *median)
+    for metric in comparison.undefined:
+        table.add_row(metric.heading, "", "not defined", "", "", "")
     return table
 
 
@@ -66,7 +68,7 @@ def _differences(comparison: Comparison) -> Table:
 
 
 def _shares(comparison: Comparison) -> Table:
-    table = _table("clean, verdicts, ends, collisions of the ego by fault, and formulas")
+    table = _table("clean, verdicts, ends, collisions by fault, formulas")
     _columns(table, ("what", "controller"), ("trials", "share", "95 %"))
     for standing in comparison.standings:
         judged = {"clean": standing.clean} if standing.judged else {}

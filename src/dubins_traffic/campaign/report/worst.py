@@ -99,8 +99,9 @@ def why(row: Mapping[str, Any]) -> str:
         found.append(f"{row['breaches']} breaches, {row['verdict']}")
     if not found:
         whole = "" if row["end"] == End.DURATION else f", {words(row['end'])} after {row['duration_s']:.1f} s"
-        goals = f"{row['goals_visited']:.0%} of the goals visited"
-        found.append(f"{goals}, {row['rounds']} rounds, of which {row['counted_rounds']} count{whole}")
+        counted, rounds = row["counted_rounds"], row["rounds"]
+        some = f"{rounds} rounds" if counted == rounds else f"{counted} of {rounds} rounds count"
+        found.append(f"{row['goals_visited']:.0%} of the goals visited, {some}{whole}")
     return "; ".join(found)
 
 
