@@ -90,6 +90,16 @@ def test_networks_of_their_own_and_a_batch_of_any_size_and_threads() -> None:
     assert sheets[0] == sheets[1] == sheets[2]
     single = run_trial(draw(config, SEED, 4), "rules")
     assert plain(sheets[0].trials[4]) == plain(single.score)
+    assert single.score.icra2016 is None, "the network is no grid"
+
+
+def test_a_score_that_is_not_defined_is_none_in_a_batch_too() -> None:
+    for agents, defined in (([], True), ([{"type": "loop", "name": "bus"}], False), (AGENTS[:2], True)):
+        config = configuration(**{"e-agents": agents}, duration_bounds=[2, 2])
+        (own,) = run_batch(config, trials=1, seed=SEED).outcomes
+        single = run_trial(draw(config, SEED, 0), "rules").score
+        assert plain(own.score) == plain(single)
+        assert (single.icra2016 is not None) == defined
 
 
 def test_a_world_with_so_many_cars_that_they_are_looked_for_in_cells() -> None:

@@ -46,7 +46,9 @@ def paper_score(instance: Instance, collisions: Sequence[Collision], rounds: int
     off_road_s : float
         Seconds that the ego was off the road.
     """
-    agents = {agent.name for agent in instance.e_agents}
-    if any(collision.partner in agents for collision in collisions):
-        return COLLISION_SCORE
+    agents = instance.e_agents
+    if collisions:
+        names = {agent.name for agent in agents}
+        if any(collision.partner in names for collision in collisions):
+            return COLLISION_SCORE
     return len(agents) * network_size(instance.problem.network) * rounds / max(1.0, off_road_s)

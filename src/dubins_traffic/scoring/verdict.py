@@ -249,9 +249,9 @@ class Judging:
         )
 
     def _was_sensed(self, car: int, first: int, last: int) -> bool:
-        sensed = np.concatenate(self._sensed)
-        self._sensed = [sensed]
-        return bool(sensed[first : last + 1, car].any())
+        if len(self._sensed) > 1:
+            self._sensed = [np.concatenate(self._sensed)]
+        return bool(self._sensed[0][first : last + 1, car].any())
 
 
 def reach_verdict(
