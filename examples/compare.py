@@ -19,14 +19,18 @@ from rich.table import Table
 import dubins_traffic as dt
 
 
-def points(value: float) -> str:
-    """Return a score of ICRA 2016 in few characters."""
+def points(value: float | None) -> str:
+    """Return a score by a formula in few characters."""
+    if value is None:
+        return "not defined"
     return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
 
 
 ROWS: dict[str, Callable[[dt.Score], str]] = {
+    "clean": lambda score: "-" if score.verdict is None else ("yes" if score.verdict.clean else "no"),
+    "counted rounds": lambda score: str(score.counted_rounds),
+    "verdict": lambda score: "-" if score.verdict is None else str(score.verdict.verdict),
     "end": lambda score: score.end or "cut off",
-    "ICRA 2016": lambda score: points(score.icra2016),
     "rounds": lambda score: str(score.rounds),
     "goals visited": lambda score: f"{score.goals_visited:.0%}",
     "collisions": lambda score: str(len(score.collisions)),
@@ -35,13 +39,21 @@ ROWS: dict[str, Callable[[dt.Score], str]] = {
     "standing": lambda score: f"{score.driven.standing_share:.0%}",
     "distance, m": lambda score: f"{score.driven.distance_m:.1f}",
     "least gap, m": lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f}",
+    "paper": lambda score: points(score.paper_score),
+    "ICRA 2016": lambda score: points(score.icra2016),
+}
+SUMS: dict[str, Callable[[dt.ScoreSheet], str]] = {
+    "counted rounds": lambda sheet: str(sheet.counted_rounds_sum),
+    "paper": lambda sheet: points(sheet.paper_sum),
+    "ICRA 2016": lambda sheet: points(sheet.icra2016_sum),
 }
 
 
 def side_by_side(sheets: dict[str, dt.ScoreSheet]) -> Table:
-    """Return a table with one column per controller and trial."""
+    """Return a table with one column per controller and trial; the controller with most counted rounds comes first."""
     table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
     table.add_column("\ntrial", no_wrap=True)
+    sheets = dict(sorted(sheets.items(), key=lambda item: -item[1].counted_rounds_sum))
     for number, (controller, sheet) in enumerate(sheets.items()):
         if number:
             table.add_column("│\n│")
@@ -50,9 +62,11 @@ def side_by_side(sheets: dict[str, dt.ScoreSheet]) -> Table:
             table.add_column(f"{title}\n{score.trial}", justify="right", overflow="fold")
         table.add_column("\nsum", justify="right", style="bold")
     for heading, cell in ROWS.items():
+        if all(cell(score) == "-" for sheet in sheets.values() for score in sheet.trials):
+            continue
         cells = [heading]
         for number, sheet in enumerate(sheets.values()):
-            total = points(sheet.icra2016_sum) if heading == "ICRA 2016" else ""
+            total = SUMS[heading](sheet) if heading in SUMS else ""
             cells += ["│"] * bool(number) + [cell(score) for score in sheet.trials] + [total]
         table.add_row(*cells)
     return table
@@ -70,6 +84,7 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
         )
         sheets[name] = plan.conclude(dt.run_trials(plan.jobs))
     Console().print(side_by_side(sheets))
+    print("Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md).\n")
     for sheet in sheets.values():
         for score in sheet.trials:
             print(score.record)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import statistics
 from collections.abc import Iterator
@@ -86,6 +87,27 @@ def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> N
         verdicts = [row["verdict"] for row in own[line["controller"]]]
         assert (int(line["count"]), int(line["of"])) == (verdicts.count(line["which"]), 12)
     assert {line["which"] for line in judged} == {"satisfied", "violated", "excused", "unfinished"}
+    for line in sheet(folder, "shares.csv"):
+        mine = own[line["controller"]]
+        if line["of_what"] == "clean":
+            assert (int(line["count"]), int(line["of"])) == (sum(row["clean"] for row in mine), 12)
+        if line["of_what"] == "excused":
+            excused = [row["near"] for row in mine if row["verdict"] == "excused"]
+            assert (int(line["count"]), int(line["of"])) == (sum(excused), len(excused))
+
+
+def test_controllers_are_ranked_by_counted_rounds(folder: Path) -> None:
+    found = rows(folder)
+    for row in found:
+        whole = row["clean"] and row["end"] == "duration"
+        assert row["counted_rounds"] == (row["rounds"] if whole else 0)
+    order = list(dict.fromkeys(line["controller"] for line in sheet(folder, "controllers.csv")))
+    sums = [sum(row["counted_rounds"] for row in found if row["controller"] == name) for name in order]
+    assert set(order) == set(CONTROLLERS)
+    assert sums == sorted(sums, reverse=True)
+    metrics = [line["metric"] for line in sheet(folder, "controllers.csv") if line["controller"] == order[0]]
+    assert metrics[:2] == ["clean", "counted_rounds"]
+    assert metrics[-1] == "icra2016"
 
 
 def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
@@ -96,7 +118,7 @@ def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
         for name, (kind, _) in SCORES.items()
         if kind != "string" and not any(name.startswith(part) for part in parts)
     }
-    assert told == numbers - {"excuse_sensed"}
+    assert told == numbers - {"excuse_sensed", "near"}
     means = {
         (line["controller"], line["metric"]): float(line["mean"]) for line in sheet(folder, "controllers.csv")
     }
@@ -164,6 +186,27 @@ def test_a_report_in_the_terminal(folder: Path, tmp_path: Path, capsys: pytest.C
     assert "36 of 36 trials" in told
     assert "time to" in told
     assert not (tmp_path / "r" / "replays").exists()
+
+
+def test_the_terminal_names_the_worst_trials_and_how_to_replay_them(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "1"]) == 0
+    told = capsys.readouterr().out
+    commands = re.findall(r"^ +dubins-traffic (campaign replay \S+ \d+)$", told, re.MULTILINE)
+    assert len(commands) == len(CONTROLLERS)
+    by_number = {row["number"]: row for row in rows(folder)}
+    assert {by_number[int(command.split()[-1])]["controller"] for command in commands} == set(CONTROLLERS)
+    number = int(commands[0].split()[-1])
+    row = by_number[number]
+    factor = f"e-agents {row['factor.e_agents']}"
+    name = f"{row['controller']}, ten, {factor}, trial {row['trial']} of seed {row['seed']}: "
+    assert name in told
+    page = tmp_path / "page.html"
+    assert main([*commands[0].split(), "-o", str(page)]) == 0
+    assert page.read_bytes() == (tmp_path / "r" / "replays" / f"trial-{number:09d}.html").read_bytes()
+    assert main(["campaign", "replay", str(folder), "36"]) == 2
+    assert "36 of 36 have" in capsys.readouterr().err
 
 
 def test_a_folder_without_a_campaign(tmp_path: Path) -> None:

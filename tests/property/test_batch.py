@@ -1,6 +1,7 @@
 """A batch gives the scores and verdicts of its trials run one by one, bit for bit."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,14 +11,15 @@ from dubins_traffic.campaign.asked import BatchView, ask
 from dubins_traffic.campaign.batch import failed, outcomes, run_batch
 from dubins_traffic.campaign.group import Group
 from dubins_traffic.campaign.single import run_trial
-from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.instance import Problem
+from dubins_traffic.problem.instance import EAgent, Problem
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import read
 from dubins_traffic.scoring.score import Score, score
+from tests.rules_scripts import on_lane
 
 SEED = 5
 AGENTS = [
@@ -88,6 +90,16 @@ def test_networks_of_their_own_and_a_batch_of_any_size_and_threads() -> None:
     assert sheets[0] == sheets[1] == sheets[2]
     single = run_trial(draw(config, SEED, 4), "rules")
     assert plain(sheets[0].trials[4]) == plain(single.score)
+    assert single.score.icra2016 is None, "the network is no grid"
+
+
+def test_a_score_that_is_not_defined_is_none_in_a_batch_too() -> None:
+    for agents, defined in (([], True), ([{"type": "loop", "name": "bus"}], False), (AGENTS[:2], True)):
+        config = configuration(**{"e-agents": agents}, duration_bounds=[2, 2])
+        (own,) = run_batch(config, trials=1, seed=SEED).outcomes
+        single = run_trial(draw(config, SEED, 0), "rules").score
+        assert plain(own.score) == plain(single)
+        assert (single.icra2016 is not None) == defined
 
 
 def test_a_world_with_so_many_cars_that_they_are_looked_for_in_cells() -> None:
@@ -200,6 +212,71 @@ def test_plain_controllers_end_as_they_do_alone() -> None:
     config = configuration()
     for own in ask([draw(config, SEED, k) for k in range(5)], Quitter, "Quitter", 2):
         assert own.ending == run_trial(draw(config, SEED, own.instance.trial), Quitter()).ending
+
+
+class Gives:
+    """Stands, and gives up after some ticks; a start in the only goal's disc has then made a round."""
+
+    def start(self, _problem: Problem) -> None:
+        self._ticks = 7
+
+    def act(self, observation: Observation) -> Command | None:
+        return Command(0.0, 0.0) if observation.tick < self._ticks else None
+
+
+class Stands(Gives):
+    def start(self, _problem: Problem) -> None:
+        self._ticks = 10**6
+
+
+@pytest.mark.parametrize("driver", [Gives, Stands])
+def test_only_who_stays_to_the_end_is_satisfied_and_counts(driver: type[Gives], tmp_path) -> None:
+    config = configuration(**{"e-agents": []}, number_goals_bounds=[1, 1], duration_bounds=[2, 2])
+    drawn = draw(config, SEED, 0)
+    network = drawn.problem.network
+    goal = network.intersections[0]
+    x, y = network.points[0]
+    instance = replace(
+        drawn, problem=replace(drawn.problem, goals=(goal,)), starts=(Pose(float(x), float(y), 1.0, 0.0),)
+    )
+    (own,) = ask([instance], driver, "driver", 1)
+    single = run_trial(instance, driver(), record=tmp_path / "trial.mcap").score
+    kept = score(read(tmp_path / "trial.mcap"))
+    assert plain(own.score) == plain(single) == plain(kept)
+    assert single.verdict is not None
+    whole = driver is Stands
+    assert (single.rounds, single.counted_rounds) == (1, int(whole))
+    assert single.verdict.verdict == ("satisfied" if whole else "unfinished")
+    assert single.verdict.longest_gap_s == 2.0, "gaps run to the planned end"
+
+
+class Strays(Gives):
+    """Stands for two seconds, then drives over the centre line."""
+
+    def act(self, observation: Observation) -> Command:
+        return Command(0.0, 0.0) if observation.tick < 60 else Command(0.3, 1.0)
+
+
+@pytest.mark.parametrize(("lane", "near"), [(0, True), (20, False)])
+def test_a_collision_among_others_is_near_or_not(lane: int, near: bool, tmp_path) -> None:
+    drawn = draw(configuration(duration_bounds=[4, 4]), SEED, 0)
+    network = drawn.problem.network
+    agents = tuple(
+        EAgent("scripted", f"agent{k}", "scripted", {"commands": [[4.0, speed, 0.0]]})
+        for k, speed in enumerate((0.5, 0.0))
+    )
+    problem = replace(drawn.problem, e_agents=("agent0", "agent1"), rules={"assume_e1": 0})
+    places = [on_lane(network, lane, 2.0, -0.3), *(on_lane(network, 3, s, -0.3) for s in (1.4, 2.0))]
+    instance = replace(drawn, problem=problem, e_agents=agents, starts=tuple(Pose(*p) for p in places))
+    (own,) = ask([instance], Strays, "driver", 1)
+    single = run_trial(instance, Strays(), record=tmp_path / "trial.mcap").score
+    assert plain(own.score) == plain(single) == plain(score(read(tmp_path / "trial.mcap")))
+    found = single.verdict
+    assert found is not None
+    assert found.excuse is not None
+    assert (found.excuse.assumption, found.excuse.violation.car) == ("E2", "agent0")
+    assert {breach.rule for breach in found.violations if breach.car != "ego"} == {"E2"}
+    assert found.near is near
 
 
 def test_records_are_those_of_single_trials(tmp_path) -> None:

@@ -56,8 +56,13 @@ def test_entries_while_inside_at_the_block_border_are_not_counted_again() -> Non
     assert visits([ROAD] * 29 + [A] * 62, goals=[(0, 0)]).goals == (GoalVisits((0, 0), 1, 61 / 30.0),)
 
 
+def test_gaps_run_to_the_planned_end() -> None:
+    found = visits([ROAD] * 10 + [A] * 5, goals=[(0, 0)], ticks=90)
+    assert found.goals == (GoalVisits((0, 0), 1, 80 / 30.0),)
+
+
 def test_a_goal_never_visited_has_the_whole_trial_as_its_gap() -> None:
-    found = visits([A] * 61)
+    found = visits([A] * 61, ticks=60)
     assert found.visited == 0.5
     assert found.rounds == 0
     assert found.goals[1] == GoalVisits((2, 1), 0, 2.0)
@@ -224,15 +229,15 @@ def test_the_score_as_json() -> None:
         "controller": "mine.py:Mine",
         "record": "out/trial-3.mcap",
         "duration_s": 2.0,
-        "icra2016": 0.0,
-        "collisions": [],
-        "collisions_among_others": 0,
         "rounds": 0,
+        "counted_rounds": 0,
         "goals_visited": 0.5,
         "goals": [
-            {"goal": [0, 0], "visits": 1, "longest_gap_s": 2.0},
-            {"goal": [2, 1], "visits": 0, "longest_gap_s": 2.0},
+            {"goal": [0, 0], "visits": 1, "longest_gap_s": 3.0},
+            {"goal": [2, 1], "visits": 0, "longest_gap_s": 3.0},
         ],
+        "collisions": [],
+        "collisions_among_others": 0,
         "distance_m": 0.0,
         "standing_share": 1.0,
         "off_road_s": 2.0,
@@ -242,6 +247,8 @@ def test_the_score_as_json() -> None:
         "time_to_begin_s": 0.5,
         "verdict": None,
         "formulas": [],
+        "paper_score": 0.0,
+        "icra2016": 0.0,
         "interventions": 0,
     }
     assert document == expected
@@ -266,8 +273,9 @@ def test_the_sheet_sums_the_scores() -> None:
         scores.append(scorer.result())
     sheet = ScoreSheet(tuple(scores))
     assert sheet.icra2016_sum == 24 * 8
-    assert sheet.to_json() == {"trials": [score.to_json() for score in scores], "icra2016_sum": 192.0}
-    assert ScoreSheet(()).to_json() == {"trials": [], "icra2016_sum": 0.0}
+    sums = {"counted_rounds_sum": 0, "paper_sum": 48.0, "icra2016_sum": 192.0}
+    assert sheet.to_json() == {"trials": [score.to_json() for score in scores], **sums}
+    assert ScoreSheet(()).to_json() == {"trials": [], **dict.fromkeys(sums, 0)}
 
 
 def test_scoring_a_record_does_not_load_the_compiler() -> None:

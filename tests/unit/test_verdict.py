@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Contact, Pose
@@ -18,10 +20,13 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import EAgent, Instance
+from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.reader import read
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
 from dubins_traffic.scoring.verdict import Judging, Verdict
+from dubins_traffic.spec.judge import Breach
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
@@ -32,13 +37,23 @@ both = pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)
 
 
 def verdict(
-    instance: Instance, script: Sequence[Frame], contacts: Sequence[Contact] = (), size: int = 10
+    instance: Instance,
+    script: Sequence[Frame],
+    contacts: Sequence[Contact] = (),
+    size: int = 10,
+    *,
+    end: End | None = End.DURATION,
+    planned: int | None = None,
 ) -> Verdict:
-    """Return the verdict on a script, fed in blocks of `size` frames."""
+    """Return the verdict on a script, fed in blocks of `size` frames; of `planned` ticks, by default those it has."""
+    ticks = len(script) - 1
     judging = Judging()
-    judging.begin(instance)
+    duration = (ticks if planned is None else planned) / instance.problem.rate
+    judging.begin(replace(instance, duration=duration))
     for block in blocks(frames_of(script, instance.problem.rate, contacts), size):
         judging.frames(block)
+    if end is not None:
+        judging.end(Ending(end, ticks))
     found = judging.result()
     assert found is not None
     return found
@@ -102,6 +117,60 @@ def test_an_excuse_says_whether_the_ego_could_have_seen(turn: float) -> None:
     assert not sensed(13, far, witness_time=1.0)
     assert not sensed(14, near, witness_time=1.0)
     assert sensed(14, near)
+
+
+def chase(ego: Sequence[int], agent: Sequence[int], sight: Sequence[int], **rules: float) -> Verdict:
+    """Return the verdict when ego and e-agent are left at some frames, and the e-agent is in sight only at `sight`."""
+    roads = RoadNetwork.grid(2, 8, 5.0)
+    lane, far = (roads.arms(roads.vertex((x, 0)))[0] for x in (0, 6))
+    script = []
+    for k in range(60):
+        beside = lane if k in sight else far
+        other = on_lane(roads, beside, 3.0 if k in sight else 2.0, 0.0 if k in agent else -0.3)
+        script.append([on_lane(roads, lane, 2.0, 0.0 if k in ego else -0.3), other])
+    return verdict(case(roads, 2, **rules), script)
+
+
+def test_near_asks_each_breach_of_the_ego_for_one_near_it() -> None:
+    quick = {"witness_time": 1.0}
+    assert chase([20], [10], [10], **quick).near is True, "as far back as may be"
+    assert chase([20], [20], [20], **quick).near is True, "in the same frame"
+    assert chase([20], [9], [9], **quick).near is False, "too long ago"
+    assert chase([20], [9], [9]).near is True, "ten seconds unless the problem says otherwise"
+    assert chase([20], [12], [13], **quick).near is False, "in sight, and not when it broke the rule"
+    assert chase([20, 40], [12], [12], **quick).near is False, "the second breach has none"
+    assert chase([20, 40], [12, 35], [12, 35], **quick).near is True
+    assert chase([20], [5, 15], [15], **quick).near is True, "another breach than that of the excuse"
+
+
+def test_near_is_said_of_who_is_excused_only() -> None:
+    assert chase([5], [20], [20]).verdict == "violated"
+    assert chase([5], [20], [20]).near is None
+    assert chase([], [20], [20]).near is None
+    assert chase([20], [12], [12]).to_json()["near"] is True
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 30), st.integers(0, 3), st.booleans()), max_size=12),
+    st.integers(0, 8),
+)
+@settings(max_examples=200, deadline=None, derandomize=True)
+def test_near_is_as_defined(found: list[tuple[int, int, bool]], back: int) -> None:
+    breaches = [Breach("2.left", car, tick, tick, 0.0, 0.0, -1, -1) for tick, car, _ in sorted(found)]
+    seen = {(car, tick) for tick, car, is_seen in found if is_seen}
+    expected = all(
+        any(o.car > 0 and t.tick - back <= o.tick <= t.tick and (o.car, o.tick) in seen for o in breaches)
+        for t in breaches
+        if t.car == 0
+    )
+    assert is_near(breaches, back, lambda car, tick: (car, tick) in seen) == expected
+
+
+def test_the_assumption_may_fall_after_the_ego_or_without_it() -> None:
+    assert duel(GRID, 5, 20).assumption_broken
+    assert duel(GRID, -1, 20).assumption_broken
+    assert not duel(GRID, 5, -1).assumption_broken
+    assert not duel(GRID, 5, 20, assume_e1=0).assumption_broken
 
 
 @both
@@ -188,6 +257,16 @@ def test_satisfied_needs_every_goal_and_short_gaps(roads: RoadNetwork) -> None:
     assert found.gap_limit_s == 10.0 * once
     assert ruling([10, 30], [goal], gap_rounds=2.0 / once + 1e-9) == "satisfied"
     assert ruling([10, 30], [goal], gap_rounds=2.0 / once - 1e-9) == "unfinished"
+
+
+@pytest.mark.parametrize("end", [*(end for end in End if end is not End.DURATION), None], ids=str)
+def test_who_ends_before_the_time_is_not_satisfied(end: End | None) -> None:
+    script = [[on_lane(GRID, lanes_in(GRID)[0], 2.0, -0.3)]] * 20
+    assert verdict(case(GRID, 1), script).verdict == "satisfied"
+    assert verdict(case(GRID, 1), script, end=end).verdict == "unfinished"
+    assert verdict(case(GRID, 1), script, planned=20).verdict == "unfinished", "a tick is missing"
+    rude = [[on_lane(GRID, lanes_in(GRID)[0], 2.0, 0.0)]] * 20
+    assert verdict(case(GRID, 1), rude, end=end).verdict == "violated"
 
 
 def test_formulas_have_four_values() -> None:
@@ -307,12 +386,14 @@ def test_check_prints_the_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[
     run_trial(replace(instance, problem=replace(instance.problem, rules={})), "simple", record=silent)
     assert main(["check", str(judged), str(silent), "--json"]) == 0
     first, second = json.loads(capsys.readouterr().out)["records"]
-    keys = ["record", "verdict", "clean", "violations", "rounds", "longest_gap_s"]
+    keys = [
+        "record", "clean", "verdict", "near", "violations", "rounds", "counted_rounds", "longest_gap_s",
+    ]  # fmt: skip
     assert list(first) == keys
     assert (first["record"], first["clean"]) == (str(judged), False)
     assert first["verdict"] in ("violated", "excused")
     assert list(first["violations"][0]) == ["rule", "car", "time", "since", "where"]
-    assert [second[key] for key in keys[1:4]] == [None, None, []]
+    assert [second[key] for key in keys[1:5]] == [None, None, None, []]
     assert main(["check", str(judged), str(silent)]) == 0
     text = capsys.readouterr().out
     assert first["verdict"] in text

@@ -24,7 +24,7 @@ from dubins_traffic.driving.law_tables import Desk, Drivers
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.scoring.tally import CLEARANCE, SEALED, Tally, count_frame
+from dubins_traffic.scoring.tally import CLEARANCE, SEALED, SIGHT2, Tally, count_frame
 from dubins_traffic.spec.docket import JUDGED, OF_CAR, Docket, Terms
 from dubins_traffic.spec.frame import label_trial
 from dubins_traffic.spec.judge_kernel import judge_trial
@@ -49,8 +49,8 @@ class Course(NamedTuple):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
     `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
-    `contact` (C, 3): tick and the flags of both cars in the frame before, of each contact. `place` (K, 2): where
-    the car of each breach was.
+    `contact` (C, 5): tick, the flags of both cars in the frame before, and whether each is within the ego's sensing
+    radius, of each contact. `place` (K, 2): where the car of each breach was.
     """
 
     ints: Ints
@@ -187,10 +187,20 @@ def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
         note[0] = tick
         note[1] = np.int64(world.labels.bits[b, car])
         note[2] = np.int64(world.labels.bits[b, other]) if other >= 0 else 0
+        note[3] = _is_sensed(b, car, world)
+        note[4] = _is_sensed(b, other, world) if other >= 0 else 0
         if EGO in (car, other):
             ego_hit = True
             world.tally.floats[b, CLEARANCE] = 0.0
     return ego_hit
+
+
+@jit
+def _is_sensed(b: int, n: int, world: World) -> int:
+    """Return 1 if car n is within the ego's sensing radius, else 0."""
+    dx = world.state.x[b, n] - world.state.x[b, EGO]
+    dy = world.state.y[b, n] - world.state.y[b, EGO]
+    return 1 if dx * dx + dy * dy <= world.tally.floats[b, SIGHT2] else 0
 
 
 @jit_inline

@@ -129,6 +129,7 @@ class Group:
         self._going = np.ones(trials, dtype=bool)
         self._contacts: list[list[Contact]] = [[] for _ in instances]
         self._breaches: list[list[Breach]] = [[] for _ in instances]
+        self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
         self._run(self.active, 1)
         self._aim()
 
@@ -177,8 +178,8 @@ class Group:
         found: list[Outcome] = []
         for b, ending, hanging in zip(trials, endings, running(rows, world.terms, world.docket), strict=True):
             score = tallied.score(
-                self.instances[b], b, self._contacts[b], self._breaches[b], hanging, ending, self._rules[b],
-                name, begin.get(b),
+                self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
+                self._rules[b], name, begin.get(b),
             )  # fmt: skip
             found.append(Outcome(self.instances[b], ending, score))
         return found
@@ -193,7 +194,7 @@ class Group:
         ints[:, OTHERS] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         radii = np.array([instance.problem.sensing_radius for instance in self.instances])
         places = np.zeros((breaches, 2))
-        return Course(ints, radii * radii, np.zeros((contacts, 3), dtype=np.int64), places)
+        return Course(ints, radii * radii, np.zeros((contacts, 5), dtype=np.int64), places)
 
     def _aim(self) -> None:
         """Let the egos that keep the rules begin with the goal nearest to where they start."""
@@ -239,10 +240,20 @@ class Group:
         world = self._world
         found, filled = int(world.work.found[0]), int(world.docket.filled[0])
         notes = zip(world.work.contact[:found].tolist(), world.course.contact[:found].tolist(), strict=True)
-        for row, (tick, own, other) in notes:
-            contact = contact_of(row, tick, self._rate)
-            self._contacts[int(row[0])].append(with_fault_by(contact, own, other))
+        for row, (tick, own, other, own_seen, other_seen) in notes:
+            b, contact = int(row[0]), contact_of(row, tick, self._rate)
+            self._contacts[b].append(with_fault_by(contact, own, other))
+            pair = ((contact.car, own_seen), (contact.other, other_seen))
+            self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
         rows: list[list[int]] = world.docket.row[:filled].tolist()
         for row, (x, y) in zip(rows, world.course.place[:filled].tolist(), strict=True):
-            self._breaches[row[OF_TRIAL]].append(breach_of(row, x, y))
+            b, breach = row[OF_TRIAL], breach_of(row, x, y)
+            self._breaches[b].append(breach)
+            if self._is_seen(b, breach):
+                self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.docket.filled[0] = 0
+
+    def _is_seen(self, b: int, breach: Breach) -> bool:
+        """Tell whether the car of a breach was within the ego's sensing radius in that frame."""
+        dx, dy = self._world.tally.pose[b, breach.tick, :2] - (breach.x, breach.y)
+        return bool(dx * dx + dy * dy <= self._world.course.sight2[b])

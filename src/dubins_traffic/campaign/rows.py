@@ -74,7 +74,11 @@ def _formulas(score: Score) -> str | None:
 
 SCORES: Mapping[str, tuple[str, Callable[[Score], Any]]] = {
     "duration_s": ("float64", lambda score: score.duration_s),
-    "icra2016": ("float64", lambda score: score.icra2016),
+    "clean": ("bool", lambda score: score.verdict and score.verdict.clean),
+    "counted_rounds": ("int32", lambda score: score.counted_rounds),
+    "verdict": ("string", lambda score: score.verdict and score.verdict.verdict.value),
+    "near": ("bool", lambda score: score.verdict and score.verdict.near),
+    "assumption_broken": ("bool", lambda score: score.verdict and score.verdict.assumption_broken),
     "rounds": ("int32", lambda score: score.rounds),
     "goals_visited": ("float64", lambda score: score.goals_visited),
     "longest_gap_s": ("float64", lambda score: max((g.longest_gap_s for g in score.goals), default=None)),
@@ -89,8 +93,6 @@ SCORES: Mapping[str, tuple[str, Callable[[Score], Any]]] = {
     "collisions_other_fault": ("int32", lambda score: sum(map(_other_fault, score.collisions))),
     "collisions_both_fault": ("int32", lambda score: sum(map(_both_fault, score.collisions))),
     "collisions_among_others": ("int32", lambda score: score.collisions_among_others),
-    "verdict": ("string", lambda score: score.verdict and score.verdict.verdict.value),
-    "clean": ("bool", lambda score: score.verdict and score.verdict.clean),
     "excuse": (
         "string",
         lambda score: score.verdict and score.verdict.excuse and score.verdict.excuse.assumption,
@@ -105,6 +107,8 @@ SCORES: Mapping[str, tuple[str, Callable[[Score], Any]]] = {
     "breaches_of_others": ("int32", lambda score: _breaches(score, ego=False)),
     **{f"breaches.{rule}": ("int32", _broken(rule)) for rule in EGO_RULES},
     **{f"breaches_of_others.{part}": ("int32", _fallen(part)) for part in ASSUMPTIONS},
+    "paper_score": ("float64", lambda score: score.paper_score),
+    "icra2016": ("float64", lambda score: score.icra2016),
 }
 """What is kept of a score: column, its type in Arrow, and its value; null where a score has none."""
 

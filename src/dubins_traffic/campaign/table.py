@@ -79,7 +79,11 @@ def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = K
     whole = folder / (RESULTS if kind is Kind.RESULTS else WALL)
     try:
         if whole.is_file():
-            return made.parquet.read_table(whole)
+            found = made.parquet.read_table(whole)
+            if found.schema.names != _schema(campaign, kind).names:
+                expected = "the table of a campaign that was run with this version of dubins-traffic"
+                raise InputError("has other columns", file=str(whole), expected=expected)
+            return found
         empty = _schema(campaign, kind).empty_table()
         return made.concat_tables([empty, *(_shaped(campaign, _load(part), kind) for part in parts)])
     except (OSError, made.ArrowInvalid) as error:
@@ -96,6 +100,13 @@ def faulty(folder: Path) -> tuple[int, str]:
         return 0, ""
     first = bad.slice(0, 1).to_pylist()[0]
     return len(bad), f"trial {first['number']} with {first['controller']}: {first['end']}: {first['reason']}"
+
+
+def assumption(folder: Path) -> tuple[int, int]:
+    """Return in how many judged trials of a finished campaign others broke the assumption, of how many."""
+    found = rows.arrow().parquet.read_table(folder / RESULTS, columns=["assumption_broken"])
+    known = found["assumption_broken"].drop_null().to_pylist()
+    return sum(known), len(known)
 
 
 def _groups(campaign: Campaign, parts: Sequence[Path], kind: Kind) -> Iterator[Any]:

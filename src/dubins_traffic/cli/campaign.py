@@ -21,6 +21,8 @@ RUN_EXAMPLES = options.examples(
 
 REPORT_EXAMPLES = options.examples("campaign report gaps", "campaign report gaps -o report --worst 5")
 
+REPLAY_EXAMPLES = options.examples("campaign replay gaps 17", "campaign replay gaps 17 -o trial.html")
+
 campaign = typer.Typer(
     help="Many trials from one file: controllers compared on the same instances, with error bars.",
     no_args_is_help=True,
@@ -91,10 +93,14 @@ def run(
 
 def _conclude(ran: Ran) -> None:
     """Say what there is, and fail if a trial came to nothing."""
-    from dubins_traffic.campaign.table import RESULTS, faulty
+    from dubins_traffic.campaign.table import RESULTS, assumption, faulty
+    from dubins_traffic.scoring.notice import assumption_notice
 
     before = f", {ran.before} of them before" if ran.before else ""
     print(f"{ran.folder / RESULTS}: {ran.campaign.total} trials{before}")
+    notice = assumption_notice(*assumption(ran.folder))
+    if notice:
+        faults.tell(notice)
     count, first = faulty(ran.folder)
     if count:
         faults.tell(f"{count} of {ran.campaign.total} trials ended by a fault; the first: {first}")
@@ -123,9 +129,10 @@ def report(
     """Compare the controllers of a campaign: a table here, a page with plots and replays, and CSV."""
     from rich.console import Console
 
-    from dubins_traffic.campaign.report.terminal import tables
+    from dubins_traffic.campaign.report.terminal import tables, worst_lines
     from dubins_traffic.campaign.report.write import write_report
     from dubins_traffic.cli.progress import progress
+    from dubins_traffic.scoring.notice import assumption_notice
 
     with progress() as show:
         written = write_report(folder, output, worst=worst, wall=wall, progress=show)
@@ -133,4 +140,35 @@ def report(
     for table in tables(written.comparison):
         console.print(table)
         console.print()
+    if any(written.worst.values()):
+        print("worst trials, each with the command that replays it")
+        print(*worst_lines(written.worst, folder), sep="\n", end="\n\n")
+    notice = assumption_notice(written.comparison.broken, written.comparison.judged)
+    if notice:
+        print(notice, end="\n\n")
     options.tell(str(written.page))
+
+
+@campaign.command("replay", epilog=REPLAY_EXAMPLES)
+def replay(
+    folder: Annotated[str, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)],
+    number: Annotated[
+        int,
+        typer.Argument(
+            metavar="NUMBER", min=0, help="The trial, as its table numbers it.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE.html", help="The page.", show_default="DIR/report/replays/..."
+        ),
+    ] = None,
+) -> None:
+    """Run one trial of a campaign again and make a page that replays it in a browser."""
+    from dubins_traffic.campaign.report.write import replay_trial
+
+    page, note = replay_trial(folder, number, output)
+    if note:
+        faults.tell(f"trial {number} {note}")
+    options.tell(str(page))

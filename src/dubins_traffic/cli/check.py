@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,25 +27,31 @@ def check(
 ) -> None:
     """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car."""
     from dubins_traffic.campaign.sources import load_record
-    from dubins_traffic.scoring.score import score
+    from dubins_traffic.scoring.notice import assumption_notice
+    from dubins_traffic.scoring.score import ScoreSheet, score
 
     scores = [(record, score(load_record(record))) for record in records]
     if json:
         found = [_document(record, scored) for record, scored in scores]
         print(json_text.dumps({"records": found}, indent=2))
-        return
-    for record, scored in scores:
-        _show(record, scored)
+    else:
+        for record, scored in scores:
+            _show(record, scored)
+    notice = assumption_notice(*ScoreSheet(tuple(scored for _, scored in scores)).assumption_broken)
+    if notice:
+        faults.tell(notice)
 
 
 def _document(record: str, score: Score) -> dict[str, Any]:
     verdict = score.verdict
     document = {
         "record": record,
-        "verdict": None if verdict is None else verdict.verdict.value,
         "clean": None if verdict is None else verdict.clean,
+        "verdict": None if verdict is None else verdict.verdict.value,
+        "near": None if verdict is None else verdict.near,
         "violations": [] if verdict is None else [entry.to_json() for entry in verdict.violations],
         "rounds": score.rounds,
+        "counted_rounds": score.counted_rounds,
         "longest_gap_s": max((goal.longest_gap_s for goal in score.goals), default=None),
     }
     if score.formulas:
@@ -75,14 +81,15 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
     clean = "clean" if verdict.clean else "not clean"
     gap = "" if verdict.longest_gap_s is None else f", longest gap {verdict.longest_gap_s:.1f} s"
     limit = "" if verdict.gap_limit_s is None else f" of {verdict.gap_limit_s:.1f} s allowed"
-    line = f"{record}: {verdict.verdict}, {clean}, {verdict.rounds} rounds{gap}{limit if gap else ''}"
+    line = f"{record}: {clean}, {verdict.verdict}, {verdict.rounds} rounds{gap}{limit if gap else ''}"
     console.print(line, markup=False)
     if verdict.excuse is not None:
         excuse = verdict.excuse
         sensed = "within" if excuse.sensed else "beyond"
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
+        near = "each" if verdict.near else "not each"
         console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
-
+        console.print(f"  {near} breach of the ego follows one near it", markup=False)
     margins = [f"{rule} {value:.3f} m" for rule, value in verdict.robustness.items() if value is not None]
     if margins:
         console.print(f"  robustness: {', '.join(margins)}", markup=False)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json as json_text
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from dubins_traffic.cli import faults
+from dubins_traffic.scoring.notice import assumption_notice
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -13,52 +17,107 @@ if TYPE_CHECKING:
     from dubins_traffic.scoring.score import Score, ScoreSheet
 
 
-CELLS: dict[str, Callable[[Score], str]] = {
-    "end": lambda score: (score.end or "cut off").replace("_", " "),
-    "ICRA 2016": lambda score: f"{score.icra2016:g}",
-    "rounds": lambda score: str(score.rounds),
-    "goals visited": lambda score: f"{score.goals_visited:.0%}",
-    "collisions": lambda score: str(len(score.collisions)),
-    "at fault": lambda score: str(sum(collision.at_fault for collision in score.collisions)),
-    "off road": lambda score: f"{score.driven.off_road_s:.1f} s",
-    "driven": lambda score: f"{score.driven.distance_m:.1f} m",
-    "least gap": lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m",
+Scores: TypeAlias = "Sequence[Score]"
+
+WIDTH = 80
+"""Columns of a terminal into which a table fits, unless told otherwise."""
+NOTE = "Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md)."
+"""What stands below a table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What is shown of a score: its cell, whether some scores need the column at all, and their sum.
+
+    Where a table is too wide, the column with the highest `spare` is left out first; 0: never.
+    """
+
+    cell: Callable[[Score], str]
+    needed: Callable[[Scores], bool] = lambda _scores: True
+    spare: int = 0
+    total: Callable[[ScoreSheet], str] | None = None
+
+
+def _is_judged(scores: Scores) -> bool:
+    return any(score.verdict is not None for score in scores)
+
+
+def _counted(score: Score) -> str:
+    """Return the rounds that count, and of how many where these are not all."""
+    counted, rounds = score.counted_rounds, score.rounds
+    return str(rounds) if counted == rounds else f"{counted} of {rounds}"
+
+
+def _near(score: Score) -> str:
+    return "-" if score.verdict is None or score.verdict.near is None else yes(score.verdict.near)
+
+
+def yes(value: bool) -> str:
+    """Return a switch as people write it."""
+    return "yes" if value else "no"
+
+
+def points(value: float | None) -> str:
+    """Return a score by a formula: six digits that count."""
+    return "not defined" if value is None else f"{value:g}"
+
+
+COLUMNS: dict[str, Column] = {
+    "clean": Column(lambda score: "-" if score.verdict is None else yes(score.verdict.clean), _is_judged),
+    "counted rounds": Column(_counted, total=lambda sheet: str(sheet.counted_rounds_sum)),
+    "verdict": Column(lambda score: score.verdict.verdict.value if score.verdict else "-", _is_judged),
+    "near": Column(_near, lambda scores: any(score.verdict and score.verdict.excuse for score in scores)),
+    "end": Column(lambda score: (score.end or "cut off").replace("_", " "), spare=2),
+    "goals visited": Column(lambda score: f"{score.goals_visited:.0%}", spare=1),
+    "collisions": Column(lambda score: str(len(score.collisions))),
+    "at fault": Column(
+        lambda score: str(sum(collision.at_fault for collision in score.collisions)),
+        spare=3,
+    ),
+    "off road": Column(
+        lambda score: f"{score.driven.off_road_s:.1f} s", lambda scores: not _is_judged(scores)
+    ),
+    "driven": Column(lambda score: f"{score.driven.distance_m:.1f} m", spare=4),
+    "least gap": Column(
+        lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m",
+        spare=5,
+    ),
+    "shield ticks": Column(
+        lambda score: str(score.interventions), lambda scores: any(score.interventions for score in scores)
+    ),
+    "paper": Column(lambda score: points(score.paper_score), total=lambda sheet: points(sheet.paper_sum)),
+    "ICRA 2016": Column(lambda score: points(score.icra2016), total=lambda sheet: points(sheet.icra2016_sum)),
 }
-"""What is shown of a score: heading and cell."""
+"""The columns by their headings, in their order: what ranks first, the score of 2016 last."""
 
-JUDGED: dict[str, Callable[[Score], str]] = {
-    "verdict": lambda score: "-" if score.verdict is None else score.verdict.verdict.value,
-}
-"""What is shown where a score has a verdict, in place of the time off the road, which is one of the rules."""
-
-
-SHIELDED: dict[str, Callable[[Score], str]] = {
-    "shield ticks": lambda score: str(score.interventions),
-}
-"""What is shown where a shield has stepped in: in how many ticks."""
-
+LEFT = ("clean", "verdict", "near", "end")
+"""Headings of texts."""
 HYPHENATED = {"collisions": "colli-\nsions"}
 """Headings that are one word wider than their cells."""
 
 
 def show(sheet: ScoreSheet, *, json: bool) -> None:
-    """Print scores on standard output: JSON for machines, else a table."""
+    """Print scores on standard output: JSON for machines, else a table; a notice goes to standard error."""
     if json:
         print(json_text.dumps(sheet.to_json(), indent=2))
-        return
-    from rich.console import Console
+    else:
+        from rich.console import Console
 
-    console = Console()
-    console.print(score_table(sheet))
-    if any(score.formulas for score in sheet.trials):
-        console.print(formula_table(sheet))
+        console = Console()
+        console.print(score_table(sheet, console.width))
+        console.print(NOTE, style="dim", highlight=False, soft_wrap=True)
+        if any(score.formulas for score in sheet.trials):
+            console.print(formula_table(sheet))
+    notice = assumption_notice(*sheet.assumption_broken)
+    if notice:
+        faults.tell(notice)
 
 
 def summary(score: Score) -> dict[str, str]:
     """Return what a replay page shows of a score."""
     return {
         "controller": score.controller or "-",
-        **{heading: cell(score) for heading, cell in _cells([score]).items()},
+        **{heading: column.cell(score) for heading, column in _needed([score]).items()},
         **{f"formula {found.name}": verdict_text(found) for found in score.formulas},
     }
 
@@ -68,28 +127,32 @@ def verdict_text(found: FormulaVerdict) -> str:
     return found.verdict if found.time is None else f"{found.verdict} since {found.time:.3f} s"
 
 
-def score_table(sheet: ScoreSheet) -> Table:
-    """Return a table with one row a trial, and the sum of ICRA 2016 at its foot."""
+def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
+    """Return a table with one row a trial, and sums at its foot; the controller with most counted rounds comes first.
+
+    Columns that matter less are left out of a table that would be wider than `width`.
+    """
     from rich import box
     from rich.table import Table
 
-    names = sorted({score.controller or "-" for score in sheet.trials})
+    ranked = _ranked(sheet.trials)
+    names = list(ranked)
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left", show_edge=False)
     table.add_column("trial", footer="sum", justify="right", no_wrap=True)
     if len(names) > 1:
         table.add_column("controller", overflow="fold")
     else:
         table.title = f"controller [b]{names[0]}[/b]"
-    cells = _cells(sheet.trials)
-    for heading in cells:
-        footer = f"{sheet.icra2016_sum:g}" if heading == "ICRA 2016" else ""
-        align = "left" if heading in ("end", "verdict") else "right"
-        table.add_column(
-            HYPHENATED.get(heading) or _narrow(heading), footer=footer, justify=align, no_wrap=True
-        )
-    for score in sheet.trials:
-        leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
-        table.add_row(*leading, *(_narrow(cell(score), 10) for cell in cells.values()))
+    room = width - len("trial") - (1 + min(20, max(map(len, names))) if len(names) > 1 else 0)
+    columns = _fitting(_needed(sheet.trials), sheet, room)
+    for heading, column in columns.items():
+        footer = column.total(sheet) if column.total else ""
+        align = "left" if heading in LEFT else "right"
+        table.add_column(_heading(heading), footer=_narrow(footer, 10), justify=align, no_wrap=True)
+    for name, scores in ranked.items():
+        for score in scores:
+            leading = [str(score.trial), *([name] if len(names) > 1 else [])]
+            table.add_row(*leading, *(_narrow(column.cell(score), 10) for column in columns.values()))
     return table
 
 
@@ -109,12 +172,47 @@ def formula_table(sheet: ScoreSheet) -> Table:
     return table
 
 
-def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
-    judged = any(score.verdict is not None for score in scores)
-    shielded = any(score.interventions for score in scores)
-    rest = {heading: cell for heading, cell in CELLS.items() if heading != "off road"}
-    shown = {**JUDGED, **rest} if judged else CELLS
-    return {**shown, **SHIELDED} if shielded else shown
+def _ranked(scores: Scores) -> dict[str, list[Score]]:
+    """Return the scores of each controller, the one with the most counted rounds a trial first."""
+    found: dict[str, list[Score]] = {}
+    for score in scores:
+        found.setdefault(score.controller or "-", []).append(score)
+
+    def mean(name: str) -> float:
+        return sum(score.counted_rounds for score in found[name]) / len(found[name])
+
+    return {name: found[name] for name in sorted(found, key=lambda name: (-mean(name), name))}
+
+
+def _needed(scores: Scores) -> dict[str, Column]:
+    return {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
+
+
+def _fitting(columns: dict[str, Column], sheet: ScoreSheet, room: int) -> dict[str, Column]:
+    """Leave out what can be spared until the columns, a space before each, fit into `room`."""
+    widths = {
+        heading: 1
+        + max(
+            len(line)
+            for text in (
+                _heading(heading),
+                _narrow(column.total(sheet), 10) if column.total else "",
+                *(_narrow(column.cell(score), 10) for score in sheet.trials),
+            )
+            for line in text.split("\n")
+        )
+        for heading, column in columns.items()
+    }
+    kept = dict(columns)
+    for heading in sorted(columns, key=lambda heading: -columns[heading].spare):
+        if sum(widths[own] for own in kept) <= room or not columns[heading].spare:
+            break
+        del kept[heading]
+    return kept
+
+
+def _heading(heading: str) -> str:
+    return HYPHENATED.get(heading) or _narrow(heading)
 
 
 def _narrow(text: str, width: int = 0) -> str:

@@ -143,6 +143,11 @@ class RoadNetwork:
         return self.shape
 
     @cached_property
+    def is_grid(self) -> bool:
+        """Whether every segment joins two neighbours of the lattice, so that the network is a grid or part of one."""
+        return all(abs(x1 - x0) + abs(y1 - y0) == 1 for x0, y0, x1, y1 in self.segments)
+
+    @cached_property
     def intersections(self) -> tuple[tuple[int, int], ...]:
         """Lattice points where roads end, sorted by x, then y."""
         points = {(x0, y0) for x0, y0, _, _ in self.segments} | {(x1, y1) for _, _, x1, y1 in self.segments}

@@ -10,6 +10,7 @@ from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.duration import planned_ticks
 
 Mask = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 
@@ -59,7 +60,7 @@ class Rounds:
 
 @dataclass(frozen=True, slots=True)
 class GoalVisits:
-    """Visits of one goal; `longest_gap_s` is the longest time without one, from frame 0 to the last frame."""
+    """Visits of one goal; `longest_gap_s` is the longest time without one, from frame 0 to the planned end."""
 
     goal: tuple[int, int]
     visits: int
@@ -92,7 +93,7 @@ class Visiting:
         self._visits = np.zeros(count, dtype=np.int64)
         self._last = np.zeros(count, dtype=np.int64)
         self._gap = np.zeros(count, dtype=np.int64)
-        self._end = 0
+        self._end = planned_ticks(instance)
         self._rate = instance.problem.rate
         self._last_frame = -1
 
@@ -103,7 +104,7 @@ class Visiting:
         inside = self._discs.inside(frames)
         entered = inside & ~np.vstack([self._inside, inside[:-1]])
         self._inside = inside[-1]
-        self._end = frames.first + len(frames) - 1
+        self._end = max(self._end, frames.first + len(frames) - 1)
         at = self._discs.at(frames)
         for goal, vertex in enumerate(self._discs.vertices):
             elsewhere = frames.first + np.flatnonzero((at >= 0) & (at != vertex))
@@ -140,7 +141,7 @@ class Visiting:
         """Nothing is left to do."""
 
     def result(self) -> Visits:
-        """Return the visits up to the last frame."""
+        """Return the visits up to the last frame; gaps run to the planned end, whenever the trial ended."""
         gaps = np.maximum(self._gap, self._end - self._last) / self._rate
         rows = zip(self._discs.goals, self._visits.tolist(), gaps.tolist(), strict=True)
         visited = float((self._visits > 0).mean()) if len(self._visits) else 1.0

@@ -10,6 +10,7 @@ description are kept, since published scores rest on them:
 - e-agents are the models whose names begin with ``agent``; others neither count nor collide;
 - the road has no rounded ends: a point is on it if its projection falls within a segment and it is at most 0.6 m
   beside it, whatever the width of the cars;
+- the formula needs a grid, and e-agents of that name where there are e-agents: elsewhere the score is not defined;
 - time off the road counts when the ego is back on it, from the first sample off to the first on; the last stretch
   does not count if it has not ended.
 """
@@ -32,15 +33,35 @@ ROAD_HALF_WIDTH = 0.6
 COLLISION_SCORE = -1.0
 
 
+def counts(name: str) -> bool:
+    """Tell whether the e-agent called `name` counts."""
+    return name.startswith("agent")
+
+
+def weight_of(instance: Instance) -> int | None:
+    """Return e-agents * rows * columns; None where the formula does not apply.
+
+    That is on a network which is no grid, and where there are e-agents and none of them counts.
+    """
+    agents = sum(counts(agent.name) for agent in instance.e_agents)
+    network = instance.problem.network
+    if not network.is_grid or (instance.e_agents and not agents):
+        return None
+    rows, columns = network.shape
+    return agents * rows * columns
+
+
 class Icra2016:
-    """The score of one trial: -1 after a collision, else e-agents * rows * columns * rounds / max(1, s off road)."""
+    """The score of one trial: -1 after a collision, else e-agents * rows * columns * rounds / max(1, s off road).
+
+    None where the formula does not apply.
+    """
 
     def begin(self, instance: Instance) -> None:
         """Start counting."""
         problem = instance.problem
-        self._agents = [n for n, name in enumerate(instance.names) if n != EGO and name.startswith("agent")]
-        rows, columns = problem.network.shape
-        self._weight = len(self._agents) * rows * columns
+        self._agents = [n for n, name in enumerate(instance.names) if n != EGO and counts(name)]
+        self._weight = weight_of(instance)
         self._rate = problem.rate
         self._road = _Road(problem.network)
         self._discs = GoalDiscs(instance)
@@ -75,8 +96,10 @@ class Icra2016:
         """Seconds off the road, as counted here."""
         return self._off_ticks / self._rate
 
-    def result(self) -> float:
-        """Return the score up to the last frame."""
+    def result(self) -> float | None:
+        """Return the score up to the last frame, None where it is not defined."""
+        if self._weight is None:
+            return None
         if self._collision:
             return COLLISION_SCORE
         return self._weight * self.rounds / max(1.0, self.off_road_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,11 +15,13 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
+from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
 from dubins_traffic.scoring.goals import GoalVisits, Visits
-from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
+from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import margins_by_rule
 from dubins_traffic.scoring.margins_kernel import MARGINS, MarginTable, find_margins
-from dubins_traffic.scoring.score import Score
+from dubins_traffic.scoring.paper import paper_score
+from dubins_traffic.scoring.score import Score, is_clean
 from dubins_traffic.scoring.tally import (
     CLEARANCE,
     COLLIDED,
@@ -68,7 +70,6 @@ class Tallied:
         self._margins: list[list[float]] = found[trials].tolist()
         self._ints: list[list[int]] = tally.ints[trials].tolist()
         self._floats: list[list[float]] = tally.floats[trials].tolist()
-        self._counted: list[int] = tally.counts[trials].sum(axis=1).tolist()
         self._first: list[int] = tally.goal_off[trials].tolist()
         self._tally = tally
 
@@ -78,6 +79,7 @@ class Tallied:
         b: int,
         contacts: Sequence[Contact],
         breaches: Sequence[Breach],
+        seen: Set[tuple[int, int]],
         running: Running,
         ending: Ending,
         rules: RuleParameters,
@@ -86,14 +88,16 @@ class Tallied:
     ) -> Score:
         """Return the score of trial b, which ended with `ending`, whose ego was driven by `controller`.
 
-        `contacts`, with `at_fault`, and the `breaches` of the docket are in order of time; `running` is what hung over
-        the cars in the last frame.
+        `contacts`, with `at_fault`, and the `breaches` of the docket are in order of time; `seen` holds (car, tick)
+        of each breach by an e-agent that was within the sensing radius then; `running` is what hung over the cars in
+        the last frame.
         """
         k = self._row[b]
         ints, floats = self._ints[k], self._floats[k]
         rate, ticks = instance.problem.rate, ending.ticks
         goals: list[list[int]] = self._tally.goal[self._first[k] : self._first[k] + ints[GOALS]].tolist()
-        visits = _visits(instance, goals, ints[ROUNDS], ticks)
+        visits = _visits(instance, goals, ints[ROUNDS])
+        whole = ran_whole(instance, ending, ticks)
         collisions, among_others = _collisions(instance, contacts) if contacts else ((), 0)
         gap = None if math.isinf(floats[CLEARANCE]) else max(0.0, floats[CLEARANCE])
         verdict = None
@@ -106,9 +110,13 @@ class Tallied:
                 visits,
                 [row[VISITS] > 0 and row[LAST_VISIT] == ticks for row in goals],
                 lambda car, first, last: bool(first <= self._tally.sensed[b, car] <= last),
+                lambda car, tick: (car, tick) in seen,
                 running,
                 margins_by_rule(gap, self._margins[k]),
+                whole=whole,
             )
+        clean = is_clean(verdict, collisions)
+        off_road = ints[OFF_ROAD] / rate
         return Score(
             trial=instance.trial,
             seed=instance.seed,
@@ -116,16 +124,16 @@ class Tallied:
             controller=controller,
             record=None,
             duration_s=ticks / rate,
-            icra2016=_icra2016(instance, ints, self._counted[k], ticks + 1),
-            collisions=collisions,
-            collisions_among_others=among_others,
             rounds=visits.rounds,
+            counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
             goals_visited=visits.visited,
             goals=visits.goals,
+            collisions=collisions,
+            collisions_among_others=among_others,
             driven=Driven(
                 floats[DISTANCE],
                 ints[STANDING] / max(1, ticks),
-                ints[OFF_ROAD] / rate,
+                off_road,
                 ints[OFF_ROAD] / max(1, ticks),
                 ints[DEPARTURES],
             ),
@@ -133,14 +141,16 @@ class Tallied:
             time_to_begin_s=time_to_begin,
             verdict=verdict,
             formulas=(),
+            paper_score=paper_score(instance, collisions, visits.rounds, off_road),
+            icra2016=_icra2016(instance, ints, ticks + 1),
         )
 
 
-def _visits(instance: Instance, rows: Sequence[Sequence[int]], rounds: int, ticks: int) -> Visits:
+def _visits(instance: Instance, rows: Sequence[Sequence[int]], rounds: int) -> Visits:
     goals = dict.fromkeys(instance.problem.goals)
-    rate = instance.problem.rate
+    rate, planned = instance.problem.rate, planned_ticks(instance)
     found = [
-        GoalVisits(goal, row[VISITS], max(row[GAP], ticks - row[LAST_VISIT]) / rate)
+        GoalVisits(goal, row[VISITS], max(row[GAP], planned - row[LAST_VISIT]) / rate)
         for goal, row in zip(goals, rows, strict=True)
     ]
     visited = sum([row[VISITS] > 0 for row in rows]) / len(rows) if rows else 1.0
@@ -154,9 +164,11 @@ def _collisions(instance: Instance, contacts: Sequence[Contact]) -> tuple[tuple[
     return listed.result(), listed.among_others
 
 
-def _icra2016(instance: Instance, ints: Sequence[int], agents: int, samples: int) -> float:
+def _icra2016(instance: Instance, ints: Sequence[int], samples: int) -> float | None:
+    weight = weight_of(instance)
+    if weight is None:
+        return None
     if ints[COLLIDED]:
         return COLLISION_SCORE
-    rows, columns = instance.problem.network.shape
     rounds = ints[SAMPLED] if ints[GOALS] else samples
-    return agents * rows * columns * rounds / max(1.0, ints[OFF_TICKS] / instance.problem.rate)
+    return weight * rounds / max(1.0, ints[OFF_TICKS] / instance.problem.rate)

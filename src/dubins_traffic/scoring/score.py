@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
+from dubins_traffic.scoring.duration import counted_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.paper import paper_score
 from dubins_traffic.scoring.verdict import Judging, Verdict
 
 _BLOCK = 512
@@ -39,13 +42,14 @@ class Score:
         Name of the ego's controller; path of the record.
     duration_s : float
         Simulated seconds up to the last frame.
-    icra2016 : float
-        The score of ICRA 2016 (`dubins_traffic.scoring.icra2016`).
-    collisions : tuple of Collision
-        Contacts of the ego, in order of time; `collisions_among_others` counts the rest.
     rounds : int
         Rounds counted by visits (`dubins_traffic.scoring.goals`); `goals_visited` is the share of the goals visited
         at least once, and `goals` tells visits and longest gap of each.
+    counted_rounds : int
+        The rounds by which controllers are ranked: `rounds` of a clean trial that ran its whole planned duration,
+        else 0. Where the problem does not ask for the rules, a trial without a collision of the ego is clean.
+    collisions : tuple of Collision
+        Contacts of the ego, in order of time; `collisions_among_others` counts the rest.
     driven : Driven
         Distance, standing, time off the road, departures from the lane (`dubins_traffic.scoring.driving`).
     min_clearance_m : float or None
@@ -56,6 +60,10 @@ class Score:
         The verdict by the rules of the road; None if the problem does not ask for them.
     formulas : tuple of FormulaVerdict
         The verdicts on the formulas that the problem carries beside its task.
+    paper_score : float
+        The score of the paper (`dubins_traffic.scoring.paper`).
+    icra2016 : float or None
+        The score of ICRA 2016 (`dubins_traffic.scoring.icra2016`); None where it is not defined.
     interventions : int
         In how many ticks a shield has stepped in (docs/shield.md).
     """
@@ -66,17 +74,19 @@ class Score:
     controller: str | None
     record: str | None
     duration_s: float
-    icra2016: float
-    collisions: tuple[Collision, ...]
-    collisions_among_others: int
     rounds: int
+    counted_rounds: int
     goals_visited: float
     goals: tuple[GoalVisits, ...]
+    collisions: tuple[Collision, ...]
+    collisions_among_others: int
     driven: Driven
     min_clearance_m: float | None
     time_to_begin_s: float | None
     verdict: Verdict | None
     formulas: tuple[FormulaVerdict, ...]
+    paper_score: float
+    icra2016: float | None
     interventions: int = 0
 
     def to_json(self) -> dict[str, Any]:
@@ -164,7 +174,10 @@ class Scorer:
             What was measured on the wall clock.
         """
         self._show()
-        visits = self._visiting.result()
+        visits, verdict = self._visiting.result(), self._judging.result()
+        collisions, driven = self._collisions.result(), self._driving.result()
+        whole = ran_whole(self._instance, self._ending, self._count - 1)
+        clean = is_clean(verdict, collisions)
         return Score(
             trial=self._instance.trial,
             seed=self._instance.seed,
@@ -172,17 +185,19 @@ class Scorer:
             controller=None if controller is None else bare_name(controller),
             record=None if record is None else str(record),
             duration_s=max(0, self._count - 1) / self._instance.problem.rate,
-            icra2016=self._icra2016.result(),
-            collisions=self._collisions.result(),
-            collisions_among_others=self._collisions.among_others,
             rounds=visits.rounds,
+            counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
             goals_visited=visits.visited,
             goals=visits.goals,
-            driven=self._driving.result(),
+            collisions=collisions,
+            collisions_among_others=self._collisions.among_others,
+            driven=driven,
             min_clearance_m=self._clearance.result(),
             time_to_begin_s=None if wall is None else wall.time_to_begin_s,
-            verdict=self._judging.result(),
+            verdict=verdict,
             formulas=self._formulas.result(),
+            paper_score=paper_score(self._instance, collisions, visits.rounds, driven.off_road_s),
+            icra2016=self._icra2016.result(),
             interventions=self._interventions,
         )
 
@@ -202,13 +217,40 @@ class ScoreSheet:
     trials: tuple[Score, ...]
 
     @property
-    def icra2016_sum(self) -> float:
-        """The final score of ICRA 2016: the sum over trials, correctly rounded."""
-        return math.fsum(score.icra2016 for score in self.trials)
+    def counted_rounds_sum(self) -> int:
+        """The rounds of all clean trials that ran their whole durations."""
+        return sum(score.counted_rounds for score in self.trials)
+
+    @property
+    def paper_sum(self) -> float:
+        """The final score of the paper: the sum over trials, correctly rounded."""
+        return math.fsum(score.paper_score for score in self.trials)
+
+    @property
+    def icra2016_sum(self) -> float | None:
+        """The final score of ICRA 2016: the sum over trials, correctly rounded; None if one of them has none."""
+        found = [score.icra2016 for score in self.trials if score.icra2016 is not None]
+        return math.fsum(found) if len(found) == len(self.trials) else None
+
+    @property
+    def assumption_broken(self) -> tuple[int, int]:
+        """In how many of the judged trials the e-agents broke the assumption, and how many these are."""
+        found = [score.verdict.assumption_broken for score in self.trials if score.verdict is not None]
+        return sum(found), len(found)
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``run --json`` and ``score --json`` print."""
-        return {"trials": [score.to_json() for score in self.trials], "icra2016_sum": self.icra2016_sum}
+        return {
+            "trials": [score.to_json() for score in self.trials],
+            "counted_rounds_sum": self.counted_rounds_sum,
+            "paper_sum": self.paper_sum,
+            "icra2016_sum": self.icra2016_sum,
+        }
+
+
+def is_clean(verdict: Verdict | None, collisions: Sequence[Collision]) -> bool:
+    """Tell whether the ego broke nothing; of a trial that is not judged, whether it touched nothing."""
+    return not collisions if verdict is None else verdict.clean
 
 
 def score(record: Record) -> Score:

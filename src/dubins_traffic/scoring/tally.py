@@ -16,6 +16,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
+from dubins_traffic.scoring.icra2016 import counts as counts_in_2016
 from dubins_traffic.spec.judged import kinds_of
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.propositions import LEFT, ON_ROAD
@@ -94,8 +95,8 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     floats[:, [STILL, RADIUS, SIGHT2]] = np.array(sizes)[index]
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
     for number, b in enumerate(fleets):
-        names: list[bool] = [agent.name.startswith("agent") for agent in instances[b].e_agents]
-        counts[whose == number, 1 : 1 + len(names)] = names
+        count: list[bool] = [counts_in_2016(agent.name) for agent in instances[b].e_agents]
+        counts[whose == number, 1 : 1 + len(count)] = count
     goals = [tuple(dict.fromkeys(instance.problem.goal_vertices)) for instance in instances]
     ints[:, GOALS] = [len(own) for own in goals]
     last = ints[:, GOALS].cumsum()

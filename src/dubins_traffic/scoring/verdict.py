@@ -15,9 +15,11 @@ from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.collisions import Collision, Collisions
+from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import Visiting, Visits
 from dubins_traffic.scoring.margins import Margins
+from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.spec.exceptions import Exceptions
 from dubins_traffic.spec.parameters import EDITION, RuleParameters
 from dubins_traffic.spec.tables import ticks
@@ -114,6 +116,9 @@ class Verdict:
         Whether the ego broke nothing, whatever others did.
     excuse : Excuse or None
         Of an excused trial.
+    near : bool or None
+        Of an excused trial: whether each breach of the ego had a breach by a car within the sensing radius in the
+        same frame or the `witness_time` before it. It informs, and ranks nothing.
     violations : tuple of Violation
         Every breach of every car, in order of time.
     collisions : tuple of Collision
@@ -130,6 +135,7 @@ class Verdict:
     verdict: Ruling
     clean: bool
     excuse: Excuse | None
+    near: bool | None
     violations: tuple[Violation, ...]
     collisions: tuple[Collision, ...]
     rounds: int
@@ -138,12 +144,19 @@ class Verdict:
     formulas: dict[str, Status]
     robustness: dict[str, float | None]
 
+    @property
+    def assumption_broken(self) -> bool:
+        """Whether the e-agents broke a part of the assumption that the problem makes, before or after the ego."""
+        return any(self.formulas.get(part) == BROKEN for part in ASSUMPTIONS)
+
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
         return {
             "edition": EDITION,
-            "verdict": self.verdict.value,
             "clean": self.clean,
+            "verdict": self.verdict.value,
+            "near": self.near,
+            "assumption_broken": self.assumption_broken,
             "excuse": None if self.excuse is None else self.excuse.to_json(),
             "violations": [violation.to_json() for violation in self.violations],
             "collisions": [collision.to_json() for collision in self.collisions],
@@ -193,6 +206,8 @@ class Judging:
         self._collisions.begin(instance)
         self._margins = Margins()
         self._margins.begin(instance)
+        self._ending: Ending | None = None
+        self._last = -1
 
     def frames(self, frames: Frames) -> None:
         """Judge a block of frames."""
@@ -207,9 +222,11 @@ class Judging:
             dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
             radius = self._instance.problem.sensing_radius
             self._sensed.append(dx * dx + dy * dy <= radius * radius)
+            self._last = frames.first + len(frames) - 1
 
     def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
+        """Keep the named end, since only a trial that ran its whole duration can be satisfied."""
+        self._ending = ending
 
     def result(self) -> Verdict | None:
         """Return the verdict up to the last frame, None if the problem carries no rules."""
@@ -223,14 +240,16 @@ class Judging:
             self._visiting.result(),
             self._visiting.now,
             self._was_sensed,
+            lambda car, tick: self._was_sensed(car, tick, tick),
             self._referee.running[0],
             self._margins.result(),
+            whole=ran_whole(self._instance, self._ending, self._last),
         )
 
     def _was_sensed(self, car: int, first: int, last: int) -> bool:
-        sensed = np.concatenate(self._sensed)
-        self._sensed = [sensed]
-        return bool(sensed[first : last + 1, car].any())
+        if len(self._sensed) > 1:
+            self._sensed = [np.concatenate(self._sensed)]
+        return bool(self._sensed[0][first : last + 1, car].any())
 
 
 def reach_verdict(
@@ -241,8 +260,11 @@ def reach_verdict(
     visits: Visits,
     visited_now: Sequence[bool],
     was_sensed: Callable[[int, int, int], bool],
+    seen: Callable[[int, int], bool],
     running: Running,
     margins: dict[str, float | None],
+    *,
+    whole: bool,
 ) -> Verdict:
     """Return the verdict on a trial.
 
@@ -257,11 +279,16 @@ def reach_verdict(
     visited_now
         For each goal, once, whether a visit of the ego's begins in the last frame.
     was_sensed
-        Asked for (car, first, last): whether the car was within the sensing radius at a frame from first to last.
+        Asked for (car, first, last), where last is the ego's first breach: whether the car was within the sensing
+        radius at a frame from first to last.
+    seen
+        Asked for (car, tick) of a breach by an e-agent: whether that car was within the sensing radius then.
     running
         What hangs over the cars after the last frame.
     margins
         How far the ego stayed from breaking rules 1 and 2.
+    whole
+        Whether the trial ran its whole planned duration.
     """
     from dubins_traffic.driving.rounds import round_time  # compiles; only where there is something to judge
 
@@ -271,9 +298,9 @@ def reach_verdict(
     fall = first_fall(breaches, rules, rate) if breaches else None
     gap = max([goal.longest_gap_s for goal in visits.goals], default=None)
     limit = rules.gap_rounds * round_time(instance.problem)
-    excuse = None
+    excuse, near = None, None
     if not own:
-        done = visits.visited == 1.0 and (gap is None or gap <= limit)
+        done = whole and visits.visited == 1.0 and (gap is None or gap <= limit)
         ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
     elif fall is None or fall[1].tick > own[0].tick:
         ruling = Ruling.VIOLATED
@@ -282,10 +309,12 @@ def reach_verdict(
         back = ticks(rules.witness_time, rate)
         sensed = was_sensed(fall[1].car, max(0, own[0].tick - back), own[0].tick)
         excuse = Excuse(fall[0], violations[breaches.index(fall[1])], sensed)
+        near = is_near(breaches, back, seen)
     return Verdict(
         ruling,
         not own,
         excuse,
+        near,
         violations,
         collisions,
         visits.rounds,

@@ -28,7 +28,8 @@ HELD: tuple[str, ...] = get_args(Status)
 class Standing:
     """What is said of one controller.
 
-    `estimates` holds a row a metric, by column; `verdicts` the share of each verdict in the judged trials, `ends` that
+    `estimates` holds a row a metric, by column; `clean` is the share of clean trials in the judged ones, `near` that of
+    excused trials whose excuses were near; `verdicts` holds the share of each verdict in the judged trials, `ends` that
     of each end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each
     part of the assumption; `faults` counts collisions by who was at fault. `formulas` holds the share of each verdict
     on each formula of the user's own, by its name, in the trials that carry it.
@@ -38,6 +39,8 @@ class Standing:
     trials: int
     judged: int
     estimates: Mapping[str, Estimate]
+    clean: Share
+    near: Share
     verdicts: Mapping[str, Share]
     ends: Mapping[str, Share]
     broken: Mapping[str, Share]
@@ -75,12 +78,22 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A campaign compared: `trials` of `total` have rows, `metrics` are those of which there are values."""
+    """A campaign compared: `trials` of `total` have rows, `metrics` are those of which there are values.
+
+    `undefined` are those that are defined for none of the trials.
+
+    `controllers` are ranked by their counted rounds a trial, most first, where a trial that came to nothing has none;
+    all else follows that order. The e-agents broke the assumption in `broken` of the `judged` trials.
+    """
 
     campaign: Campaign
+    controllers: Sequence[str]
     trials: int
     total: int
+    broken: int
+    judged: int
     metrics: Sequence[Metric]
+    undefined: Sequence[Metric]
     standings: Sequence[Standing]
     differences: Sequence[Difference]
     levels: Sequence[Level]
@@ -108,18 +121,35 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         if metric.column in values and _is_told(metric, values[metric.column])
     ]
     names: Any = np.array(results["controller"].to_pylist(), dtype=object)
-    chosen = {name: names == name for name in campaign.controllers}
+    ranked = _ranked(campaign, names, _floats(results["counted_rounds"]))
+    chosen = {name: names == name for name in ranked}
+    fallen = _floats(results["assumption_broken"])
     factors = _factors(campaign)
     return Comparison(
         campaign,
+        ranked,
         len(results),
         campaign.total,
+        int((fallen > 0).sum()),
+        int((~np.isnan(fallen)).sum()),
         known,
+        [metric for metric in METRICS if metric.bounded and metric not in known],
         [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
         list(_differences(campaign, results, chosen, known, values)),
         list(_levels(results, factors, chosen, known, values)),
         factors,
     )
+
+
+def _ranked(campaign: Campaign, names: Any, counted: Floats) -> list[str]:
+    """Return the controllers, those with the most counted rounds a trial first; ties in the order of the file."""
+    rounds = np.nan_to_num(counted)
+
+    def mean(name: str) -> float:
+        own = names == name
+        return float(rounds[own].sum()) / max(1, int(own.sum()))
+
+    return sorted(campaign.controllers, key=lambda name: -mean(name))
 
 
 def _factors(campaign: Campaign) -> dict[str, list[str]]:
@@ -147,6 +177,8 @@ def _standing(
         len(own),
         judged,
         {metric.column: estimate(values[metric.column][chosen]) for metric in metrics},
+        happened("clean"),
+        share(int((_floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
         {end: share(ends.count(end), len(ends)) for end in sorted(set(ends))},
         {rule: happened(f"breaches.{rule}") for rule in EGO_RULES} if judged else {},
@@ -185,7 +217,7 @@ def _differences(
     """Return the paired differences of all pairs of controllers in all metrics."""
     cells, _, trials = table.places(campaign, results["number"].to_numpy())
     pair = np.array([cell.first for cell in campaign.cells])[cells] + trials
-    for first, second in combinations(campaign.controllers, 2):
+    for first, second in combinations(chosen, 2):
         one, other = np.flatnonzero(chosen[first]), np.flatnonzero(chosen[second])
         _, left, right = np.intersect1d(pair[one], pair[other], return_indices=True)
         for metric in metrics:

@@ -11,7 +11,7 @@ class Metric:
     """A column of the table as a report tells it: its name, its unit (none: a number), and which way is better.
 
     `better` is 1 where more is better, -1 where less is, 0 where neither is. One that is `rare` is told only where
-    some trial has more than none of it.
+    some trial has more than none of it; one that is `bounded` is not defined for every trial.
     """
 
     column: str
@@ -19,6 +19,7 @@ class Metric:
     unit: str = ""
     better: int = 0
     rare: bool = False
+    bounded: bool = False
 
     @property
     def heading(self) -> str:
@@ -27,13 +28,14 @@ class Metric:
 
 
 METRICS = (
-    Metric("icra2016", "ICRA 2016", better=1),
+    Metric("clean", "clean", "share", 1),
+    Metric("counted_rounds", "counted rounds", better=1),
     Metric("rounds", "rounds", better=1),
     Metric("goals_visited", "goals visited", "share", 1),
     Metric("longest_gap_s", "longest gap between visits", "s", -1),
-    Metric("clean", "clean", "share", 1),
     Metric("breaches", "breaches of the ego", better=-1),
     Metric("breaches_of_others", "breaches of others"),
+    Metric("assumption_broken", "assumption broken by others", "share"),
     Metric("collisions", "collisions", better=-1),
     Metric("collisions_ego_fault", "collisions, the ego's fault", better=-1),
     Metric("collisions_other_fault", "collisions, the other's fault"),
@@ -47,8 +49,10 @@ METRICS = (
     Metric("lane_departures", "lane departures", better=-1),
     Metric("interventions", "interventions of a shield", "ticks", -1, rare=True),
     Metric("duration_s", "duration", "s"),
+    Metric("paper_score", "score of the paper", better=1),
+    Metric("icra2016", "ICRA 2016, counts samples", better=1, bounded=True),
 )
-"""The metrics of the table, in the order of a report."""
+"""The metrics of the table, in the order of a report: what ranks controllers first, the score of 2016 last."""
 
 WALL_METRICS = (
     Metric("time_to_begin_s", "time to begin, wall clock", "s", -1),

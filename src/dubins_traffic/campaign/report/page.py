@@ -14,6 +14,7 @@ from dubins_traffic.campaign.report.comparison import Comparison, Difference, St
 from dubins_traffic.campaign.report.metrics import Metric, shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
+from dubins_traffic.scoring.notice import assumption_notice
 
 MINUS = "\N{MINUS SIGN}"
 HOW = (
@@ -74,8 +75,11 @@ def _head(comparison: Comparison) -> str:
         if missing
         else ""
     )
+    notice = assumption_notice(comparison.broken, comparison.judged)
+    warning += f'<p class="warning">{_text(notice)}</p>' if notice else ""
     key = "".join(
-        f'<li><span class="dot c{k}"></span>{_text(name)}</li>' for k, name in enumerate(campaign.controllers)
+        f'<li><span class="dot c{k}"></span>{_text(name)}</li>'
+        for k, name in enumerate(comparison.controllers)
     )
     return (
         f"<header><h1>{_text(campaign.model.name)}</h1><p>{' · '.join(facts)}</p>{warning}"
@@ -92,6 +96,8 @@ def _overview(comparison: Comparison) -> str:
         [
             _name(standing, k),
             _count(standing.judged),
+            _share(standing.clean),
+            _mean(standing, "counted_rounds"),
             *(_share(standing.verdicts.get(verdict)) for verdict in plots.VERDICTS),
         ]
         for k, standing in enumerate(comparison.standings)
@@ -106,10 +112,8 @@ def _overview(comparison: Comparison) -> str:
         for k, standing in enumerate(comparison.standings)
     ]
     at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
-    return (
-        f'<div class="figures wide">{figures}</div>'
-        f"{_table(['controller', 'judged', *plots.VERDICTS], judged)}{_table(at_fault, collided)}"
-    )
+    ruled = ["controller", "judged", "clean", "counted rounds", *plots.VERDICTS]
+    return f'<div class="figures wide">{figures}</div>{_table(ruled, judged)}{_table(at_fault, collided)}'
 
 
 def _formulas(comparison: Comparison) -> str:
@@ -139,7 +143,9 @@ def _metrics(comparison: Comparison) -> str:
             estimate = standing.estimates[metric.column]
             first = f'<th rowspan="{many}" scope="rowgroup">{_heading(metric)}</th>' if k == 0 else ""
             body.append([first, _name(standing, k), *_estimate(estimate), _count(estimate.count)])
-    return _table(head, body, "grouped") + f"<p>{HOW}</p>"
+    undefined = ", ".join(metric.name for metric in comparison.undefined)
+    note = f"<p>Not defined for these trials: {_text(undefined)}.</p>" if undefined else ""
+    return _table(head, body, "grouped") + note + f"<p>{HOW}</p>"
 
 
 def _differences(comparison: Comparison) -> str:
@@ -271,6 +277,11 @@ def _estimate(estimate: Estimate, *, signed: bool = False) -> list[str]:
         _number(estimate.median, signed),
         _interval(estimate.median_interval),
     ]
+
+
+def _mean(standing: Standing, column: str) -> str:
+    found = standing.estimates.get(column)
+    return _number(None if found is None else found.mean)
 
 
 def _number(value: float | None, signed: bool = False) -> str:

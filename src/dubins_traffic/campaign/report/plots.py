@@ -60,7 +60,7 @@ def against(comparison: Comparison, factor: str, metric: Metric) -> str:
     step = min((b - a for a, b in pairwise(places)), default=1.0)
 
     def draw(axes: Any) -> None:
-        controllers = comparison.campaign.controllers
+        controllers = comparison.controllers
         for k, controller in enumerate(controllers):
             own = [level for level in levels if level.controller == controller]
             shift = DODGE * step * (k - 0.5 * (len(controllers) - 1))

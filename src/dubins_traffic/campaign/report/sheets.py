@@ -37,7 +37,9 @@ def _controllers(comparison: Comparison) -> Iterator[Sequence[object]]:
 def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
     for standing in comparison.standings:
         groups = {
+            "clean": {"clean": standing.clean} if standing.judged else {},
             "verdict": standing.verdicts,
+            "excused": {"near": standing.near} if standing.near.total else {},
             "end": standing.ends,
             "rule broken by the ego": standing.broken,
             "assumption broken by others": standing.fallen,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.report.comparison import Comparison
 from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Interval, Share
+from dubins_traffic.campaign.table import FACTOR
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+    from dubins_traffic.campaign.report.worst import Bad
 
 
 def tables(comparison: Comparison) -> Iterator[Table]:
@@ -19,6 +23,22 @@ def tables(comparison: Comparison) -> Iterator[Table]:
     if comparison.differences:
         yield _differences(comparison)
     yield _shares(comparison)
+
+
+def worst_lines(worst: Mapping[str, Sequence[Bad]], folder: str) -> Iterator[str]:
+    """Return what is said of the worst trials of a campaign in `folder`: two lines each, the second a command."""
+    for controller, trials in worst.items():
+        for bad in trials:
+            row = bad.row
+            factors = [
+                f"{words(name.removeprefix(FACTOR))} {value}"
+                for name, value in row.items()
+                if name.startswith(FACTOR)
+            ]
+            place = ", ".join([row["configuration"], *factors, f"trial {row['trial']} of seed {row['seed']}"])
+            note = f" ({bad.note})" if bad.note else ""
+            yield f"{controller}, {place}: {bad.why}{note}"
+            yield f"    dubins-traffic campaign replay {shlex.quote(folder)} {row['number']}"
 
 
 def _metrics(comparison: Comparison) -> Table:
@@ -30,6 +50,8 @@ def _metrics(comparison: Comparison) -> Table:
             mean = (shown(one.mean), _interval(one.mean_interval))
             median = (shown(one.median), _interval(one.median_interval))
             table.add_row(metric.heading if k == 0 else "", standing.controller, *mean, *median)
+    for metric in comparison.undefined:
+        table.add_row(metric.heading, "", "not defined", "", "", "")
     return table
 
 
@@ -46,10 +68,12 @@ def _differences(comparison: Comparison) -> Table:
 
 
 def _shares(comparison: Comparison) -> Table:
-    table = _table("verdicts, ends, collisions of the ego by fault, and formulas")
+    table = _table("clean, verdicts, ends, collisions by fault, formulas")
     _columns(table, ("what", "controller"), ("trials", "share", "95 %"))
     for standing in comparison.standings:
-        for name, share in {**standing.verdicts, **standing.ends}.items():
+        judged = {"clean": standing.clean} if standing.judged else {}
+        near = {"excused, near": standing.near} if standing.near.total else {}
+        for name, share in {**judged, **standing.verdicts, **near, **standing.ends}.items():
             table.add_row(words(name), standing.controller, str(share.count), *_share(share))
         for who, count in standing.faults.items():
             table.add_row(f"fault of {who}", standing.controller, str(count), "", "")

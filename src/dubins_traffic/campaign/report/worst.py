@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,12 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.many import Job
+from dubins_traffic.campaign.report.metrics import words
 from dubins_traffic.campaign.table import places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
-from dubins_traffic.record.sink import FAULTS
+from dubins_traffic.record.sink import FAULTS, End
 from dubins_traffic.scoring.score import score
 from dubins_traffic.viewer.marks import breach_marks
 from dubins_traffic.viewer.replay import write_replay
@@ -26,6 +27,8 @@ from dubins_traffic.viewer.replay import write_replay
 FOLDER = "replays"
 SUMMARY = (
     "end",
+    "clean",
+    "counted_rounds",
     "verdict",
     "rounds",
     "goals_visited",
@@ -34,9 +37,12 @@ SUMMARY = (
     "breaches",
     "distance_m",
     "min_clearance_m",
+    "paper_score",
     "icra2016",
 )
 """Columns shown beside a replay."""
+
+OTHER_WAY = "went another way when it was run again"
 
 NOTHING = frozenset({rows.FAILED, rows.CRASHED})
 """Ends of trials that came to nothing."""
@@ -55,25 +61,25 @@ class Bad:
 def order(results: Any) -> Ints:
     """Return the rows of a table in the order of how bad the trials are, the worst first.
 
-    In order: came to nothing; ended by a fault; collisions with the ego at fault; a verdict of violated; breaches
-    of the ego; other collisions; few goals visited; few rounds; the number of the trial.
+    In order: came to nothing; ended by a fault; collisions with the ego at fault; breaches of the ego; other
+    collisions; few counted rounds; few goals visited; few rounds; the number of the trial.
     """
     compute: Any = rows.arrow().compute
 
-    def among(column: str, values: Iterable[str]) -> Ints:
-        found = compute.is_in(results[column], rows.arrow().array(sorted(values), rows.arrow().string()))
+    def among(values: Iterable[str]) -> Ints:
+        found = compute.is_in(results["end"], rows.arrow().array(sorted(values), rows.arrow().string()))
         return found.cast("int64").to_numpy(zero_copy_only=False)
 
     def number(column: str) -> Floats:
         return compute.fill_null(results[column].cast("float64"), 0.0).to_numpy(zero_copy_only=False)
 
     keys = (
-        -among("end", NOTHING),
-        -among("end", FAULTS),
+        -among(NOTHING),
+        -among(FAULTS),
         -(number("collisions_ego_fault") + number("collisions_both_fault")),
-        -among("verdict", ["violated"]),
         -number("breaches"),
         -number("collisions"),
+        number("counted_rounds"),
         number("goals_visited"),
         number("rounds"),
         number("number"),
@@ -92,21 +98,29 @@ def why(row: Mapping[str, Any]) -> str:
     if row["breaches"]:
         found.append(f"{row['breaches']} breaches, {row['verdict']}")
     if not found:
-        found.append(f"{row['goals_visited']:.0%} of the goals visited, {row['rounds']} rounds")
+        whole = "" if row["end"] == End.DURATION else f", {words(row['end'])} after {row['duration_s']:.1f} s"
+        counted, rounds = row["counted_rounds"], row["rounds"]
+        some = f"{rounds} rounds" if counted == rounds else f"{counted} of {rounds} rounds count"
+        found.append(f"{row['goals_visited']:.0%} of the goals visited, {some}{whole}")
     return "; ".join(found)
 
 
 def worst(
-    campaign: Campaign, results: Any, count: int, folder: Path, tell: Callable[[int, int], object]
+    campaign: Campaign,
+    results: Any,
+    controllers: Sequence[str],
+    count: int,
+    folder: Path,
+    tell: Callable[[int, int], object],
 ) -> dict[str, list[Bad]]:
-    """Return the `count` worst trials of each controller, with their replays written into `folder`.
+    """Return the `count` worst trials of each of `controllers`, with their replays written into `folder`.
 
     A trial that came to nothing is not run again. `tell` is told how many of how many replays there are.
     """
     compute: Any = rows.arrow().compute
     chosen = {
         name: _first(results.filter(compute.equal(results["controller"], name)), count)
-        for name in campaign.controllers
+        for name in controllers
     }
     total = sum(map(len, chosen.values()))
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
@@ -128,13 +142,22 @@ def _first(own: Any, count: int) -> list[Mapping[str, Any]]:
 def _bad(campaign: Campaign, row: Mapping[str, Any], folder: Path) -> Bad:
     if row["end"] in NOTHING:
         return Bad(row, why(row), None, "not run again")
-    name = f"{FOLDER}/trial-{row['number']:09d}.html"
+    name = replay_name(row["number"])
     try:
-        again = _replay(_chunk(campaign, row["number"]), row, folder / name)
+        again = replay(campaign, row, folder / name)
     except DubinsTrafficError as error:
         return Bad(row, why(row), None, str(error))
-    same = all(row[column] == again[column] for column in rows.RESULT)
-    return Bad(row, why(row), name, "" if same else "went another way when it was run again")
+    return Bad(row, why(row), name, "" if same(row, again) else OTHER_WAY)
+
+
+def replay_name(number: int) -> str:
+    """Return where the replay of a trial stands in a report."""
+    return f"{FOLDER}/trial-{number:09d}.html"
+
+
+def same(row: Mapping[str, Any], again: Mapping[str, Any]) -> bool:
+    """Tell whether a trial that was run again went as it did."""
+    return all(row[column] == again[column] for column in rows.RESULT)
 
 
 def _chunk(campaign: Campaign, number: int) -> Chunk:
@@ -142,8 +165,9 @@ def _chunk(campaign: Campaign, number: int) -> Chunk:
     return campaign.chunk(campaign.cells[int(cells[0])], int(controllers[0]), int(trials[0]))
 
 
-def _replay(chunk: Chunk, row: Mapping[str, Any], page: Path) -> rows.Row:
-    """Run a trial again, write its replay, and return its row."""
+def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
+    """Run the trial of a row again, write its replay, and return its new row."""
+    chunk = _chunk(campaign, row["number"])
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "trial.mcap"
         job = Job(

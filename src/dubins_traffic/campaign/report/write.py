@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, table
+from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.sheets import sheets
+from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import write_text
@@ -22,9 +25,10 @@ PAGE = "index.html"
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A report: what it says, and where its page is."""
+    """A report: what it says, the worst trials of each controller, and where its page is."""
 
     comparison: Comparison
+    worst: Mapping[str, Sequence[Bad]]
     page: Path
 
 
@@ -61,13 +65,7 @@ def write_report(
         Without the extra `campaign`.
     """
     place = Path(folder)
-    known = manifest.read(place)
-    if known is None:
-        raise InputError(
-            "no campaign", file=str(place), expected="the folder of a campaign, with manifest.json"
-        )
-    campaign = manifest.stored_campaign(place, known)
-    parts = [path for _, _, path in folders.parts(place)]
+    known, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
     if not len(results):
         raise InputError("nothing is finished yet", file=str(place), expected="a campaign that has begun")
@@ -75,11 +73,61 @@ def write_report(
     comparison = compare(campaign, results, clock)
     target = place / REPORT if output is None else Path(output)
     _make(target)
-    bad = find_worst(campaign, results, worst, target, progress or _silent) if worst else {}
+    ranked = comparison.controllers
+    bad = find_worst(campaign, results, ranked, worst, target, progress or _silent) if worst else {}
     for name, text in sheets(comparison).items():
         write_text(target / name, text)
     write_text(target / PAGE, page(comparison, known, bad))
-    return Written(comparison, target / PAGE)
+    return Written(comparison, bad, target / PAGE)
+
+
+def replay_trial(
+    folder: str | os.PathLike[str], number: int, output: str | os.PathLike[str] | None = None
+) -> tuple[Path, str]:
+    """Run a trial of a campaign again and write its replay.
+
+    Parameters
+    ----------
+    folder : path
+        The folder of a campaign.
+    number : int
+        Number of the trial in the campaign, the column `number` of its table.
+    output : path, optional
+        The page; by default where a report has it.
+
+    Returns
+    -------
+    page : Path
+        Where the replay is.
+    note : str
+        What is odd about it: that it went another way; empty if it went as in the campaign.
+
+    Raises
+    ------
+    InputError
+        If there is no campaign in `folder`, the trial has not been run, or the page can't be written.
+    """
+    place = Path(folder)
+    _, campaign, parts = _open(place)
+    results = table.read(place, campaign, parts)
+    found = results.filter([one == number for one in results["number"].to_pylist()]).to_pylist()
+    if not found:
+        expected = f"the number of a trial that has been run; {len(results)} of {campaign.total} have"
+        raise InputError("no such trial", file=str(place), field="number", value=number, expected=expected)
+    target = place / REPORT / replay_name(number) if output is None else Path(output)
+    _make(target.parent)
+    again = replay(campaign, found[0], target)
+    return target, "" if same(found[0], again) else OTHER_WAY
+
+
+def _open(place: Path) -> tuple[Mapping[str, Any], Campaign, Sequence[Path]]:
+    """Return the manifest of a folder, its campaign and the parts of its table."""
+    known = manifest.read(place)
+    if known is None:
+        raise InputError(
+            "no campaign", file=str(place), expected="the folder of a campaign, with manifest.json"
+        )
+    return known, manifest.stored_campaign(place, known), [path for _, _, path in folders.parts(place)]
 
 
 def _silent(_done: int, _total: int) -> None:

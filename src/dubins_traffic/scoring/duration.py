@@ -1,0 +1,35 @@
+"""Whether a trial ran its whole planned duration, and which of its rounds count where controllers are ranked."""
+
+from __future__ import annotations
+
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import End, Ending
+
+
+def planned_ticks(instance: Instance) -> int:
+    """Return the ticks of a trial that runs to its planned end; a trial has one at least."""
+    return max(1, instance.ticks)
+
+
+def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
+    """Tell whether a trial ran its whole planned duration.
+
+    Parameters
+    ----------
+    instance : Instance
+        What was run.
+    ending : Ending or None
+        How the trial ended; None while it runs, and for a record that was cut off.
+    last : int
+        Number of the last frame that is there.
+    """
+    return (
+        ending is not None
+        and ending.end is End.DURATION
+        and min(ending.ticks, last) >= planned_ticks(instance)
+    )
+
+
+def counted_rounds(rounds: int, *, clean: bool, whole: bool) -> int:
+    """Return the rounds that count in a ranking: those of a clean trial that ran its whole duration, else 0."""
+    return rounds if clean and whole else 0
