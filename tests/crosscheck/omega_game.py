@@ -66,16 +66,35 @@ class Game:
         return all_of(f"(c{j}{prime} # {node})" for j in self.cars if j != mover)
 
     def ready(self, i: int) -> str:
-        nodes = self.request["enters"]
-        return any_of(f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)})" for v in nodes)
+        """Say that a car waits where it owes an entry: at a clear crossing, or before a bend or dead end."""
+        found: list[str] = []
+        for v in self.request["enters"]:
+            owed = [f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)})", self.unmet(v)]
+            if v not in self.request["crossings"]:
+                closed = f"({self.open(v)} \\/ ~ {self.ego_among(self.following[v])})"
+                owed.append(self.open(v) if self.request["way_out"] else closed)
+            found.append(all_of(owed))
+        return any_of(found)
 
     def stuck(self, i: int) -> str:
-        """Say that a car is in a node with a free exit."""
-        found: list[str] = []
-        for v in self.nodes:
-            free = any_of(all_of(f"(c{j} # {lane})" for j in self.cars) for lane in self.following[v])
-            found.append(f"((c{i} = {v}) /\\ {free})")
-        return any_of(found)
+        """Say that a car is in a node that it owes to leave."""
+        return any_of(f"((c{i} = {v}) /\\ {self.open(v)} /\\ {self.unmet(v)})" for v in self.nodes)
+
+    def open(self, node: int) -> str:
+        """Say that some exit of a node is free; with E4:unmet also that no e-agent passes by."""
+        free = any_of(all_of(f"(c{j} # {lane})" for j in self.cars) for lane in self.following[node])
+        other = self.request["opposite"][node]
+        if other < 0 or not self.request["unmet"]:
+            return free
+        return f"({free} /\\ {self.clear(other, 0)})"
+
+    def unmet(self, node: int) -> str:
+        """Say that the ego is not in the other half of a bend."""
+        other = self.request["opposite"][node]
+        return "TRUE" if other < 0 else f"(c0 # {other})"
+
+    def ego_among(self, cells: list[int]) -> str:
+        return any_of(f"(c0 = {cell})" for cell in cells)
 
     def environment(self) -> Any:
         parts = self.aut.true
@@ -159,7 +178,10 @@ class Game:
             if asked["leaves"]:
                 found.append(self.bdd(self.stuck(i)))
         for nodes in asked["goals"] if asked["frees"] else ():
-            found.append(self.bdd(any_of(f"(c{i} = {v})" for i in self.cars[1:] for v in nodes)))
+            taken = any_of(f"(c{i} = {v})" for i in self.cars[1:] for v in nodes)
+            exits = [lane for v in nodes for lane in self.following[v]]
+            free = any_of(all_of(f"(c{j} # {lane})" for j in self.cars) for lane in exits)
+            found.append(self.bdd(f"{taken} /\\ ({free} \\/ ~ {self.ego_among([*exits, *nodes])})"))
         return found or [self.aut.false]
 
     def solve(self) -> Any:
@@ -167,7 +189,7 @@ class Game:
         self.aut.action["sys"] = self.ego()
         self.aut.init["env"] = self.aut.init["sys"] = self.aut.true
         self.aut.win["<>[]"] = self.debts()
-        goals = [self.bdd(any_of(f"(c0 = {v})" for v in nodes)) for nodes in self.request["goals"]]
+        goals = [self.bdd(any_of(f"(c0 = {v})" for v in nodes)) for nodes in self.request["targets"]]
         self.aut.win["[]<>"] = goals
         self.aut.prime_varlists()
         return gr1.solve_streett_game(self.aut)[0]

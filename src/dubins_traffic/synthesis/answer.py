@@ -113,8 +113,7 @@ class Answer:
             If a game that would have to be solved for it is too large.
         """
         if self.realizable:
-            pairs = zip(self.solution.game.board.arena.goals, self.solution.ranks, strict=True)
-            return [self._waits(goal, ranks) for goal, ranks in pairs]
+            return [self._waits(target, ranks) for target, ranks in enumerate(self.solution.ranks)]
         counter = Counterstrategy(self.solution)
         lost = ~self.solution.winning
         start = next((place for place in self.starts if lost[place]), int(np.argmax(lost)))
@@ -132,8 +131,8 @@ class Answer:
             else "The ego would not win even if all of E1 to E6 were assumed.",
         ]
 
-    def _waits(self, goal: int, ranks: Ranks) -> str:
-        """Return in how many positions on the way to a goal the ego gets on by itself or waits, and for what."""
+    def _waits(self, target: int, ranks: Ranks) -> str:
+        """Return in how many positions on the way to a target the ego gets on by itself or waits, and for what."""
         arena = self.solution.game.board.arena
         held = ranks.rank > 0
         debt = ranks.debt[ranks.rank[held]]
@@ -145,7 +144,7 @@ class Answer:
             "waits until the goal is freed (E6)": debt >= arena.cells,
         }
         shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
-        return f"On the way to {list(arena.network.intersections[goal])} it {shares} positions."
+        return f"On the way to {arena.target_name(target)} it {shares} positions."
 
 
 def _e_agents(count: int) -> str:

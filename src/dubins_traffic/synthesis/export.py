@@ -21,7 +21,7 @@ from dubins_traffic.synthesis.positions import list_scenes
 from dubins_traffic.synthesis.queues import EGO
 
 FORMAT: Final = "dubins-traffic game"
-VERSION: Final = 1
+VERSION: Final = 2
 WHO: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 
@@ -55,6 +55,7 @@ def header(board: Board) -> dict[str, Any]:
             for n, node in enumerate(arena.nodes)
         ],
         "goal_nodes": [list(nodes) for nodes in arena.goal_nodes],
+        "targets": [list(nodes) for nodes in arena.targets],
         "kinds": [
             [
                 {

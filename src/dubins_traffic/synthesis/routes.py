@@ -36,7 +36,7 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
 def waits(arena: Arena) -> set[tuple[int, int]]:
     """Return where an ego on shortest routes may have to wait, and for which cell."""
     found: set[tuple[int, int]] = set()
-    for nodes in arena.goal_nodes:
+    for nodes in arena.targets:
         far = distances(arena, nodes)
         for cell, own in far.items():
             found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == own - 1}

@@ -27,7 +27,7 @@ from dubins_traffic.synthesis.moves import Work, list_moves
 from dubins_traffic.synthesis.solver import Ranks, Solution
 
 FORMAT: Final = "dubins-traffic strategy"
-VERSION: Final = 1
+VERSION: Final = 2
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def _strategy(arrays: dict[str, Any]) -> Strategy:
     arena = Arena.of(network, goals, header["order_degree"])
     board = Board(arena, Assumption.parse(header["assume"]), header["cars"])
     ranks: list[Ranks] = []
-    for k in range(len(arena.goals)):
+    for k in range(len(arena.targets)):
         names = [f"{name}_{k}" for name in ("rank", "start", "debt")]
         missing = [name for name in names if name not in arrays or arrays[name].ndim != 1]
         if missing:
