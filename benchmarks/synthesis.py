@@ -144,12 +144,18 @@ def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
         "enters": [n for n, node in enumerate(arena.nodes) if _entered(node.crossing, assumed)],
         "crossings": [n for n, node in enumerate(arena.nodes) if node.crossing],
         "opposite": [arena.opposite(n) for n in range(len(arena.nodes))],
+        "beside": [_beside(arena, n) for n in range(len(arena.nodes))],
         "leaves": assumed.leaves is not Leaving.NEVER,
         "unmet": assumed.leaves is Leaving.UNMET,
         "way_out": assumed.arrives is Arriving.WAY_OUT,
         "frees": assumed.frees,
         "list": lost,
     }
+
+
+def _beside(arena: Arena, node: int) -> list[int]:
+    """Return the exits of a node and the lanes beside them."""
+    return [len(arena.nodes) + lane for out in arena.nodes[node].exits for lane in (out, out ^ 1)]
 
 
 def _entered(crossing: bool, assumed: Assumption) -> bool:

@@ -183,8 +183,10 @@ class Reference:
         return found + [self.frees and self.must_free(state, goal) for goal in self.goals]
 
     def closed(self, state: State, node: State) -> bool:
-        """Say whether every way out of a node is taken."""
-        return all(lane in state[0] for lane in self.exits(node))
+        """Say whether every way out of a node is taken, but for one that may be the way back, which is none."""
+        exits = self.exits(node)
+        spare = 1 if len(exits) > 1 and not self.crossing(node[1]) else 0
+        return sum(lane not in state[0] for lane in exits) <= spare
 
     def met_by_ego(self, state: State, node: State) -> bool:
         """Say whether the ego is at the intersection of a node."""
@@ -221,12 +223,11 @@ class Reference:
     def must_free(self, state: State, goal: Point) -> bool:
         """E6."""
         own, *others = state[0]
-        nodes = {self.node(("lane", before, goal)) for before in self.neighbours(goal)}
-        if not nodes & set(others):
-            return False
-        shut = all(self.closed(state, node) for node in nodes)
-        before_it = own in nodes or any(own in self.exits(node) for node in nodes)
-        return not (shut and before_it)
+        nodes = {cell for cell in others if cell[0] == "node" and cell[1] == goal}
+        exits = [lane for node in nodes for lane in self.exits(node)]
+        near = exits + [("lane", after, before) for _, before, after in exits]
+        held_up = all(self.closed(state, node) for node in nodes)
+        return bool(nodes) and not (held_up and (own in near or self.met_by_ego(state, ("node", goal))))
 
 
 def _frozen(lined: dict[Point, Any]) -> Any:

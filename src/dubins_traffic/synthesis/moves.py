@@ -222,17 +222,33 @@ def _inside(t: Tables, work: Work, node: int) -> int:
 
 
 @jit_inner
-def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, bool]:
-    """Say whether an exit of a node is free, and whether the ego is in one."""
-    free = False
-    ego = False
+def _in_lane(t: Tables, work: Work, lane: int) -> int:
+    """Return who is in a lane: 0 nobody, 1 an e-agent, 2 the ego."""
+    end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
+    if (t.taken[end] >> t.lane_slot[lane] & 1) == 0:
+        return 0
+    return 1 if t.others_slots[end] >> t.lane_slot[lane] & 1 else EGO + 1
+
+
+@jit_inner
+def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
+    """Say whether an exit of a node is free; and whether the ego is in one (2), in the lane beside one (1) or not (0).
+
+    Away from crossings the way back is no exit. In a node of several exits nobody knows who came by which, so there
+    two must be free.
+    """
+    count = t.exit_at[node + 1] - t.exit_at[node]
+    left = 2 if count > 1 and t.crossing[node] == 0 else 1
+    ego = 0
     for k in range(t.exit_at[node], t.exit_at[node + 1]):
         lane = t.exits[k]
-        end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
-        taken = (t.taken[end] >> t.lane_slot[lane] & 1) != 0
-        free = free or not taken
-        ego = ego or (taken and (t.others_slots[end] >> t.lane_slot[lane] & 1) == 0)
-    return free, ego
+        inside = _in_lane(t, work, lane)
+        left -= 1 if inside == 0 else 0
+        if inside == EGO + 1:
+            ego = 2
+        elif _in_lane(t, work, lane ^ 1) == EGO + 1:
+            ego = max(ego, 1)
+    return left <= 0, ego
 
 
 @jit_inner
@@ -244,7 +260,7 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
         return False
     if t.switches[5]:
         return free and not (t.switches[4] and opposite)
-    return free or not ego
+    return free or ego != 2
 
 
 @jit_inner
@@ -262,12 +278,11 @@ def _to_free(t: Tables, work: Work, goal: int) -> int:
     free = False
     ego = False
     for v in range(t.base.shape[0]):
-        if t.goal[v] == goal:
-            out, before = _ways_out(t, work, v)
-            inside = _inside(t, work, v)
-            found = v if inside == 1 else found
+        if t.goal[v] == goal and _inside(t, work, v) == 1:
+            found = v
+            out, near = _ways_out(t, work, v)
             free = free or out
-            ego = ego or before or inside == EGO + 1
+            ego = ego or near > 0 or _inside(t, work, t.opposite[v]) == EGO + 1
     return -1 if ego and not free else found
 
 
