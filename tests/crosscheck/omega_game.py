@@ -1,11 +1,12 @@
 """Solves games of cells symbolically, with omega and dd; run by the Python that has them.
 
 Standard input: {"following": cells that each cell leads to, "nodes": how many cells are nodes, "goals": nodes of
-each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered": whether crossings keep the order of arrival, "enters": nodes that are to be
-entered, "crossings": nodes that are, "opposite": the other half of each bend or -1, "beside": lanes near the exits of
-each node, "leaves", "frees": what is assumed, "unmet", "way_out": whether E4 and E5 are weak}. Standard output: {"seconds", "valid", "winning"}, the latter two as
-numbers of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the
-cars, ego first, and pairs (i, j) such that i is before j if they wait together.
+each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered": whether crossings
+keep the order of arrival, "enters": nodes that are to be entered, "crossings": nodes that are such, "opposite": the
+other half of each bend or -1, "beside": lanes near the exits of each node, "leaves", "frees": what is assumed, "unmet",
+"way_out": whether E4 and E5 are weak}. Standard output: {"seconds", "valid", "winning"}, the latter two as numbers of
+labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the cars, ego
+first, and pairs (i, j) such that i is before j if they wait together.
 """
 
 from __future__ import annotations

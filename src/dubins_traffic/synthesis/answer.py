@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
 from dubins_traffic.synthesis.story import told
 from dubins_traffic.synthesis.strengthening import smallest
+
+VACUOUSLY: Final = "vacuously"
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,20 @@ class Answer:
         return start_positions(self.solution.game.board, self.instance)
 
     @property
-    def realizable(self) -> bool:
-        """Whether the ego wins from all positions in which the instance may start; if these aren't known, from all."""
-        return wins(self.solution, self.starts)
+    def realizable(self) -> bool | Literal["vacuously"]:
+        """Whether the ego wins from all positions in which the instance may start; if these aren't known, from all.
+
+        ``"vacuously"`` where each of these wins is vacuous: the strategy, which keeps nobody from what is assumed,
+        wins from none of them.
+        """
+        if not wins(self.solution, self.starts):
+            return False
+        vacuous = self.solution.vacuous
+        return VACUOUSLY if bool((vacuous[self.starts] if self.starts else vacuous).all()) else True
 
     @property
     def outcome(self) -> str:
-        """Where the ego wins: everywhere, from the starts, nowhere, or elsewhere only."""
+        """Where the ego wins: everywhere, from the starts, nowhere, or elsewhere only; vacuous or not."""
         if self.solution.everywhere:
             return "everywhere"
         if self.realizable:
@@ -92,6 +101,10 @@ class Answer:
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
+        if self.realizable == VACUOUSLY:
+            found.append(
+                "It wins vacuously: each of these wins rests on an assumption that can't be kept then."
+            )
         vacuous = int(self.solution.vacuous.sum())
         if vacuous:
             found.append(
@@ -112,8 +125,10 @@ class Answer:
         InputError
             If a game that would have to be solved for it is too large.
         """
-        if self.realizable:
+        if self.realizable is True:
             return [self._waits(target, ranks) for target, ranks in enumerate(self.solution.ranks)]
+        if self.realizable == VACUOUSLY:
+            return ["The ego has no strategy but to keep the e-agents from freeing a goal (E6)."]
         counter = Counterstrategy(self.solution)
         lost = ~self.solution.winning
         start = next((place for place in self.starts if lost[place]), int(np.argmax(lost)))

@@ -117,9 +117,7 @@ class Assumption:
         return ",".join(self.words()) or "nothing"
 
 
-NOTHING: Final = Assumption(
-    Order.IGNORED, False, False, Forfeits.NEVER, Leaving.NEVER, Arriving.NEVER, False
-)
+NOTHING: Final = Assumption(Order.IGNORED, False, False, Forfeits.NEVER, Leaving.NEVER, Arriving.NEVER, False)
 """No assumption at all."""
 
 WORDS: Final[Mapping[str, Mapping[str, Any]]] = {

@@ -6,14 +6,13 @@ numbers of positions mean. `docs/theory.md` documents it.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from dubins_traffic import files
 from dubins_traffic.errors import InputError
+from dubins_traffic.synthesis.archive import save_arrays
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import Game
@@ -80,7 +79,6 @@ def save_game(game: Game, path: str | Path) -> None:
             expected="memory for all of them (--memory)",
         )
     arrays = {
-        "header": np.frombuffer(json.dumps(header(game.board)).encode(), dtype=np.uint8),
         "scene": scene_numbers(game.board),
         "ego_cell": game.ego_cell,
         "to_at": game.to_at,
@@ -90,9 +88,4 @@ def save_game(game: Game, path: str | Path) -> None:
         "owed_at": game.owed_at,
         "owed": game.owed,
     }
-
-    def write(neighbour: Path) -> None:
-        with neighbour.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **arrays)
-
-    files.replace_file(Path(path), write)
+    save_arrays(path, header(game.board), arrays)

@@ -1,8 +1,8 @@
 """How many e-agents an ego on fixed routes provably wins against, without solving a game.
 
 The ego keeps to shortest routes and moves whenever it may. Suppose that it waits in a cell for ever, for the next cell
-of its route. Under E1 to E5 then everything that can be reached from that next cell, except through the ego or by who is
-excused by it, is held for ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has
+of its route. Under E1 to E5 then everything that can be reached from that next cell, except through the ego or by who
+is excused by it, is held for ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has
 cells can't stop it.
 """
 

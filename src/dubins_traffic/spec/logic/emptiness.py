@@ -23,9 +23,7 @@ Edge: TypeAlias = tuple[State, frozenset[int]]
 class Emptiness:
     """Answers whether obligations can be met, for obligations without clocks; `most` states are looked at."""
 
-    def __init__(
-        self, stepper: Stepper, outcomes: list[tuple[bool, ...]], most: int = MAX_STATES
-    ) -> None:
+    def __init__(self, stepper: Stepper, outcomes: list[tuple[bool, ...]], most: int = MAX_STATES) -> None:
         self._most = most
         self._stepper = stepper
         self._outcomes = outcomes

@@ -52,6 +52,8 @@ LONGEST: Final = 400
 """Longest bound, ticks, that is counted in states where a clock does not do."""
 MAX_PARTS: Final = 512
 """Most parts of one formula."""
+LONGEST_DELAY: Final = 1_000_000
+"""Most ticks that a bound may begin later, where requests wait in a delay line."""
 TOGETHER: Final = Limits(states=256, cells=4_096, sought=1_000, choices=8_192)
 """How large a table may grow in which several parts are put together."""
 
@@ -257,6 +259,10 @@ class Monitors:
         found = delayed(part, period)
         if found is not None:
             others, late = found
+            if late.length > LONGEST_DELAY:
+                raise FormulaError(
+                    "begins too late", value=late.length, expected=f"at most {LONGEST_DELAY} ticks from now"
+                )
             for other in others:
                 self._add(number, other, period)
             table = compiled(late.formula, period)
