@@ -37,7 +37,7 @@ def monitors_of_a_task() -> tuple[Monitors, int]:
     spec = task(instance.problem, instance.names)
     formulas = {str(number): part for number, part in enumerate((*spec.assumptions, *spec.guarantees))}
     names = sorted({name for formula in formulas.values() for name in propositions(formula)})
-    return Monitors(formulas, names, instance.problem.period), len(names)
+    return Monitors(formulas, names, instance.problem.period, split=True), len(names)
 
 
 def updates_per_second(monitors: Monitors, width: int, trials: int) -> float:

@@ -18,7 +18,7 @@ from tests.property.test_game_reference import SQUARE, position, reference
 from benchmarks.table import Row
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.play import Environment, play
@@ -138,17 +138,28 @@ def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
         "following": [list(arena.following(cell)) for cell in range(arena.cells)],
         "nodes": len(arena.nodes),
         "goals": [list(nodes) for nodes in arena.goal_nodes],
+        "targets": [list(nodes) for nodes in arena.targets],
         "others": some.others,
         "ordered": assumed.order == "kept",
         "enters": [n for n, node in enumerate(arena.nodes) if _entered(node.crossing, assumed)],
-        "leaves": assumed.leaves,
+        "crossings": [n for n, node in enumerate(arena.nodes) if node.crossing],
+        "opposite": [arena.opposite(n) for n in range(len(arena.nodes))],
+        "beside": [_beside(arena, n) for n in range(len(arena.nodes))],
+        "leaves": assumed.leaves is not Leaving.NEVER,
+        "unmet": assumed.leaves is Leaving.UNMET,
+        "way_out": assumed.arrives is Arriving.WAY_OUT,
         "frees": assumed.frees,
         "list": lost,
     }
 
 
+def _beside(arena: Arena, node: int) -> list[int]:
+    """Return the exits of a node and the lanes beside them."""
+    return [len(arena.nodes) + lane for out in arena.nodes[node].exits for lane in (out, out ^ 1)]
+
+
 def _entered(crossing: bool, assumed: Assumption) -> bool:
-    return assumed.enters if crossing else assumed.arrives
+    return assumed.enters if crossing else assumed.arrives is not Arriving.NEVER
 
 
 def _against_omega() -> list[Row]:

@@ -34,7 +34,7 @@ def winning(arrays: Mapping[str, npt.NDArray[Any]]) -> Flags:
         return np.logical_and.reduceat(safe[arrays["to"]], arrays["to_at"][:-1])
 
     def recurring(won: Flags) -> Flags:
-        for nodes in header["goal_nodes"]:
+        for nodes in header["targets"]:
             base = np.isin(ego_cell, nodes) & controllable(won)
             won = won & _repeat(
                 lambda near, base=base: base | _nearer(near, controllable, debts), np.zeros_like(won)

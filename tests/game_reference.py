@@ -8,7 +8,7 @@ A cell is ("node", point), ("node", point, from) for one direction of a bend tha
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations, product
 from typing import Any
@@ -29,8 +29,8 @@ class Reference:
     order: str = "kept"
     forfeits: str = "never"
     enters: bool = True
-    leaves: bool = True
-    arrives: bool = True
+    leaves: str = "owed"
+    arrives: str = "owed"
     frees: bool = True
     order_degree: int = 1
 
@@ -69,7 +69,7 @@ class Reference:
                         yield cells, _frozen(lined), renewed
 
     def _orders(self, cars: list[int]) -> list[tuple[int, ...]]:
-        must = [car for car in cars if car == 0 or self.arrives]
+        must = [car for car in cars if car == 0 or self.arrives != "never"]
         may = [car for car in cars if car not in must]
         found: list[tuple[int, ...]] = []
         for count in range(len(may) + 1):
@@ -121,7 +121,7 @@ class Reference:
         if car not in dict(orders).get(cells[car][2], ()):
             return True
         may = self.forfeits == "always" or (self.forfeits == "once" and car not in renewed)
-        return self.order != "none" and may and self.first(state, car) and self.clear(state, car)
+        return self.order != "none" and may
 
     def _after(self, state: State, chosen: Any, moved: State) -> Iterator[State]:
         cells, orders, renewed = state
@@ -141,7 +141,7 @@ class Reference:
                     new.setdefault(point, []).append(car)
                 else:
                     again.discard(car)
-            elif self.crossing(cell[2]) and self.arrives:
+            elif self.crossing(cell[2]) and self.arrives != "never":
                 new.setdefault(cell[2], []).append(car)
         for arrivals in product(*(permutations(cars) for cars in new.values())):
             lined = {point: list(order) for point, order in lines.items()}
@@ -178,12 +178,56 @@ class Reference:
         found: list[bool] = []
         for car in range(1, self.others + 1):
             lane = cells[car][0] == "lane"
-            kept = self.enters if lane and self.crossing(cells[car][2]) else self.arrives
-            found.append(kept and self.first(state, car) and self.clear(state, car))
-            free = not lane and any(cell not in cells for cell in self.exits(cells[car]))
-            found.append(self.leaves and free)
-        taken = {cell[1] for cell in cells[1:] if cell[0] == "node"}
-        return found + [self.frees and goal in taken for goal in self.goals]
+            found.append(lane and self.must_enter(state, car))
+            found.append(not lane and self.must_leave(state, car))
+        return found + [self.frees and self.must_free(state, goal) for goal in self.goals]
+
+    def closed(self, state: State, node: State) -> bool:
+        """Say whether every way out of a node is taken, but for one that may be the way back, which is none."""
+        exits = self.exits(node)
+        spare = 1 if len(exits) > 1 and not self.crossing(node[1]) else 0
+        return sum(lane not in state[0] for lane in exits) <= spare
+
+    def met_by_ego(self, state: State, node: State) -> bool:
+        """Say whether the ego is at the intersection of a node."""
+        own = state[0][0]
+        return own[0] == "node" and own[1] == node[1]
+
+    def met_by_others(self, state: State, node: State) -> bool:
+        """Say whether an e-agent is in the same bend, on its way in the other direction."""
+        return any(cell[:2] == node[:2] and cell != node for cell in state[0][1:])
+
+    def must_enter(self, state: State, car: int) -> bool:
+        """E3 at crossings, E5 before bends and dead ends."""
+        node = self.node(state[0][car])
+        if not (self.first(state, car) and self.clear(state, car)):
+            return False
+        if self.crossing(node[1]):
+            return self.enters
+        if self.arrives == "never" or self.met_by_ego(state, node):
+            return False
+        if self.arrives == "way_out":
+            passing = self.leaves == "unmet" and self.met_by_others(state, node)
+            return not self.closed(state, node) and not passing
+        return not (self.closed(state, node) and state[0][0] in self.exits(node))
+
+    def must_leave(self, state: State, car: int) -> bool:
+        """E4."""
+        node = state[0][car]
+        if self.leaves == "never" or self.closed(state, node):
+            return False
+        if len(node) == 3 and self.met_by_ego(state, node):
+            return False
+        return not (self.leaves == "unmet" and self.met_by_others(state, node))
+
+    def must_free(self, state: State, goal: Point) -> bool:
+        """E6."""
+        own, *others = state[0]
+        nodes = {cell for cell in others if cell[0] == "node" and cell[1] == goal}
+        exits = [lane for node in nodes for lane in self.exits(node)]
+        near = exits + [("lane", after, before) for _, before, after in exits]
+        held_up = all(self.closed(state, node) for node in nodes)
+        return bool(nodes) and not (held_up and (own in near or self.met_by_ego(state, ("node", goal))))
 
 
 def _frozen(lined: dict[Point, Any]) -> Any:
@@ -199,10 +243,14 @@ class Arrays:
         self.to_at, self.to = _rows([[number[s] for s in game.turns(state)] for state in self.states])
         self.ego_at, self.ego_to = _rows([[number[s] for s in game.answers(state)] for state in self.states])
         self.owed = np.array([game.owed(state) for state in self.states], dtype=bool).T
-        self.goals = [
-            np.array([state[0][0][0] == "node" and state[0][0][1] == goal for state in self.states])
-            for goal in game.goals
-        ]
+        self.goals = [self._at(lambda point, goal=goal: point == goal) for goal in dict.fromkeys(game.goals)]
+        if len(self.goals) == 1:
+            self.goals.append(self._at(lambda point: point != game.goals[0]))
+
+    def _at(self, wanted: Callable[[Point], bool]) -> Any:
+        """Return in which states the ego is at an intersection that is wanted."""
+        egos = [state[0][0] for state in self.states]
+        return np.array([own[0] == "node" and wanted(own[1]) for own in egos])
 
     def cpre(self, safe: Any) -> Any:
         """Return from where the ego gets into `safe` in one turn of both."""

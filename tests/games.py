@@ -26,10 +26,10 @@ PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
 """A square with a handle."""
 
 
-def pan(others: int, goals: Sequence[int], assumed: str = ALL) -> Board:
-    """Return the positions on a square with a handle, whose end is node 4; crossings as in the rules."""
+def pan(others: int, goals: Sequence[int], assumed: str = ALL, order_degree: int = 1) -> Board:
+    """Return the positions on a square with a handle, whose end is node 4."""
     network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
-    return Board(Arena.of(network, goals), Assumption.parse(assumed.split(",")), others)
+    return Board(Arena.of(network, goals, order_degree), Assumption.parse(assumed.split(",")), others)
 
 
 @cache

@@ -1,10 +1,12 @@
 """Solves games of cells symbolically, with omega and dd; run by the Python that has them.
 
 Standard input: {"following": cells that each cell leads to, "nodes": how many cells are nodes, "goals": nodes of
-each goal, "others": e-agents, "ordered": whether crossings keep the order of arrival, "enters": nodes that are to be
-entered, "leaves", "frees": what is assumed}. Standard output: {"seconds", "valid", "winning"}, the latter two as
-numbers of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the
-cars, ego first, and pairs (i, j) such that i is before j if they wait together.
+each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered": whether crossings
+keep the order of arrival, "enters": nodes that are to be entered, "crossings": nodes that are such, "opposite": the
+other half of each bend or -1, "beside": lanes near the exits of each node, "leaves", "frees": what is assumed, "unmet",
+"way_out": whether E4 and E5 are weak}. Standard output: {"seconds", "valid", "winning"}, the latter two as numbers of
+labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the cars, ego
+first, and pairs (i, j) such that i is before j if they wait together.
 """
 
 from __future__ import annotations
@@ -66,16 +68,49 @@ class Game:
         return all_of(f"(c{j}{prime} # {node})" for j in self.cars if j != mover)
 
     def ready(self, i: int) -> str:
-        nodes = self.request["enters"]
-        return any_of(f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)})" for v in nodes)
+        """Say that a car waits where it owes an entry: at a clear crossing, or before a bend or dead end."""
+        found: list[str] = []
+        for v in self.request["enters"]:
+            owed = [f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)})", self.unmet(v)]
+            if v not in self.request["crossings"]:
+                closed = f"({self.open(v)} \\/ ~ {self.ego_among(self.following[v])})"
+                owed.append(self.open(v) if self.request["way_out"] else closed)
+            found.append(all_of(owed))
+        return any_of(found)
 
     def stuck(self, i: int) -> str:
-        """Say that a car is in a node with a free exit."""
-        found: list[str] = []
-        for v in self.nodes:
-            free = any_of(all_of(f"(c{j} # {lane})" for j in self.cars) for lane in self.following[v])
-            found.append(f"((c{i} = {v}) /\\ {free})")
-        return any_of(found)
+        """Say that a car is in a node that it owes to leave."""
+        return any_of(f"((c{i} = {v}) /\\ {self.open(v)} /\\ {self.unmet(v)})" for v in self.nodes)
+
+    def open(self, node: int) -> str:
+        """Say that some exit of a node is free; with E4:unmet also that no e-agent passes by."""
+        free = self.exits_free(node)
+        other = self.request["opposite"][node]
+        if other < 0 or not self.request["unmet"]:
+            return free
+        return f"({free} /\\ {self.clear(other, 0)})"
+
+    def exits_free(self, node: int) -> str:
+        return any_of(all_of(f"(c{j} # {lane})" for j in self.cars) for lane in self.following[node])
+
+    def unmet(self, node: int) -> str:
+        """Say that the ego is not in the other half of a bend."""
+        other = self.request["opposite"][node]
+        return "TRUE" if other < 0 else f"(c0 # {other})"
+
+    def taken(self, nodes: list[int]) -> str:
+        return any_of(f"(c{i} = {v})" for i in self.cars[1:] for v in nodes)
+
+    def held_up(self, nodes: list[int]) -> str:
+        """Say that nobody in the goal has a free exit, and that the ego is near an exit of one who is there."""
+        stuck = all_of(f"(~ {self.taken([v])} \\/ ~ {self.exits_free(v)})" for v in nodes)
+        near = any_of(
+            f"({self.taken([v])} /\\ {self.ego_among([*self.request['beside'][v], *nodes])})" for v in nodes
+        )
+        return f"({stuck} /\\ {near})"
+
+    def ego_among(self, cells: list[int]) -> str:
+        return any_of(f"(c0 = {cell})" for cell in cells)
 
     def environment(self) -> Any:
         parts = self.aut.true
@@ -159,7 +194,7 @@ class Game:
             if asked["leaves"]:
                 found.append(self.bdd(self.stuck(i)))
         for nodes in asked["goals"] if asked["frees"] else ():
-            found.append(self.bdd(any_of(f"(c{i} = {v})" for i in self.cars[1:] for v in nodes)))
+            found.append(self.bdd(f"{self.taken(nodes)} /\\ ~ {self.held_up(nodes)}"))
         return found or [self.aut.false]
 
     def solve(self) -> Any:
@@ -167,7 +202,7 @@ class Game:
         self.aut.action["sys"] = self.ego()
         self.aut.init["env"] = self.aut.init["sys"] = self.aut.true
         self.aut.win["<>[]"] = self.debts()
-        goals = [self.bdd(any_of(f"(c0 = {v})" for v in nodes)) for nodes in self.request["goals"]]
+        goals = [self.bdd(any_of(f"(c0 = {v})" for v in nodes)) for nodes in self.request["targets"]]
         self.aut.win["[]<>"] = goals
         self.aut.prime_varlists()
         return gr1.solve_streett_game(self.aut)[0]

@@ -106,7 +106,10 @@ def test_split_monitors_are_sound_and_late_only_where_parts_share_propositions(s
         random = Random(seed)
         names = NAMES
         whole = Monitors({"f": formula}, names, 1.0, split=False)
-        split = Monitors({"f": formula}, names, 1.0)
+        split = Monitors({"f": formula}, names, 1.0, split=True)
+        default = Monitors({"f": formula}, names, 1.0)
+        assert not default.late, formula
+        default.reset(1)
         whole.reset(1)
         split.reset(1)
         shared = [set(propositions(part)) for part in parts(formula)]
@@ -115,6 +118,8 @@ def test_split_monitors_are_sound_and_late_only_where_parts_share_propositions(s
             letter = random.randrange(4)
             values = np.array([[letter & 1, letter >> 1]])
             exact, found = int(whole.update(values)[0, 0]), int(split.update(values)[0, 0])
+            early = int(default.update(values)[0, 0])
+            assert (early, exact) in ((PRESUMABLY_TRUE, PRESUMABLY_FALSE), (exact, exact)), formula
             if exact == FALSE and found != FALSE:
                 late += 1
                 assert not apart, formula

@@ -10,7 +10,7 @@ import pytest
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.rnd import extent
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.queues import EGO, OTHER, RENEWED, Scene
@@ -29,22 +29,34 @@ GAMES: list[tuple[Any, int, dict[str, Any]]] = [
     (SQUARE, 2, {"forfeits": "once"}),
     (SQUARE, 2, {"forfeits": "always"}),
     (SQUARE, 1, {"enters": False}),
-    (SQUARE, 1, {"leaves": False}),
-    (SQUARE, 1, {"arrives": False}),
-    (SQUARE, 2, {"arrives": False}),
-    (SQUARE, 1, {"enters": False, "leaves": False, "arrives": False}),
+    (SQUARE, 1, {"leaves": "never"}),
+    (SQUARE, 1, {"arrives": "never"}),
+    (SQUARE, 2, {"arrives": "never"}),
+    (SQUARE, 1, {"enters": False, "leaves": "never", "arrives": "never"}),
     (SQUARE, 2, {"frees": False}),
     (SQUARE, 2, {"order_degree": 3}),
-    (SQUARE, 2, {"order_degree": 3, "arrives": False}),
+    (SQUARE, 2, {"order_degree": 3, "arrives": "never"}),
+    (SQUARE, 2, {"order_degree": 3, "leaves": "unmet"}),
+    (SQUARE, 3, {"order_degree": 3, "leaves": "unmet", "arrives": "way_out"}),
+    (SQUARE, 3, {"order_degree": 3, "arrives": "way_out"}),
+    (SQUARE, 2, {"order_degree": 3, "goals": 1}),
+    (SQUARE, 2, {"goals": 1}),
     (SQUARE, 3, {}),
     (SQUARE, 3, {"order": "none"}),
     (TEE, 2, {}),
     (TEE, 2, {"order_degree": 3}),
-    (TEE, 2, {"leaves": False, "frees": False}),
+    (TEE, 2, {"leaves": "never", "frees": False}),
+    (TEE, 2, {"order_degree": 3, "arrives": "way_out", "frees": False}),
+    (TEE, 2, {"order_degree": 3, "goals": 1}),
+    (TEE, 3, {"order_degree": 2}),
     (KITE, 2, {}),
     (KITE, 2, {"order_degree": 3}),
     (KITE, 2, {"order": "ignored"}),
-    (KITE, 1, {"arrives": False, "forfeits": "once"}),
+    (KITE, 2, {"order_degree": 3, "leaves": "unmet", "arrives": "way_out"}),
+    (KITE, 2, {"order_degree": 4}),
+    (KITE, 2, {"order_degree": 4, "arrives": "way_out"}),
+    (KITE, 1, {"arrives": "never", "forfeits": "once"}),
+    (KITE, 2, {"forfeits": "once", "order_degree": 2, "goals": 1}),
 ]
 
 
@@ -54,7 +66,9 @@ def solved(segments: Any, others: int, assumed: dict[str, Any]) -> Solution:
     degree = words.pop("order_degree", 1)
     words["order"] = Order(words.get("order", "kept"))
     words["forfeits"] = Forfeits(words.get("forfeits", "never"))
-    arena = Arena.of(network, goals(network), degree)
+    words["leaves"] = Leaving(words.get("leaves", "owed"))
+    words["arrives"] = Arriving(words.get("arrives", "owed"))
+    arena = Arena.of(network, goals(network)[: words.pop("goals", 2)], degree)
     return solve(build(Board(arena, Assumption(**words), others)))
 
 
@@ -65,7 +79,8 @@ def goals(network: RoadNetwork) -> list[int]:
 def reference(segments: Any, others: int, assumed: dict[str, Any]) -> Reference:
     roads = tuple(((a, b), (c, d)) for a, b, c, d in segments)
     points = sorted({point for road in roads for point in road})
-    return Reference(roads, (points[0], points[-1]), others, **assumed)
+    words = dict(assumed)
+    return Reference(roads, (points[0], points[-1])[: words.pop("goals", 2)], others, **words)
 
 
 def position(board: Board, game: Reference, state: Any) -> int:
@@ -104,7 +119,7 @@ def test_winners_are_those_of_the_textbook(segments: Any, others: int, assumed: 
 
 
 def test_moves_are_those_of_the_textbook() -> None:
-    for assumed in ({}, {"forfeits": "once"}, {"arrives": False}, {"order_degree": 3}):
+    for assumed in ({}, {"forfeits": "once"}, {"arrives": "never"}, {"order_degree": 3}):
         solution = solved(KITE, 2, assumed)
         game = reference(KITE, 2, assumed)
         graph, board = solution.game, solution.game.board

@@ -42,7 +42,7 @@ def history(text: str, names: str, rows: list[str], period: float = 1.0) -> str:
         ("[] (b -> O a)", ["", "a", "b"], "tTT"),
         ("H a -> <> b", ["a", "b"], "fT"),
         ("[] (a -> X Y a)", [""], "T"),
-        ("(<> a) && [] !a", [""], "f"),
+        ("(<> a) && [] !a", [""], "F"),
         ("F[0,2] a", ["", "", ""], "ffF"),
         ("F[1,2] a", ["a", "", "a"], "ffT"),
         ("G[1,2] a", ["", "a", "a"], "ttT"),
@@ -61,9 +61,31 @@ def test_contradicting_parts_in_one_piece_are_false_at_once() -> None:
     monitors = Monitors(formula, ("a",), 1.0, split=False)
     monitors.reset(1)
     assert monitors.verdicts[0, 0] == FALSE
-    split = Monitors(formula, ("a",), 1.0)
+    split = Monitors(formula, ("a",), 1.0, split=True)
     split.reset(1)
+    assert split.late == {"f"}
     assert split.verdicts[0, 0] == PRESUMABLY_FALSE or split.verdicts[0, 0] == PRESUMABLY_TRUE
+
+
+def test_parts_that_share_propositions_are_put_together_where_that_is_cheap() -> None:
+    assert history("[] p && <> !p", "p", []) == ""
+    for text in ("[] p && <> !p", "[] (a -> <> p) && <> a && [] !p", "([]<> p) && <>[] !p && [] q"):
+        monitors = Monitors({"f": parse(text)}, ("a", "p", "q"), 1.0)
+        monitors.reset(1)
+        assert (monitors.verdicts[0, 0], monitors.late) == (FALSE, frozenset()), text
+
+
+def test_what_is_too_large_to_be_put_together_is_said_to_be_late() -> None:
+    large = " && ".join(f"[] (a -> <> b{i})" for i in range(11))
+    texts = {"large": large, "delayed": "[] (a -> <>[5,10] c)", "small": "[] a && <> c"}
+    names = ("a", "c", *(f"b{i}" for i in range(11)))
+    begun = time.perf_counter()
+    monitors = Monitors({name: parse(text) for name, text in texts.items()}, names, 1 / 30)
+    assert monitors.late == {"large", "delayed"}
+    assert time.perf_counter() - begun < 30
+    monitors.reset(1)
+    monitors.update(np.ones((1, len(names))))
+    assert monitors.verdicts[0].tolist() == [PRESUMABLY_TRUE, PRESUMABLY_FALSE, PRESUMABLY_TRUE]
 
 
 @pytest.mark.parametrize(("rate", "ticks"), [(30.0, 300), (10.0, 100), (7.0, 70)])
@@ -109,8 +131,9 @@ def test_parts_are_split_and_share_tables() -> None:
     found = parts(parse(text))
     assert len(found) == 80
     names = [f"{name}_{v}" for v in range(40) for name in ("enter", "stopped", "ahead")]
+    assert Monitors({"rule 3": parse(text)}, names, 0.1, split=True).tables == 80
     monitors = Monitors({"rule 3": parse(text)}, names, 0.1)
-    assert monitors.tables == 80
+    assert (monitors.tables, monitors.late) == (40, frozenset())
     monitors.reset(2)
     frame = np.zeros((2, len(names)))
     assert monitors.update(frame).tolist() == [[PRESUMABLY_TRUE]] * 2

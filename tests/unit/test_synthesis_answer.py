@@ -76,7 +76,7 @@ def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
     assert found.everywhere
     assert ((found.ranks[0].rank >= 0) == ~found.vacuous).all()
     assert 0 < int(found.vacuous.sum()) < found.game.positions
-    assert not found.vacuous[found.game.at_goal(0)].any()
+    assert not found.vacuous[found.game.at_target(0)].any()
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_the_counterstrategy_keeps_a_goal_from_the_ego_and_pays_its_debts(
             streaks = {owed: streaks.get(owed, 0) + 1 for owed in counter.debts(position)}
             assert level < before or max(streaks.values(), default=0) < 60
             sought = solution.losses[level].goal
-            at_goal = at_goal + int(game.at_goal(sought)[position]) if level == before else 0
+            at_goal = at_goal + int(game.at_target(sought)[position]) if level == before else 0
         assert at_goal == 0
 
 

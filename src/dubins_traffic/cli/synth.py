@@ -42,7 +42,7 @@ def synth(
             "--assume",
             metavar="E1,E2,...",
             help="What is assumed of the e-agents: some of E1 to E6, weaker forms E1:any-order, E3:one-forfeit, "
-            "E3:forfeits; or nothing.",
+            "E3:forfeits, E4:unmet, E5:way-out; or nothing.",
             show_default="as the problem says",
         ),
     ] = None,
@@ -64,6 +64,9 @@ def synth(
         str | None,
         typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
     ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that exist; else they are refused.")
+    ] = False,
     explain: Annotated[
         bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
     ] = False,
@@ -84,6 +87,7 @@ def synth(
     Ctrl-C ends it soon; nothing is written then.
     """
     from dubins_traffic.synthesis.answer import answer
+    from dubins_traffic.synthesis.archive import check_target
     from dubins_traffic.synthesis.assumption import Assumption
     from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
@@ -92,6 +96,8 @@ def synth(
     for option, name in (("--output", strategy), ("--graph", graph)):
         if name is not None and not name.endswith(".npz"):
             raise InputError("not a name of an archive", field=option, value=name, expected="NAME.npz")
+        if name is not None:
+            check_target(name, overwrite=overwrite)
     instance = _instance(source, seed, trial)
     words = None if assume is None else [word for word in assume.split(",") if word.strip() != "nothing"]
     with _progress() as progress:

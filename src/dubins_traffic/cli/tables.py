@@ -123,8 +123,9 @@ def summary(score: Score) -> dict[str, str]:
 
 
 def verdict_text(found: FormulaVerdict) -> str:
-    """Return the verdict on a formula, and since when it is definite."""
-    return found.verdict if found.time is None else f"{found.verdict} since {found.time:.3f} s"
+    """Return the verdict on a formula, since when it is definite, and whether false may be said late."""
+    when = "" if found.time is None else f" since {found.time:.3f} s"
+    return f"{found.verdict}{when}" + ("" if found.early or found.verdict == "true" else " (judged by parts)")
 
 
 def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:

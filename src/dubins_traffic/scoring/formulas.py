@@ -33,16 +33,25 @@ class FormulaVerdict:
         ``true``, ``presumably true``, ``presumably false`` or ``false``.
     time : float or None
         Seconds: since which frame the verdict has been true or false for good; None while it is presumed.
+    early : bool
+        Whether that is said as early as can be; else false may be said later (`spec.logic.monitor`).
     """
 
     name: str
     formula: str
     verdict: Status
     time: float | None
+    early: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
-        return {"name": self.name, "formula": self.formula, "verdict": self.verdict, "time": self.time}
+        return {
+            "name": self.name,
+            "formula": self.formula,
+            "verdict": self.verdict,
+            "time": self.time,
+            "early": self.early,
+        }
 
 
 class FormulaVerdicts:
@@ -94,7 +103,11 @@ class FormulaVerdicts:
         )
         return tuple(
             FormulaVerdict(
-                name, text, cast("Status", VERDICTS[verdict]), None if tick < 0 else tick / self._rate
+                name,
+                text,
+                cast("Status", VERDICTS[verdict]),
+                None if tick < 0 else tick / self._rate,
+                name not in self._monitors.late,
             )
             for (name, text), verdict, tick in found
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
 from dubins_traffic.synthesis.story import told
 from dubins_traffic.synthesis.strengthening import smallest
+
+VACUOUSLY: Final = "vacuously"
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,20 @@ class Answer:
         return start_positions(self.solution.game.board, self.instance)
 
     @property
-    def realizable(self) -> bool:
-        """Whether the ego wins from all positions in which the instance may start; if these aren't known, from all."""
-        return wins(self.solution, self.starts)
+    def realizable(self) -> bool | Literal["vacuously"]:
+        """Whether the ego wins from all positions in which the instance may start; if these aren't known, from all.
+
+        ``"vacuously"`` where each of these wins is vacuous: the strategy, which keeps nobody from what is assumed,
+        wins from none of them.
+        """
+        if not wins(self.solution, self.starts):
+            return False
+        vacuous = self.solution.vacuous
+        return VACUOUSLY if bool((vacuous[self.starts] if self.starts else vacuous).all()) else True
 
     @property
     def outcome(self) -> str:
-        """Where the ego wins: everywhere, from the starts, nowhere, or elsewhere only."""
+        """Where the ego wins: everywhere, from the starts, nowhere, or elsewhere only; vacuous or not."""
         if self.solution.everywhere:
             return "everywhere"
         if self.realizable:
@@ -92,6 +101,10 @@ class Answer:
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
+        if self.realizable == VACUOUSLY:
+            found.append(
+                "It wins vacuously: each of these wins rests on an assumption that can't be kept then."
+            )
         vacuous = int(self.solution.vacuous.sum())
         if vacuous:
             found.append(
@@ -112,9 +125,10 @@ class Answer:
         InputError
             If a game that would have to be solved for it is too large.
         """
-        if self.realizable:
-            pairs = zip(self.solution.game.board.arena.goals, self.solution.ranks, strict=True)
-            return [self._waits(goal, ranks) for goal, ranks in pairs]
+        if self.realizable is True:
+            return [self._waits(target, ranks) for target, ranks in enumerate(self.solution.ranks)]
+        if self.realizable == VACUOUSLY:
+            return ["The ego has no strategy but to keep the e-agents from freeing a goal (E6)."]
         counter = Counterstrategy(self.solution)
         lost = ~self.solution.winning
         start = next((place for place in self.starts if lost[place]), int(np.argmax(lost)))
@@ -132,8 +146,8 @@ class Answer:
             else "The ego would not win even if all of E1 to E6 were assumed.",
         ]
 
-    def _waits(self, goal: int, ranks: Ranks) -> str:
-        """Return in how many positions on the way to a goal the ego gets on by itself or waits, and for what."""
+    def _waits(self, target: int, ranks: Ranks) -> str:
+        """Return in how many positions on the way to a target the ego gets on by itself or waits, and for what."""
         arena = self.solution.game.board.arena
         held = ranks.rank > 0
         debt = ranks.debt[ranks.rank[held]]
@@ -145,7 +159,7 @@ class Answer:
             "waits until the goal is freed (E6)": debt >= arena.cells,
         }
         shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
-        return f"On the way to {list(arena.network.intersections[goal])} it {shares} positions."
+        return f"On the way to {arena.target_name(target)} it {shares} positions."
 
 
 def _e_agents(count: int) -> str:

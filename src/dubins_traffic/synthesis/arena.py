@@ -121,6 +121,30 @@ class Arena:
         """The nodes in each goal."""
         return tuple(self.nodes_of(goal) for goal in self.goals)
 
+    @cached_property
+    def targets(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes in which the ego is to be again and again: those of each goal; of a single one also all others.
+
+        A goal is visited once more only after the ego has been at another intersection. With several goals each
+        takes care of the others.
+        """
+        if len(self.goals) > 1:
+            return self.goal_nodes
+        return (
+            *self.goal_nodes,
+            tuple(n for n, node in enumerate(self.nodes) if node.vertex != self.goals[0]),
+        )
+
+    def target_name(self, target: int) -> str:
+        """Return how people call one of `targets`."""
+        if target >= len(self.goals):
+            return "any other intersection"
+        return str(list(self.network.intersections[self.goals[target]]))
+
+    def opposite(self, node: int) -> int:
+        """Return the other node of a bend that is two, else -1."""
+        return next((n for n in self.nodes_of(self.nodes[node].vertex) if n != node), -1)
+
     def following(self, cell: int) -> tuple[int, ...]:
         """Return the cells to which a car may move from `cell`."""
         count = len(self.nodes)

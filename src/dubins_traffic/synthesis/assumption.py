@@ -22,13 +22,34 @@ class Order(StrEnum):
 
 
 class Forfeits(StrEnum):
-    """How often an e-agent that is first at a clear intersection may give up its place (E3)."""
+    """How often an e-agent that waits may give up its place for a new one (E3)."""
 
     NEVER = "never"
     ONCE = "once"
     """Once in a wait."""
     ALWAYS = "always"
     """Any number of times."""
+
+
+class Leaving(StrEnum):
+    """When an e-agent must leave a disc (E4)."""
+
+    OWED = "owed"
+    """When an exit is free; in a bend not while the ego meets the disc, and whatever other e-agents do that meet it."""
+    UNMET = "unmet"
+    """In a bend, besides, not while an e-agent is in it that came by the other road."""
+    NEVER = "never"
+
+
+class Arriving(StrEnum):
+    """When an e-agent must go on in its lane (E5)."""
+
+    OWED = "owed"
+    """Up to the line of a crossing; into a bend or dead end that is clear and that the ego does not meet, unless the
+    ego is in the only way out."""
+    WAY_OUT = "way_out"
+    """Into a bend or dead end, besides, only if a way out of it is free."""
+    NEVER = "never"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +66,9 @@ class Assumption:
         E3: who is first at a clear intersection enters at last.
     forfeits : Forfeits
         Whether places in the order may be given up.
-    leaves : bool
+    leaves : Leaving
         E4: who is in an intersection with a free exit leaves at last.
-    arrives : bool
+    arrives : Arriving
         E5: who is in a lane comes to its end at last, and so into the order, or through a bend.
     frees : bool
         E6: every goal is free again and again.
@@ -57,8 +78,8 @@ class Assumption:
     yields: bool = True
     enters: bool = True
     forfeits: Forfeits = Forfeits.NEVER
-    leaves: bool = True
-    arrives: bool = True
+    leaves: Leaving = Leaving.OWED
+    arrives: Arriving = Arriving.OWED
     frees: bool = True
 
     @classmethod
@@ -96,7 +117,7 @@ class Assumption:
         return ",".join(self.words()) or "nothing"
 
 
-NOTHING: Final = Assumption(Order.IGNORED, False, False, Forfeits.NEVER, False, False, False)
+NOTHING: Final = Assumption(Order.IGNORED, False, False, Forfeits.NEVER, Leaving.NEVER, Arriving.NEVER, False)
 """No assumption at all."""
 
 WORDS: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -106,8 +127,10 @@ WORDS: Final[Mapping[str, Mapping[str, Any]]] = {
     "E3": {"enters": True, "forfeits": Forfeits.NEVER},
     "E3:one-forfeit": {"enters": True, "forfeits": Forfeits.ONCE},
     "E3:forfeits": {"enters": True, "forfeits": Forfeits.ALWAYS},
-    "E4": {"leaves": True},
-    "E5": {"arrives": True},
+    "E4": {"leaves": Leaving.OWED},
+    "E4:unmet": {"leaves": Leaving.UNMET},
+    "E5": {"arrives": Arriving.OWED},
+    "E5:way-out": {"arrives": Arriving.WAY_OUT},
     "E6": {"frees": True},
 }
 """What each word assumes."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption, Forfeits
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving
 from dubins_traffic.synthesis.queues import (
     IMPOSSIBLE,
     OTHER,
@@ -66,8 +66,11 @@ class Tables(NamedTuple):
         The goal to which the node belongs, or -1.
     goal_nodes : (G,) int64
         How many nodes each goal has.
-    switches : (4,) int64
-        Whether E2, E4 and E6 are assumed; number of cells.
+    crossing, opposite : (V,) int64
+        Whether the node is a crossing; the other node of a bend, or -1.
+    switches : (6,) int64
+        Whether E2, E4 and E6 are assumed; number of cells; whether e-agents that meet in a bend excuse each other (E4),
+        and whether a taken way out excuses who does not enter (E5).
     """
 
     base: Ints
@@ -98,6 +101,8 @@ class Tables(NamedTuple):
     renewed: Ints
     goal: Ints
     goal_nodes: Ints
+    crossing: Ints
+    opposite: Ints
     switches: Ints
 
 
@@ -204,10 +209,16 @@ class Board:
             renewed=_ints(RENEWED if kind.forfeits is Forfeits.ONCE else OTHER for kind in self._kinds),
             goal=_ints(self._goal_of(node.vertex) for node in nodes),
             goal_nodes=_ints(len(own) for own in self.arena.goal_nodes),
-            switches=_ints(
-                (self.assumption.yields, self.assumption.leaves, self.assumption.frees, self.arena.cells)
-            ),
+            crossing=_ints(node.crossing for node in nodes),
+            opposite=_ints(self.arena.opposite(n) for n in range(len(nodes))),
+            switches=_ints(self._switches()),
         )
+
+    def _switches(self) -> tuple[int, ...]:
+        """Return `Tables.switches`."""
+        own = self.assumption
+        leaves, meeting = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
+        return own.yields, leaves, own.frees, self.arena.cells, meeting, own.arrives is Arriving.WAY_OUT
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""

@@ -44,8 +44,8 @@ def check(game: Game, ranks: Sequence[Ranks]) -> None:
     for goal, own in enumerate(ranks):
         following = ranks[(goal + 1) % len(ranks)]
         reached = own.rank == 0
-        if (reached & ~game.at_goal(goal)).any():
-            raise _error(game, goal, reached & ~game.at_goal(goal), "has rank 0 away from the goal")
+        if (reached & ~game.at_target(goal)).any():
+            raise _error(game, goal, reached & ~game.at_target(goal), "has rank 0 away from the goal")
         best = answers(game, own)
         wrong = _astray(game, own, best)
         if wrong.any():
@@ -86,5 +86,5 @@ def _worst(game: Game, best: Numbers) -> Numbers:
 
 def _error(game: Game, goal: int, wrong: Flags, fault: str) -> StrategyError:
     position = int(np.flatnonzero(wrong)[0])
-    name = game.board.arena.name(game.board.arena.goal_nodes[goal][0])
+    name = game.board.arena.target_name(goal)
     return StrategyError(f"position {position}, on the way to {name}: {fault} ({int(wrong.sum())} such)")

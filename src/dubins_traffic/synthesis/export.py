@@ -6,14 +6,13 @@ numbers of positions mean. `docs/theory.md` documents it.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from dubins_traffic import files
 from dubins_traffic.errors import InputError
+from dubins_traffic.synthesis.archive import save_arrays
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import Game
@@ -21,7 +20,7 @@ from dubins_traffic.synthesis.positions import list_scenes
 from dubins_traffic.synthesis.queues import EGO
 
 FORMAT: Final = "dubins-traffic game"
-VERSION: Final = 1
+VERSION: Final = 2
 WHO: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 
@@ -55,6 +54,7 @@ def header(board: Board) -> dict[str, Any]:
             for n, node in enumerate(arena.nodes)
         ],
         "goal_nodes": [list(nodes) for nodes in arena.goal_nodes],
+        "targets": [list(nodes) for nodes in arena.targets],
         "kinds": [
             [
                 {
@@ -79,7 +79,6 @@ def save_game(game: Game, path: str | Path) -> None:
             expected="memory for all of them (--memory)",
         )
     arrays = {
-        "header": np.frombuffer(json.dumps(header(game.board)).encode(), dtype=np.uint8),
         "scene": scene_numbers(game.board),
         "ego_cell": game.ego_cell,
         "to_at": game.to_at,
@@ -89,9 +88,4 @@ def save_game(game: Game, path: str | Path) -> None:
         "owed_at": game.owed_at,
         "owed": game.owed,
     }
-
-    def write(neighbour: Path) -> None:
-        with neighbour.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **arrays)
-
-    files.replace_file(Path(path), write)
+    save_arrays(path, header(game.board), arrays)

@@ -128,9 +128,9 @@ class Game:
         """How many kinds of debts there may be: one a cell and one a goal."""
         return self.board.arena.cells + len(self.board.arena.goals)
 
-    def at_goal(self, goal: int) -> Flags:
-        """Return where (N,) the ego is at a goal."""
-        return np.isin(self.ego_cell, np.array(self.board.arena.goal_nodes[goal], dtype=np.int16))
+    def at_target(self, target: int) -> Flags:
+        """Return where (N,) the ego is at one of `Arena.targets`."""
+        return np.isin(self.ego_cell, np.array(self.board.arena.targets[target], dtype=np.int16))
 
     def turns(self) -> Iterator[Turns]:
         """Yield the moves of the environment from all positions, in order, some positions at a time."""
@@ -190,7 +190,7 @@ def estimate(board: Board) -> Estimate:
         expand(board.tables, board.others, count, position, position + 1, work, out, position)
         sizes += out.used
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
-    goals = len(board.arena.goals)
+    goals = len(board.arena.targets)
     mask = np.dtype(mask_type(board.others)).itemsize
     building = 2 * (4 * ego_moves + (2 + mask) * debts) + 26 * count
     solving = 8 * ego_moves + (6 + mask) * debts + 26 * count

@@ -112,11 +112,11 @@ def play(
     first = strategy.first() if position is None else position
     if not strategy.wins(first):
         raise InputError("the strategy does not win from there", field="position", value=first)
-    goals = len(board.arena.goals)
+    targets = len(board.arena.targets)
     table = Table(
         np.array([first, 0, 0, 0], dtype=np.int64),
-        np.zeros(board.arena.cells + goals, dtype=np.int64),
-        *(np.zeros(goals, dtype=np.int64) for _ in range(3)),
+        np.zeros(board.arena.cells + len(board.arena.goals), dtype=np.int64),
+        *(np.zeros(targets, dtype=np.int64) for _ in range(3)),
     )
     moves = Room(room(board, 1, LARGEST_CHOICE), room(board, 1, LARGEST_CHOICE))
     ranks = np.stack([own.rank for own in strategy.ranks])

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Order
 
 OTHER: Final = 0
 EGO: Final = 1
@@ -46,7 +46,7 @@ class Kind:
     parks : bool
         Whether they may stay away from the end of the lane.
     owed : bool
-        Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere).
+        Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows).
     """
 
     slots: int
@@ -65,8 +65,8 @@ class Kind:
             ordered,
             ordered and assumed.order is Order.IGNORED,
             assumed.forfeits if ordered else Forfeits.NEVER,
-            crossing and not assumed.arrives,
-            assumed.enters if crossing else assumed.arrives,
+            crossing and assumed.arrives is Arriving.NEVER,
+            assumed.enters if crossing else assumed.arrives is not Arriving.NEVER,
         )
 
 
@@ -196,10 +196,9 @@ class Scenery:
         return sum(1 << slot for slot, who in scene.queue if who != EGO)
 
     def _may_forfeit(self, scene: Scene) -> int:
-        if self.kind.forfeits is Forfeits.NEVER or scene.inside is not None:
+        if self.kind.forfeits is Forfeits.NEVER:
             return 0
-        renewed = bool(scene.queue) and scene.queue[0][1] == RENEWED
-        return 0 if renewed else self._first(scene)
+        return sum(1 << slot for slot, who in scene.queue if who == OTHER)
 
     def left(self) -> Ints:
         """Return the scene (C,) after whoever is in the node has left it."""

@@ -1,8 +1,9 @@
 """How many e-agents an ego on fixed routes provably wins against, without solving a game.
 
 The ego keeps to shortest routes and moves whenever it may. Suppose that it waits in a cell for ever, for the next cell
-of its route. Under E1 to E5 then everything that can be reached from that next cell without passing the ego is held for
-ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has cells can't stop it.
+of its route. Under E1 to E5 then everything that can be reached from that next cell, except through the ego or by who
+is excused by it, is held for ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has
+cells can't stop it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable
 
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 
 
 def route_bound(arena: Arena, assumption: Assumption) -> int:
@@ -22,10 +23,11 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
     arena : Arena
         The cells.
     assumption : Assumption
-        The proof needs E1 to E5, that forfeits are bounded, and crossings wherever three roads meet; it does not need
-        E6. Without these the bound is 0.
+        The proof needs E1 to E5, E4 and E5 in full, that forfeits are bounded, and crossings wherever three roads
+        meet; it does not need E6. Without these the bound is 0.
     """
-    kept = [assumption.yields, assumption.enters, assumption.leaves, assumption.arrives]
+    kept = [assumption.yields, assumption.enters]
+    kept += [assumption.leaves is Leaving.OWED, assumption.arrives is Arriving.OWED]
     kept += [node.crossing or len(node.inbound) == 1 for node in arena.nodes]
     if assumption.order is not Order.KEPT or assumption.forfeits is Forfeits.ALWAYS or not all(kept):
         return 0
@@ -36,7 +38,7 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
 def waits(arena: Arena) -> set[tuple[int, int]]:
     """Return where an ego on shortest routes may have to wait, and for which cell."""
     found: set[tuple[int, int]] = set()
-    for nodes in arena.goal_nodes:
+    for nodes in arena.targets:
         far = distances(arena, nodes)
         for cell, own in far.items():
             found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == own - 1}
@@ -60,13 +62,29 @@ def distances(arena: Arena, targets: Iterable[int]) -> dict[int, int]:
     return far
 
 
-def region(arena: Arena, first: int, without: int) -> set[int]:
-    """Return the cells that can be reached from `first`, itself included, without passing the cell `without`."""
+def region(arena: Arena, first: int, ego: int) -> set[int]:
+    """Return the cells that are held for ever if `first` is, and the ego stays in the cell `ego`."""
     found = {first}
     waiting = [first]
     while waiting:
-        for ahead in arena.following(waiting.pop()):
-            if ahead != without and ahead not in found:
+        cell = waiting.pop()
+        if _excused(arena, cell, ego):
+            continue
+        for ahead in arena.following(cell):
+            if ahead != ego and ahead not in found:
                 found.add(ahead)
                 waiting.append(ahead)
     return found
+
+
+def _excused(arena: Arena, cell: int, ego: int) -> bool:
+    """Say whether who holds a cell need not go on because of the ego, though the ego is not in the next one.
+
+    So it is in and before a bend through which the ego passes, and before a bend or dead end out of which only the
+    lane of the ego leads.
+    """
+    count = len(arena.nodes)
+    node = cell if cell < count else arena.lane_end[cell - count][0]
+    if arena.nodes[node].crossing:
+        return False
+    return ego == arena.opposite(node) or (cell >= count and arena.following(node) == (ego,))

@@ -181,7 +181,7 @@ class _Solver:
     def winning(self, *, friendly: bool) -> tuple[Flags, tuple[Ranks, ...], tuple[Loss, ...], bool]:
         """Return the winning positions, the ranks, the losses, and whether being friendly has cost any position."""
         count = self._game.positions
-        goals = range(len(self._game.board.arena.goals))
+        goals = range(len(self._game.board.arena.targets))
         won = np.ones(count, dtype=np.bool_)
         ways = [won] * len(goals)
         losses: list[Loss] = []
@@ -202,7 +202,7 @@ class _Solver:
 
     def _targets(self, won: Flags) -> list[Flags]:
         """Return, for each goal, where it has been reached and the ego stays where it has won."""
-        targets = [self._game.at_goal(goal) for goal in range(len(self._game.board.arena.goals))]
+        targets = [self._game.at_target(goal) for goal in range(len(self._game.board.arena.targets))]
         if won.all():
             return targets
         kept = np.empty(won.shape, dtype=np.bool_)

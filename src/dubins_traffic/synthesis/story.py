@@ -49,8 +49,8 @@ def told(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[s
     board = counter.solution.game.board
     moments, again, goal = played(counter, position, turns)
     arena = board.arena
-    name = arena.name(arena.goal_nodes[goal][0]).partition(" from")[0]
-    lines = [f"From here the ego can be kept from goal {name} for ever:", *_scene_lines(arena, moments[0])]
+    name = ("goal " if goal < len(arena.goals) else "") + arena.target_name(goal)
+    lines = [f"From here the ego can be kept from {name} for ever:", *_scene_lines(arena, moments[0])]
     if moments[-1].rammed:
         return [
             *lines,
@@ -95,7 +95,7 @@ def _towards(counter: Counterstrategy, position: int, goal: int) -> int:
     """Return the move of an ego that takes the shortest way to a goal, or waits."""
     game = counter.solution.game
     arena = game.board.arena
-    far = distances(arena, arena.goal_nodes[goal])
+    far = distances(arena, arena.targets[goal])
     options = game.ego_to[game.ego_at[position] : game.ego_at[position + 1]].tolist()
     return min(options, key=lambda option: (far.get(int(game.ego_cell[option]), arena.cells), option))
 

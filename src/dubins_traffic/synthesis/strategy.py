@@ -7,27 +7,26 @@ the arrays `rank_k`, `start_k` and `debt_k` (`solver.Ranks`).
 
 from __future__ import annotations
 
-import json
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dubins_traffic import files
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.synthesis.archive import Archive, save_arrays
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.assumption import Assumption
-from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
+from dubins_traffic.synthesis.board import MOST_OTHERS, Board
+from dubins_traffic.synthesis.game import LARGEST_CHOICE, MOST_POSITIONS, room
 from dubins_traffic.synthesis.moves import Work, list_moves
 from dubins_traffic.synthesis.solver import Ranks, Solution
 
 FORMAT: Final = "dubins-traffic strategy"
-VERSION: Final = 1
+VERSION: Final = 2
 
 
 @dataclass(frozen=True)
@@ -101,17 +100,11 @@ class Strategy:
             "assume": list(self.board.assumption.words()),
         }
         arrays: dict[str, Any] = {
-            "header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
             **{f"rank_{k}": _narrow(own.rank) for k, own in enumerate(self.ranks)},
             **{f"start_{k}": own.start for k, own in enumerate(self.ranks)},
             **{f"debt_{k}": own.debt for k, own in enumerate(self.ranks)},
         }
-
-        def write(neighbour: Path) -> None:
-            with neighbour.open("wb") as stream:
-                np.savez_compressed(stream, **arrays)
-
-        files.replace_file(Path(path), write)
+        save_arrays(path, header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Strategy:
@@ -120,22 +113,28 @@ class Strategy:
         Raises
         ------
         InputError
-            If it can't be read, is no strategy, or of an unknown version. Whether it wins is for `checker.check`.
+            If it can't be read, is no strategy, of an unknown version, or has no rank in any position for some goal.
+            Whether it wins elsewhere is for `checker.check`.
         """
-        try:
-            with Path(path).open("rb") as stream:
-                if not zipfile.is_zipfile(stream):
-                    raise zipfile.BadZipFile("no NumPy archive, or only a part of one")
-                with np.load(stream, allow_pickle=False) as archive:
-                    arrays = {name: archive[name] for name in archive.files}
-        except FileNotFoundError:
-            raise InputError("no such file", file=str(path)) from None
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
-            raise InputError(f"can't be read as a strategy ({error})", file=str(path)) from None
-        try:
-            return _strategy(arrays)
-        except InputError as error:
-            raise error.within(file=str(path)) from None
+        with Archive(path, "strategy") as archive:
+            try:
+                found = _strategy(archive)
+                found.first()
+            except InputError as error:
+                raise error if error.file else error.within(file=str(path)) from None
+        return found
+
+
+class _Header(BaseModel):
+    """What the header of a file says of the game, as `Strategy.save` writes it."""
+
+    model_config = ConfigDict(strict=True)
+
+    network: dict[str, Any]
+    goals: list[Annotated[list[int], Field(min_length=2, max_length=2)]]
+    order_degree: Annotated[int, Field(ge=1)]
+    cars: Annotated[int, Field(ge=1, le=MOST_OTHERS)]
+    assume: list[str]
 
 
 def _narrow(rank: Numbers) -> Any:
@@ -143,37 +142,44 @@ def _narrow(rank: Numbers) -> Any:
     return rank.astype(np.int16) if rank.max(initial=0) < 2**15 else rank
 
 
-def _strategy(arrays: dict[str, Any]) -> Strategy:
-    header = _header(arrays)
-    network = RoadNetwork.from_document(header["network"])
-    goals = [network.vertex(tuple(goal)) for goal in header["goals"]]
-    arena = Arena.of(network, goals, header["order_degree"])
-    board = Board(arena, Assumption.parse(header["assume"]), header["cars"])
-    ranks: list[Ranks] = []
-    for k in range(len(arena.goals)):
-        names = [f"{name}_{k}" for name in ("rank", "start", "debt")]
-        missing = [name for name in names if name not in arrays or arrays[name].ndim != 1]
-        if missing:
-            raise InputError("a table is missing", field=missing[0], expected="one a goal")
-        rank, start, debt = (arrays[name] for name in names)
-        if rank.shape != (board.positions,) or rank.max(initial=-1) >= len(start) or len(start) != len(debt):
-            raise InputError("tables of another game", field=f"rank_{k}", value=rank.shape)
-        ranks.append(Ranks(rank.astype(np.int32), start.astype(np.int32), debt.astype(np.int16)))
-    return Strategy(board, tuple(ranks))
+def _strategy(archive: Archive) -> Strategy:
+    header = _header(archive)
+    network = RoadNetwork.from_document(header.network)
+    goals = [network.vertex((x, y)) for x, y in header.goals]
+    arena = Arena.of(network, goals, header.order_degree)
+    board = Board(arena, Assumption.parse(header.assume), header.cars)
+    if not 0 < board.positions < MOST_POSITIONS:
+        raise InputError("no game", field="header.cars", value=header.cars, expected="one that has positions")
+    return Strategy(board, tuple(_ranks(archive, board, k) for k in range(len(arena.targets))))
 
 
-def _header(arrays: dict[str, Any]) -> dict[str, Any]:
-    try:
-        header: dict[str, Any] = json.loads(arrays["header"].tobytes().decode())
-    except (KeyError, ValueError):
-        raise InputError("no strategy", field="header", expected="the header of a strategy") from None
+def _ranks(archive: Archive, board: Board, target: int) -> Ranks:
+    """Return the tables for one target; InputError if they are none of the game."""
+    count, debts = board.positions, board.arena.cells + len(board.arena.goals)
+    rank = archive.array(f"rank_{target}", np.int32, count, exactly=True)
+    start = archive.array(f"start_{target}", np.int32, count + 1)
+    debt = archive.array(f"debt_{target}", np.int16, len(start), exactly=True)
+    tables = ((f"rank_{target}", rank, len(start)), (f"start_{target}", start, len(start)))
+    for name, table, end in (*tables, (f"debt_{target}", debt, debts)):
+        low = 0 if table is start else -1
+        if table.min(initial=0) < low or table.max(initial=-1) >= end:
+            raise InputError(
+                "tables of another game", field=name, expected=f"numbers from {low} to {end - 1}"
+            )
+    return Ranks(rank.astype(np.int32), start.astype(np.int32), debt.astype(np.int16))
+
+
+def _header(archive: Archive) -> _Header:
+    header = archive.header()
     if header.get("format") != FORMAT:
         raise InputError("no strategy", field="format", value=header.get("format"), expected=FORMAT)
     if header.get("version") != VERSION:
         raise InputError(
             "of an unknown version", field="version", value=header.get("version"), expected=str(VERSION)
         )
-    for name in ("network", "goals", "order_degree", "cars", "assume"):
-        if name not in header:
-            raise InputError("missing", field=f"header.{name}")
-    return header
+    try:
+        return _Header.model_validate(header)
+    except ValidationError as error:
+        (first, *_) = error.errors(include_url=False)
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError("not as in a strategy", field=f"header.{place}", expected=first["msg"]) from None

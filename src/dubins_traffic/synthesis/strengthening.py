@@ -10,7 +10,11 @@ from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import Progress, build
 from dubins_traffic.synthesis.solver import Solution, solve
 
-STEPS = {"E3": ("E3:one-forfeit", "E3")}
+STEPS = {
+    "E3": ("E3:one-forfeit", "E3"),
+    "E4": ("E4:unmet", "E4"),
+    "E5": ("E5:way-out", "E5"),
+}
 """Words of a part from weak to strong, where more than one can be added."""
 
 

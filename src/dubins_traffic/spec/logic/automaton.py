@@ -17,8 +17,9 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.spec.logic.emptiness import MAX_STATES as MAX_SOUGHT
 from dubins_traffic.spec.logic.emptiness import Emptiness
-from dubins_traffic.spec.logic.formula import Formula, FormulaError
+from dubins_traffic.spec.logic.formula import FUTURE, Formula, FormulaError, Op, subformulas
 from dubins_traffic.spec.logic.moves import STRONG, Stepper
 from dubins_traffic.spec.logic.obligations import DONE, Atom, Moves, Table
 
@@ -63,7 +64,32 @@ class Automaton:
     clocks: Ints
 
 
-def automaton(formula: Formula, period: float, unroll: int) -> Automaton:
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How large things may grow while a table is built.
+
+    Attributes
+    ----------
+    states : int
+        States of the table before it is made smaller.
+    cells : int
+        Its states times the letters and what is known of its clocks.
+    sought : int
+        States of the Büchi automaton in which it is asked what can still be met.
+    choices : int
+        Letters times the ways to meet or put off each operator other than G and X.
+    """
+
+    states: int = MAX_STATES
+    cells: int = 1 << 30
+    sought: int = MAX_SOUGHT
+    choices: int = 1 << 62
+
+
+FULL: Final = Limits()
+
+
+def automaton(formula: Formula, period: float, unroll: int, limits: Limits = FULL) -> Automaton:
     """Return the table of one formula.
 
     Parameters
@@ -74,6 +100,8 @@ def automaton(formula: Formula, period: float, unroll: int) -> Automaton:
         Seconds between positions.
     unroll : int
         Bounds up to this many ticks are counted in states, longer ones by clocks.
+    limits : Limits
+        What is too large.
 
     Raises
     ------
@@ -87,21 +115,26 @@ def automaton(formula: Formula, period: float, unroll: int) -> Automaton:
         raise FormulaError(
             "too many long bounds in one part", value=len(table.clocks), expected=f"at most {MAX_CLOCKS}"
         )
-    return _Builder(table).build()
+    return _Builder(table, formula, limits).build()
 
 
 class _Builder:
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Table, formula: Formula, limits: Limits) -> None:
         self._table = table
+        self._limits = limits
         self._stepper = Stepper(table)
         self._letter, self._outcomes = table.letters()
-        self._emptiness = Emptiness(self._stepper, self._outcomes)
+        chosen = sum(part.op in FUTURE - {Op.G, Op.X} for part in subformulas(formula))
+        if len(self._outcomes) << chosen > limits.choices:
+            raise FormulaError("too many choices to be monitored", expected="fewer operators")
+        self._emptiness = Emptiness(self._stepper, self._outcomes, limits.sought)
         self._verdicts: dict[State, int] = {}
         self._bounds: dict[tuple[int, bool], int] = {}
 
     def build(self) -> Automaton:
         table = self._table
         width = 1 << len(table.clocks)
+        most = min(self._limits.states, self._limits.cells // (width * len(self._outcomes)))
         start = self._sunk((table.remembered(), frozenset([frozenset([table.root << 2])])))
         number = {start: 0}
         states = [start]
@@ -113,10 +146,10 @@ class _Builder:
                 for expired in range(width):
                     target, reset = self._step(state, tests, expired)
                     if target not in number:
-                        if len(states) >= MAX_STATES:
+                        if len(states) >= most:
                             raise FormulaError(
                                 "too large to be monitored",
-                                expected=f"at most {MAX_STATES} states in each part",
+                                expected=f"at most {most} states in each part",
                             )
                         number[target] = len(states)
                         states.append(target)

@@ -21,9 +21,10 @@ Edge: TypeAlias = tuple[State, frozenset[int]]
 
 
 class Emptiness:
-    """Answers whether obligations can be met, for obligations without clocks."""
+    """Answers whether obligations can be met, for obligations without clocks; `most` states are looked at."""
 
-    def __init__(self, stepper: Stepper, outcomes: list[tuple[bool, ...]]) -> None:
+    def __init__(self, stepper: Stepper, outcomes: list[tuple[bool, ...]], most: int = MAX_STATES) -> None:
+        self._most = most
         self._stepper = stepper
         self._outcomes = outcomes
         self._meetable: dict[State, bool] = {}
@@ -98,9 +99,9 @@ class Emptiness:
                 if target in index:
                     low[state] = min(low[state], index[target])
                     continue
-                if len(self._meetable) + len(index) > MAX_STATES:
+                if len(self._meetable) + len(index) > self._most:
                     raise FormulaError(
-                        "too large to be monitored", expected=f"at most {MAX_STATES} states of its automaton"
+                        "too large to be monitored", expected=f"at most {self._most} states of its automaton"
                     )
                 index[target] = low[target] = len(index)
                 edges[target] = self._edges(target)

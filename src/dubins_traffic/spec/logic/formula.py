@@ -40,6 +40,8 @@ MAX_DEPTH: Final = 100
 """Deepest nesting of operators in a formula."""
 MAX_SIZE: Final = 20_000
 """Most operators and propositions in a formula written out."""
+LONGEST_BOUND: Final = 1e9
+"""Longest bound, seconds: some thirty years."""
 
 Bounds: TypeAlias = tuple[float, float]
 
@@ -291,13 +293,14 @@ def interval(bounds: Bounds | None) -> Bounds | None:
     Raises
     ------
     FormulaError
-        If they are not 0 <= a <= b < inf.
+        If they are not 0 <= a <= b <= `LONGEST_BOUND`.
     """
     if bounds is None:
         return None
     low, high = float(bounds[0]), float(bounds[1])
-    if not 0.0 <= low <= high < math.inf:
-        raise FormulaError("not an interval", value=list(bounds), expected="[a, b] with 0 <= a <= b, seconds")
+    if not 0.0 <= low <= high <= LONGEST_BOUND:
+        expected = f"[a, b] with 0 <= a <= b <= {LONGEST_BOUND:g}, seconds"
+        raise FormulaError("not an interval", value=list(bounds), expected=expected)
     return low + 0.0, high + 0.0
 
 

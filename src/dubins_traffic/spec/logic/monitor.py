@@ -1,11 +1,13 @@
 """Monitors: formulas judged frame by frame over a batch of trials, by table look-up.
 
-A formula is split into the parts of its conjunction (G distributes over it), and each part is monitored by a table of
-its own; the verdict of the whole is the least one. A part is *true* as soon as every infinite continuation satisfies
-it and *false* as soon as none does. So is the whole, as long as parts that share propositions don't contradict each
-other on a continuation that suits each of them alone: then *false* comes when the first part is lost, possibly later
-than the whole was. Parts without common propositions never do. *True* is as early as for the whole; a part that is
-decided counts as decided in what is presumed of the whole. `split=False` monitors the formula in one piece.
+A formula is split into the parts of its conjunction (G distributes over it). Parts that share propositions are put
+together again where their table stays small (`TOGETHER`), and each group is monitored by a table of its own; the
+verdict of the whole is the least one. A group is *true* as soon as every infinite continuation satisfies it and *false*
+as soon as none does, and so is the whole, since groups without common propositions can't contradict each other.
+
+Where parts that share propositions stay apart they may contradict each other on every continuation though each could
+be met alone. Then *false* comes when the first part is lost, possibly later than the whole was (`Monitors.late`).
+*True* is as early as ever; a part that is decided counts as decided in what is presumed of the whole.
 
 Bounds of at most `UNROLL` ticks are counted in the states of a table, longer ones by clocks beside it, so tables
 don't grow with the bounds. Where a clock doesn't do, requests go through a delay line (`delays`), or the bound is
@@ -15,6 +17,7 @@ counted if the table stays within its limits.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.spec.logic.automaton import Automaton, automaton
+from dubins_traffic.spec.logic.automaton import Automaton, Limits, automaton
 from dubins_traffic.spec.logic.delays import Line, delayed, line
 from dubins_traffic.spec.logic.formula import (
     FUTURE,
@@ -49,6 +52,10 @@ LONGEST: Final = 400
 """Longest bound, ticks, that is counted in states where a clock does not do."""
 MAX_PARTS: Final = 512
 """Most parts of one formula."""
+LONGEST_DELAY: Final = 1_000_000
+"""Most ticks that a bound may begin later, where requests wait in a delay line."""
+TOGETHER: Final = Limits(states=256, cells=4_096, sought=1_000, choices=8_192)
+"""How large a table may grow in which several parts are put together."""
 
 
 def parts(formula: Formula) -> tuple[Formula, ...]:
@@ -88,6 +95,46 @@ def _split(formula: Formula, positive: bool) -> list[Formula]:
     return [formula if positive else ~formula]
 
 
+def groups(split: Sequence[Formula]) -> list[list[Formula]]:
+    """Return the parts in groups; parts of two groups have no proposition in common."""
+    found: list[tuple[set[str], list[Formula]]] = []
+    for part in split:
+        names, members = set(propositions(part)), [part]
+        apart: list[tuple[set[str], list[Formula]]] = []
+        for other, own in found:
+            if names & other:
+                names, members = names | other, own + members
+            else:
+                apart.append((other, own))
+        found = [*apart, (names, members)]
+    return [members for _, members in found]
+
+
+def together(group: Sequence[Formula], period: float) -> Automaton | None:
+    """Return one table for all parts of a group, exact in every verdict; None if it would be too large."""
+    formula = conj(*group)
+    names = propositions(formula)
+    if len(names) > MAX_PROPOSITIONS:
+        return None
+    found = _together(renamed(formula, _plain(names)), period)
+    return None if found is None else replace(found, names=names)
+
+
+@lru_cache(maxsize=1024)
+def _together(formula: Formula, period: float) -> Automaton | None:
+    for unroll in (UNROLL, LONGEST):
+        try:
+            return automaton(formula, period, unroll, TOGETHER)
+        except FormulaError:
+            continue
+    return None
+
+
+def _plain(names: Sequence[str]) -> dict[str, str]:
+    """Return a name for each proposition by its place, the same for all formulas of one shape."""
+    return {name: f"p{place:03d}" for place, name in enumerate(names)}
+
+
 def compiled(formula: Formula, period: float, unroll: int = UNROLL) -> Automaton:
     """Return the table of one formula in one piece.
 
@@ -106,12 +153,11 @@ def compiled(formula: Formula, period: float, unroll: int = UNROLL) -> Automaton
         If it can't be monitored in this form, saying why.
     """
     names = propositions(formula)
-    plain = {name: f"p{place:03d}" for place, name in enumerate(names)}
     try:
-        found = _compiled(renamed(formula, plain), period, unroll)
+        found = _compiled(renamed(formula, _plain(names)), period, unroll)
     except FormulaError as error:
         raise FormulaError(f"{error.problem}, in {_short(formula)}", **error.context) from None
-    return Automaton(names, found.letter, found.target, found.reset, found.verdict, found.clocks)
+    return replace(found, names=names)
 
 
 @lru_cache(maxsize=1024)
@@ -135,13 +181,15 @@ class Monitors:
         The propositions, in the order of the input's columns.
     period : float
         Seconds between frames.
-    split : bool
-        Whether conjunctions are split (see above).
+    split : bool, optional
+        Whether all parts of conjunctions stay apart (true), or none (false); if not given, as above.
 
     Attributes
     ----------
     formulas : tuple of str
         The names of the formulas, in the order of the verdicts' columns.
+    late : frozenset of str
+        The formulas for which *false* may come later than it could.
     tables : int
         How many table look-ups a frame of one trial takes.
     lines : int
@@ -156,7 +204,12 @@ class Monitors:
     """
 
     def __init__(
-        self, formulas: Mapping[str, Formula], names: Sequence[str], period: float, *, split: bool = True
+        self,
+        formulas: Mapping[str, Formula],
+        names: Sequence[str],
+        period: float,
+        *,
+        split: bool | None = None,
     ) -> None:
         if not period > 0.0:
             raise FormulaError("not a period", value=period, expected="seconds > 0")
@@ -164,18 +217,37 @@ class Monitors:
         self._column = {name: column for column, name in enumerate(names)}
         self._pieces: list[Piece] = []
         self._delays: list[tuple[Line, int]] = []
+        late: set[str] = set()
         for number, (name, formula) in enumerate(formulas.items()):
             try:
-                for part in parts(formula) if split else (formula,):
-                    self._add(number, part, period)
+                if not self._take(number, formula, period, split):
+                    late.add(name)
             except FormulaError as error:
                 raise error.within(field=name) from None
+        self.late = frozenset(late)
         self.tables = len(self._pieces)
         self.lines = len(self._delays)
         self._tables = packed_tables(self._pieces)
         self._lines = packed_lines(self._delays, self._column)
         self._kernel: tuple[Tables, Lines] | None = None
         self.reset(0)
+
+    def _take(self, number: int, formula: Formula, period: float, split: bool | None) -> bool:
+        """Monitor a formula; say whether *false* comes as early as it can."""
+        lines = len(self._delays)
+        if split is False:
+            self._add(number, formula, period)
+            return len(self._delays) == lines
+        early = True
+        for group in groups(parts(formula)):
+            table = together(group, period) if len(group) > 1 and split is None else None
+            if table is not None:
+                self._place(number, table)
+                continue
+            early = early and len(group) == 1
+            for part in group:
+                self._add(number, part, period)
+        return early and len(self._delays) == lines
 
     def _add(self, number: int, part: Formula, period: float) -> None:
         """Monitor a part: with clocks, else with a delay line, else by counting its bounds."""
@@ -187,6 +259,10 @@ class Monitors:
         found = delayed(part, period)
         if found is not None:
             others, late = found
+            if late.length > LONGEST_DELAY:
+                raise FormulaError(
+                    "begins too late", value=late.length, expected=f"at most {LONGEST_DELAY} ticks from now"
+                )
             for other in others:
                 self._add(number, other, period)
             table = compiled(late.formula, period)
