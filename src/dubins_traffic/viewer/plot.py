@@ -18,6 +18,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
+from dubins_traffic.viewer.marks import goal_numbers
 from dubins_traffic.viewer.scene import Extent, centre_lines, extent, lane_hints, obstacle_points
 
 if TYPE_CHECKING:
@@ -178,10 +179,7 @@ class _Canvas:
         """Draw the goals' discs, numbered in the order in which they are given."""
         from matplotlib.patches import Circle
 
-        order: dict[int, list[str]] = {}
-        for number, vertex in enumerate(problem.goal_vertices):
-            order.setdefault(vertex, []).append(str(number + 1))
-        for vertex, numbers in order.items():
+        for vertex, numbers in goal_numbers(problem).items():
             place = self.network.points[vertex]
             disc = Circle(
                 (float(place[0]), float(place[1])),
@@ -196,7 +194,7 @@ class _Canvas:
             size = min(9.0, 0.34 * problem.intersection_radius * self.points)
             if size >= 3.0:
                 lift = np.array([0.0, 0.62 * problem.intersection_radius])
-                self._text(place + lift, f"goal {'+'.join(numbers)}", size, "#00684B", 6, bold=True)
+                self._text(place + lift, f"goal {numbers}", size, "#00684B", 6, bold=True)
 
     def obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Draw obstacles, hatched."""
