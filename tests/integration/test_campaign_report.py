@@ -24,6 +24,7 @@ from selenium.webdriver.common.by import By
 from dubins_traffic.campaign.conduct import run_campaign
 from dubins_traffic.campaign.report.metrics import METRICS
 from dubins_traffic.campaign.report.write import write_report
+from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
@@ -176,6 +177,28 @@ def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
         " || e.getBoundingClientRect().right > 400.5).map(e => e.outerHTML.slice(0, 90))"
     )
     assert wide == []
+
+
+def test_results_are_a_table_a_dict_and_a_picture(folder: Path) -> None:
+    results = load_results(folder)
+    assert len(results) == 36
+    assert repr(results) == f"<CampaignResults {folder}: 36 of 36 trials of {', '.join(CONTROLLERS)}>"
+    columns = results.asdict()
+    assert [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] == rows(
+        folder
+    )
+    text = results._repr_html_()
+    assert text.count("<svg") == 1
+    assert all(name in text for name in CONTROLLERS)
+    with pytest.raises(InputError, match="no campaign"):
+        load_results(folder / "report")
+
+
+def test_results_are_a_data_frame(folder: Path) -> None:
+    pytest.importorskip("pandas")
+    table = load_results(folder).to_pandas()
+    assert table.shape == (36, len(rows(folder)[0]))
+    assert list(table["controller"].unique()) == CONTROLLERS
 
 
 def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:

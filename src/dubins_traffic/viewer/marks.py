@@ -10,9 +10,8 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.scoring.formulas import FormulaVerdict
-from dubins_traffic.scoring.verdict import Ruling, Verdict, Violation
+from dubins_traffic.scoring.verdict import EGO_NAME, Ruling, Verdict, Violation
 
-EGO_NAME = "ego"
 RULES = {
     "1.collision": "touches another body",
     "1.road": "leaves the road",

@@ -13,7 +13,8 @@ from dubins_traffic.campaign.report.comparison import Comparison, Level
 from dubins_traffic.campaign.report.metrics import Metric, words
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.plot import METADATA, STYLE
+from dubins_traffic.viewer.canvas import METADATA
+from dubins_traffic.viewer.plot import STYLE
 
 GRID_COLOUR = "#E4E6EA"
 DARK: Mapping[str, str] = {
