@@ -8,6 +8,7 @@ from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, Obstacle, 
 from dubins_traffic.cars.state import Contact, Event, Frames, Pose
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation
 
 SPEED = 0.5
 ROUGH = RoadNetwork(
@@ -136,3 +137,17 @@ def _contacts(places: np.ndarray, rate: float) -> tuple[Contact, ...]:
                     Contact(int(frame), frame / rate, car, other, float(x), float(y), 1.0, 0.0, *sides)
                 )
     return tuple(sorted(found, key=lambda contact: contact.time))
+
+
+def verdict(instance: Instance, breaches: list[tuple[float, str, str]], excuse: int | None = None) -> Verdict:
+    """Return a verdict with breaches of (time, car, rule), `excuse` is the number of one of them."""
+    violations = tuple(
+        Violation(rule, car, time, round(time * 30), time, Place(1.0 + 0.5 * number, 2.0, (1, 1), None))
+        for number, (time, car, rule) in enumerate(breaches)
+    )
+    clean = all(car != "ego" for _, car, _ in breaches)
+    fault = Ruling.VIOLATED if excuse is None else Ruling.EXCUSED
+    ruling = Ruling.SATISFIED if clean else fault
+    why = None if excuse is None else Excuse("E1", violations[excuse], sensed=True)
+    assert all(car in instance.names for _, car, _ in breaches)
+    return Verdict(ruling, clean, why, violations, (), 2, 10.0, 100.0, {}, {})

@@ -19,7 +19,8 @@ from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.plot import METADATA, STYLE, _Canvas
+from dubins_traffic.viewer.canvas import METADATA, Canvas
+from dubins_traffic.viewer.plot import STYLE
 from dubins_traffic.viewer.scene import Extent
 
 Point = tuple[float, float]
@@ -103,7 +104,7 @@ class Panel:
 
     def __init__(self, figure: Figure, place: Box, network: RoadNetwork, box: Box) -> None:
         self.network = network
-        self.canvas = canvas = _Canvas(network, CAR, ())
+        self.canvas = canvas = Canvas(network, CAR, ())
         canvas.box, canvas.scale, canvas.points = Extent(*box), SCALE, 72.0 * SCALE
         canvas.figure, canvas.axes = figure, figure.add_axes(place)
         self.axes: Any = canvas.axes

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dubins_traffic.campaign.batch import Batch, run_batch
+    from dubins_traffic.campaign.conduct import run_campaign
     from dubins_traffic.campaign.many import Job, run_trials
     from dubins_traffic.campaign.plan import Plan, plan
+    from dubins_traffic.campaign.results import CampaignResults, load_results
     from dubins_traffic.campaign.single import Result, Trial, run_trial
     from dubins_traffic.campaign.sources import load, load_record
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
@@ -29,13 +31,15 @@ if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
     from dubins_traffic.scoring.verdict import Judging, Verdict
-    from dubins_traffic.viewer.plot import write_plot
+    from dubins_traffic.viewer.plot import plot, write_plot
     from dubins_traffic.viewer.replay import write_replay
 
 _PLACES = {
     "campaign.batch": ("Batch", "run_batch"),
+    "campaign.conduct": ("run_campaign",),
     "campaign.many": ("Job", "run_trials"),
     "campaign.plan": ("Plan", "plan"),
+    "campaign.results": ("CampaignResults", "load_results"),
     "campaign.single": ("Result", "Trial", "run_trial"),
     "campaign.sources": ("load", "load_record"),
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
@@ -53,7 +57,7 @@ _PLACES = {
     "roads.network": ("RoadNetwork",),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
     "scoring.verdict": ("Judging", "Verdict"),
-    "viewer.plot": ("write_plot",),
+    "viewer.plot": ("plot", "write_plot"),
     "viewer.replay": ("write_replay",),
 }
 _NAMES = {
@@ -67,6 +71,7 @@ __version__: str
 __all__ = [
     "Batch",
     "Bounds",
+    "CampaignResults",
     "Car",
     "Command",
     "Configuration",
@@ -114,8 +119,11 @@ __all__ = [
     "load_config",
     "load_instance",
     "load_record",
+    "load_results",
     "plan",
+    "plot",
     "run_batch",
+    "run_campaign",
     "run_trial",
     "run_trials",
     "score",
@@ -138,4 +146,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """Return the public names, all of them, loaded or not, and no module that happens to have been imported."""
+    return sorted(__all__)

@@ -2,9 +2,32 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from typing import Final
 
 _ABSENT: Final = object()
+_ARGUMENTS: Final = {
+    "--append": "append=True",
+    "--endless": "endless=True",
+    "--gui": "show=True",
+    "--jobs 1": "workers=1",
+    "--lockstep": "lockstep=True",
+    "--overwrite": "overwrite=True",
+    "--resume": "resume=True",
+    "-F": "overwrite_data=True",
+    "-f": "data",
+    **{
+        f"--{name}": name
+        for name in (
+            "assume", "cars", "clock", "controller", "deadline", "factor", "keep", "master", "memory", "poses", "ray",
+            "records", "remote", "repeat", "rnd", "seed", "simulator", "trials", "url", "workers",
+        )
+    },
+}  # fmt: skip
+"""Options of commands, and what the functions behind them call the same."""
+_LONGEST_FIRST: Final = sorted(map(re.escape, _ARGUMENTS), key=len, reverse=True)
+_OPTION: Final = re.compile(rf"(?<![\w./=-])(?:{'|'.join(_LONGEST_FIRST)})(?![\w=./-])")
 
 
 class DubinsTrafficError(Exception):
@@ -19,7 +42,8 @@ class InputError(DubinsTrafficError):
     problem : str
         What is wrong, in a few words.
     file : str, optional
-        The file (or ``-``, or a name such as ``--seed``) in which it stands.
+        The file (or ``-``, or an option such as ``--seed``) in which it stands. Options are named as the command line
+        has them; `str` of the error names the arguments of Python, `on_command_line` the options.
     field : str, optional
         Path of the field inside the document, such as ``rnd.segments[3]``.
     value : object, optional
@@ -64,12 +88,19 @@ class InputError(DubinsTrafficError):
         )
 
     def __str__(self) -> str:
-        parts = [part for part in (self.file, self.field, self.problem) if part]
+        return self._told(in_python)
+
+    def on_command_line(self) -> str:
+        """Return the message for somebody who typed a command: it names options, not the arguments of functions."""
+        return self._told(str)
+
+    def _told(self, say: Callable[[str], str]) -> str:
+        parts = [say(part) for part in (self.file, self.field, self.problem) if part]
         text = ": ".join(parts)
         if self.value is not _ABSENT:
             text += f": got {_short(self.value)}"
         if self.expected:
-            text += f"; expected {self.expected}"
+            text += f"; expected {say(self.expected)}"
         return text
 
 
@@ -103,6 +134,19 @@ class MissingExtraError(DubinsTrafficError):
 
     def __init__(self, feature: str, extra: str) -> None:
         super().__init__(f"{feature} needs the extra '{extra}': install dubins-traffic[{extra}]")
+
+
+def in_python(text: str) -> str:
+    """Return a text in which arguments of functions stand for the options of commands that are the same.
+
+    Messages are written with the options, since most are read there; commands to type, and other options, stay.
+
+    Examples
+    --------
+    >>> in_python("--keep, --records: exists; -F overwrites")
+    'keep, records: exists; overwrite_data=True overwrites'
+    """
+    return _OPTION.sub(lambda found: _ARGUMENTS[found[0]], text)
 
 
 def _short(value: object, limit: int = 60) -> str:

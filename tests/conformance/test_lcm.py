@@ -195,7 +195,7 @@ def test_a_second_session_at_one_url_is_refused() -> None:
 
 @pytest.mark.parametrize("url", ["nonsense", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:port"])
 def test_a_url_that_is_none(url: str) -> None:
-    with pytest.raises(InputError, match="--url"):
+    with pytest.raises(InputError, match="url"):
         Lcm(url).open(Inbox(10))
 
 

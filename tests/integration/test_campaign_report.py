@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import csv
+import html
 import json
 import os
 import re
 import shutil
 import statistics
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 from pyarrow import parquet
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign.conduct import run_campaign
+from dubins_traffic.campaign.report.metrics import METRICS
 from dubins_traffic.campaign.report.write import write_report
+from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
@@ -166,6 +172,70 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     browser.get(str(links[0]))
     assert "Trial" in browser.title
     assert browser.get_log("browser") == []
+
+
+@pytest.mark.skipif(
+    (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true", reason="needs chromium"
+)
+def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
+    folder: Path, browser: webdriver.Chrome
+) -> None:
+    for scheme, is_ground in (("dark", range(60)), ("light", range(200, 256))):
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        browser.get((folder / "report" / "index.html").as_uri())
+        shot = browser.find_element(By.CSS_SELECTOR, "section img").screenshot_as_png
+        pixels = np.asarray(Image.open(BytesIO(shot)).convert("L"))
+        assert int(np.median(pixels[:3])) in is_ground
+        assert abs(int(pixels.max()) - int(pixels.min())) > 150
+        ink = browser.execute_script("return getComputedStyle(document.querySelector('td')).color")
+        assert (sum(map(int, re.findall(r"\d+", ink)[:3])) > 384) == (scheme == "dark")
+    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get((folder / "report" / "index.html").as_uri())
+    wide = browser.execute_script(
+        "return [...document.querySelectorAll('*')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth"
+        " || e.getBoundingClientRect().right > 400.5).map(e => e.outerHTML.slice(0, 90))"
+    )
+    assert wide == []
+
+
+def test_results_are_a_table_a_dict_and_a_picture(folder: Path) -> None:
+    results = load_results(folder)
+    assert len(results) == 36
+    assert repr(results) == f"<CampaignResults {folder}: 36 of 36 trials of {', '.join(CONTROLLERS)}>"
+    columns = results.asdict()
+    assert [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] == rows(
+        folder
+    )
+    text = results._repr_html_()
+    assert text.count("<svg") == 1
+    assert all(name in text for name in CONTROLLERS)
+    with pytest.raises(InputError, match="no campaign"):
+        load_results(folder / "report")
+
+
+def test_results_are_a_data_frame(folder: Path) -> None:
+    pytest.importorskip("pandas")
+    table = load_results(folder).to_pandas()
+    assert table.shape == (36, len(rows(folder)[0]))
+    assert list(table["controller"].unique()) == CONTROLLERS
+
+
+def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:
+    text = html.unescape((folder / "report" / "index.html").read_text())
+    told = sheet(folder, "controllers.csv")
+    silent = {line["metric"] for line in told} - {
+        line["metric"] for line in told if float(line["mean"] or 0.0)
+    }
+    assert "collisions_among_others" in silent
+    (note,) = re.findall(r"No chart of what is 0 or absent everywhere: (.*?)\.</p>", text)
+    named = {metric.name for metric in METRICS if metric.column in silent}
+    assert set(note.split("; ")) == named
+    charts = re.findall(r'<img alt="([^"]*) against e-agents"', text)
+    assert set(charts) == {metric.heading for metric in METRICS if metric.column not in silent}
+    assert 'alt="Collisions by fault"' in text
+    assert "the egos had none" not in text
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,22 @@ def test_the_page_on_batches_runs_and_ten_thousand_cars_keep_the_rules(tmp_path)
         [],
         0,
     )
+
+
+def test_the_page_on_python_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    for language, text in runnable(page):
+        assert language == "python"
+        if text.startswith("# with the extra pandas") and find_spec("pandas") is None:
+            continue
+        exec(compile(text, "python.md", "exec"), names)
+    told = capsys.readouterr().out
+    for told_there in re.findall(r"print\(.*#\s*(.*)$", page, re.MULTILINE):
+        pattern = re.escape(told_there).replace(r"\.\.\.", ".*")
+        assert re.search(f"^{pattern}$", told, re.MULTILINE), told_there
+    assert {path.suffix for path in tmp_path.iterdir()} == {".mcap", ".json", ".png", ".svg", ".html"}
 
 
 def test_the_controller_on_the_page_on_batches_drives_alike_alone():

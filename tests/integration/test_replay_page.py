@@ -22,7 +22,7 @@ from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import write_replay
-from tests.synthetic import ROUGH, driven, instance, obstacles_beside
+from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 FLAGS = (
@@ -70,6 +70,28 @@ def page(
     write_replay(path, tried, frames, Ending(End.DURATION, len(frames) - 1), {"rounds": 2}, marks)
     browser.set_window_size(1280, 800)
     browser.get(path.as_uri())
+    WebDriverWait(browser, 20).until(
+        lambda driver: driver.execute_script("return window.replay?.ready === true")
+    )
+    yield browser
+    assert browser.get_log("browser") == []
+
+
+BREACHES = [
+    (4.0, "b", "3.stop"), (9.0, "ego", "2.left"), (9.0, "c", "E4"), (12.0, "ego", "3.stop"), (12.0, "b", "E4"),
+    (20.0, "d", "E5"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def judged(
+    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
+) -> Iterator[webdriver.Chrome]:
+    """The page of `trial` with breaches, of which the first excuses the ego."""
+    tried, frames = trial
+    write_replay(tmp_path / "judged.html", tried, frames, None, verdict=verdict(tried, BREACHES, 0))
+    browser.set_window_size(1280, 800)
+    browser.get((tmp_path / "judged.html").as_uri())
     WebDriverWait(browser, 20).until(
         lambda driver: driver.execute_script("return window.replay?.ready === true")
     )
@@ -204,13 +226,128 @@ def test_choosing_a_car_or_an_event_leads_there(page: webdriver.Chrome) -> None:
     assert ask(page, "time") == pytest.approx(9.0)
 
 
-@pytest.mark.parametrize("width", [360, 820, 1280])
+def has_colour(page: webdriver.Chrome, colour: str) -> bool:
+    return page.execute_script(
+        "const wanted = getComputedStyle(document.documentElement).getPropertyValue(arguments[0]).trim();"
+        "const c = document.getElementById('map'), copy = new OffscreenCanvas(c.width, c.height);"
+        "const own = copy.getContext('2d', {willReadFrequently: true}); own.drawImage(c, 0, 0);"
+        "const d = own.getImageData(0, 0, c.width, c.height).data;"
+        "for (let i = 0; i < d.length; i += 4) if ('#' + [d[i], d[i+1], d[i+2]].map(v => v.toString(16)"
+        ".padStart(2, '0')).join('') === wanted) return true; return false",
+        f"--{colour}",
+    )
+
+
+def test_breaches_stand_on_the_map_in_two_colours_with_filters(judged: webdriver.Chrome) -> None:
+    assert not has_colour(judged, "breach")
+    assert not has_colour(judged, "others")
+    ask(judged, "seek(4.5)")
+    assert has_colour(judged, "others")
+    assert not has_colour(judged, "breach")
+    ask(judged, "seek(10)")
+    assert has_colour(judged, "breach")
+    element(judged, "filter-others").click()
+    assert has_colour(judged, "breach")
+    assert not has_colour(judged, "others")
+    listed = [row.text for row in judged.find_elements(By.CSS_SELECTOR, "#events .breach span")]
+    assert listed == ["ego breaks 2.left: reaches over the centre line",
+                      "ego breaks 3.stop: enters a crossing without a stop"]  # fmt: skip
+    assert {mark["group"] for mark in ask(judged, "shown")} >= {"breach"}
+    press(judged, "o")
+    assert element(judged, "filter-others").is_selected()
+    element(judged, "filter-breach").click()
+    assert not has_colour(judged, "breach")
+    assert len(judged.find_elements(By.CSS_SELECTOR, "#events .breach")) == 4
+
+
+def test_keys_and_buttons_lead_from_event_to_event(judged: webdriver.Chrome) -> None:
+    element(judged, "filter-goal").click()
+    if judged.find_elements(By.ID, "filter-contact"):
+        element(judged, "filter-contact").click()
+    element(judged, "filter-event").click()
+    went: list[tuple[float, int]] = []
+    for _ in BREACHES:
+        press(judged, ".")
+        went.append((ask(judged, "time"), ask(judged, "chosen")))
+    names = ["ego", NASTY, "b", "c", "d", "e"]
+    assert went == [(time, names.index(car)) for time, car, _ in BREACHES]
+    press(judged, ".")
+    assert ask(judged, "time") == 20.0
+    press(judged, ",")
+    assert (ask(judged, "time"), ask(judged, "mark.rule")) == (12.0, "E4")
+    element(judged, "previous").click()
+    assert (ask(judged, "time"), ask(judged, "mark.rule")) == (12.0, "3.stop")
+    element(judged, "next").click()
+    assert ask(judged, "mark.rule") == "E4"
+    press(judged, "B")
+    assert (ask(judged, "time"), ask(judged, "mark.rule"), ask(judged, "chosen")) == (12.0, "3.stop", 0)
+    press(judged, "B")
+    assert (ask(judged, "time"), ask(judged, "mark.rule")) == (9.0, "2.left")
+    press(judged, Keys.HOME, "b", "b")
+    assert ask(judged, "time") == 12.0
+
+
+def test_what_excused_the_ego_is_said_and_shown(judged: webdriver.Chrome) -> None:
+    assert element(judged, "verdict").text == "excused"
+    why = element(judged, "why").text
+    assert why == (
+        "The ego broke 2.left at 9.00 s. It is excused by b, which broke 3.stop at 4.00 s near (1, 1) "
+        "(enters a crossing without a stop); the ego sensed it."
+    )
+    element(judged, "excuse").click()
+    assert (ask(judged, "time"), ask(judged, "chosen"), ask(judged, "mark.rule")) == (4.0, 2, "3.stop")
+    press(judged, Keys.END, "x")
+    assert ask(judged, "time") == 4.0
+    (excused,) = judged.find_elements(By.CSS_SELECTOR, "#events em")
+    assert excused.text == "excuses the ego"
+    (here,) = judged.find_elements(By.CSS_SELECTOR, "#events li.here")
+    assert "b breaks 3.stop" in here.text
+
+
+def test_an_event_beyond_the_map_is_brought_onto_it(judged: webdriver.Chrome) -> None:
+    for _ in range(8):
+        element(judged, "zoom-in").click()
+    ActionChains(judged).drag_and_drop_by_offset(element(judged, "map"), 300, -200).perform()
+    assert not has_colour(judged, "others")
+    press(judged, "x")
+    ask(judged, "seek(5)")
+    assert has_colour(judged, "others")
+
+
+def test_the_legend_of_keys_names_every_key(judged: webdriver.Chrome) -> None:
+    assert not element(judged, "keys").is_displayed()
+    press(judged, "?")
+    assert element(judged, "keys").is_displayed()
+    keys = element(judged, "keys").text
+    for word in (
+        "previous, next event",
+        "next, previous breach of the ego",
+        "what excused the ego",
+        "this legend",
+    ):
+        assert word in keys
+    element(judged, "help").click()
+    assert not element(judged, "keys").is_displayed()
+
+
+def test_goals_bear_the_numbers_of_pictures(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
+    tried, _ = trial
+    told = [item.text.split()[:2] for item in page.find_elements(By.CSS_SELECTOR, "#goals li")]
+    assert told == [[str(n + 1), f"{x},{y}"] for n, (x, y) in enumerate(tried.problem.goals)]
+
+
+@pytest.mark.parametrize("width", [360, 400, 820, 1280])
 def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) -> None:
     size = {"width": width, "height": 780, "deviceScaleFactor": 2, "mobile": width < 600}
     page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
         assert page.execute_script("return document.documentElement.scrollWidth") <= width
         assert element(page, "play").is_displayed()
+        assert page.execute_script(
+            "return ['next', 'play', 'previous', 'clock', 'speed'].every(id => {"
+            "const box = document.getElementById(id); const r = box.getBoundingClientRect();"
+            "return r.left >= 0 && r.right <= innerWidth && box.scrollWidth <= Math.ceil(r.width) })"
+        )
         light = page.execute_script(PICTURE)
         element(page, "theme").click()
         assert page.execute_script("return document.documentElement.dataset.theme") == "dark"

@@ -11,7 +11,7 @@ import pytest
 
 import dubins_traffic
 
-HEAVY = ("numba", "llvmlite", "matplotlib", "pyarrow", "scipy", "mcap")
+HEAVY = ("numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "mcap")
 LIMIT = 0.4
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 
@@ -63,7 +63,17 @@ def test_start_up_is_quick(arguments):
 def test_every_public_name_can_be_had():
     for name in dubins_traffic.__all__:
         assert getattr(dubins_traffic, name) is not None
-    assert set(dubins_traffic.__all__) <= set(dir(dubins_traffic))
+    assert dir(dubins_traffic) == sorted(dubins_traffic.__all__)
+
+
+def test_dir_shows_the_public_names_and_loads_none_of_them():
+    code = (
+        "import dubins_traffic as dt; before = dir(dt)\n"
+        "assert before == sorted(dt.__all__) and 'plot' in before and 'annotations' not in before\n"
+        "assert not {'numpy', 'matplotlib', 'numba'} & set(sys.modules)\n"
+        "import dubins_traffic.roads.network; dt.RoadNetwork; assert dir(dt) == before"
+    )
+    assert "dubins_traffic" in modules_after(code)
 
 
 def test_an_unknown_name_is_an_attribute_error():

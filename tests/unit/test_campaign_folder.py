@@ -103,7 +103,7 @@ def test_changed_surroundings_are_refused(tmp_path: Path) -> None:
     with opened(out, own, resume=False, records="failures"):
         pass
     with (
-        pytest.raises(InputError, match=r"--records: changed .*got 'all'; expected \"failures\""),
+        pytest.raises(InputError, match=r"records: changed .*got 'all'; expected \"failures\""),
         opened(out, own, resume=True, records="all"),
     ):
         pass

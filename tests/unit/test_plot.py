@@ -16,7 +16,8 @@ from dubins_traffic.record.reader import Record
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.plot import KERB, MARGIN, write_plot
+from dubins_traffic.viewer.canvas import KERB, MARGIN
+from dubins_traffic.viewer.plot import write_plot
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside
 
 

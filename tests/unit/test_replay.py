@@ -19,9 +19,10 @@ from dubins_traffic.cars.state import Contact
 from dubins_traffic.errors import InputError
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.viewer.marks import Mark, goal_visits, marks_of
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, assumption_of
+from dubins_traffic.viewer.marks import RULES, Mark, goal_numbers, goal_visits, marks_of, verdict_text
 from dubins_traffic.viewer.replay import replay_page, write_replay
-from tests.synthetic import ROUGH, driven, instance, obstacles_beside
+from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
 NASTY = ("</script><script>alert(1)</script>", "<!--<script>", "a&amp;b\u2028'\"\\")
 
@@ -143,6 +144,45 @@ def test_marks_are_contacts_events_visits_and_more_in_order_of_time() -> None:
         "note (half of the time)",
         "rule 2",
     ]
+
+
+def test_the_verdict_is_told_with_its_breaches_and_what_excused_the_ego() -> None:
+    tried, frames = driven(instance(RoadNetwork.grid(2, 3), cars=3, seconds=4.0, names=(NASTY[0], "b")))
+    plain = document(replay_page(tried, frames, None))
+    assert plain["verdict"] is None
+    found = verdict(tried, [(1.0, NASTY[0], "E4"), (2.0, "ego", "2.left")], excuse=0)
+    page = replay_page(tried, frames, None, verdict=found)
+    data = document(page)
+    assert NASTY[0] not in page
+    assert data["verdict"]["ruling"] == "excused"
+    excuse = data["marks"][data["verdict"]["excuse"]]
+    assert (excuse["time"], excuse["car"], excuse["rule"], excuse["kind"]) == (1.0, 1, "E4", "breach")
+    assert [mark["rule"] for mark in data["marks"] if mark["kind"] == "breach"] == ["E4", "2.left"]
+    assert "E4 at 1.00 s" in data["verdict"]["why"]
+
+
+@pytest.mark.parametrize(
+    ("breaches", "words"),
+    [
+        ([], "The ego broke nothing and did its task."),
+        ([(1.0, "ego", "2.left")], "The ego broke 2.left at 1.00 s, while the others had kept their part."),
+    ],
+)
+def test_a_verdict_is_told_in_words(breaches: list[tuple[float, str, str]], words: str) -> None:
+    tried = instance(RoadNetwork.grid(2, 3), cars=3)
+    assert verdict_text(verdict(tried, breaches)) == words
+
+
+def test_every_rule_has_words() -> None:
+    assert set(EGO_RULES) <= set(RULES)
+    assert {assumption_of(rule) for rule in RULES} == set(ASSUMPTIONS)
+
+
+def test_goals_are_numbered_in_their_order_and_once() -> None:
+    tried = instance(RoadNetwork.grid(2, 3))
+    first, second = tried.problem.goals[:2]
+    problem = replace(tried.problem, goals=(second, first, second))
+    assert goal_numbers(problem) == dict(zip(problem.goal_vertices[:2], ("1+3", "2"), strict=True))
 
 
 def test_a_visit_is_an_entry_and_the_first_frame_counts() -> None:

@@ -154,7 +154,7 @@ def test_too_large_a_game_is_refused_before_it_is_built() -> None:
         build(board(4, 4, 3), limit=100 << 20)
     with pytest.raises(InputError, match="less than 2147483647"):
         build(board(3, 4, 8))
-    with pytest.raises(InputError, match=r"--cars: .* got 63; expected 1 to 62"):
+    with pytest.raises(InputError, match=r"cars: .* got 63; expected 1 to 62"):
         estimate(board(2, 2, 63))
     with pytest.raises(InputError, match="more cars than cells: got 13; expected at most 12"):
         estimate(board(2, 2, 12))
@@ -235,7 +235,7 @@ def test_assumptions_by_name() -> None:
     assert (weaker.order, weaker.forfeits, weaker.leaves) == (Order.NONE, Forfeits.ONCE, False)
     assert Assumption.parse(weaker.words()) == weaker
     for words in (["E7"], ["E1", "E1:any-order"]):
-        with pytest.raises(InputError, match="--assume"):
+        with pytest.raises(InputError, match="assume"):
             Assumption.parse(words)
 
 

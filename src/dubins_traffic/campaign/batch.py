@@ -27,6 +27,7 @@ from dubins_traffic.problem.kinds import COUNTER, REMOTE
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.viewer.notebook import Sheeted
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -41,8 +42,8 @@ KEEP = "none, all, failures or sample:K"
 Progress = Callable[[int], object]
 
 
-@dataclass(frozen=True, slots=True)
-class Batch:
+@dataclass(frozen=True, slots=True, repr=False)
+class Batch(Sheeted):
     """What came of the trials of a batch, by their numbers; of trials that have a record their scores name it."""
 
     outcomes: tuple[Outcome, ...]

@@ -72,6 +72,9 @@ class Outcome:
     score: Score
     act_s: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
 
+    def __repr__(self) -> str:
+        return f"<Outcome: {self.instance.title}, {self.score.summary}>"
+
 
 class Group:
     """Some trials of one control rate on their way.

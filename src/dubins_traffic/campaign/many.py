@@ -58,6 +58,7 @@ class Job:
             deadline=self.deadline,
             sinks=() if cancelled is None else (_Watch(cancelled),),
             simulator=simulators.load(instance.simulator, show=self.show),
+            sketch=False,
         )
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.display import Tabulated
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
@@ -20,6 +22,8 @@ from dubins_traffic.transports.drivers import LocalController, RemoteAgents, Rem
 from dubins_traffic.transports.link import Link
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
+from dubins_traffic.viewer.notebook import trial_html
+from dubins_traffic.viewer.paths import Paths
 
 
 class Trial(BareTrial):
@@ -87,8 +91,11 @@ def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
-    """What came of a trial: its ending, score, wall-clock figures, and where its record is."""
+class Result(Tabulated):
+    """What came of a trial: its ending, score, wall-clock figures, and where its record is.
+
+    `paths` is a sketch of the ways of the cars, for pictures.
+    """
 
     instance: Instance
     controller: str
@@ -96,6 +103,19 @@ class Result:
     score: Score
     wall: wall.Wall
     record: Path | None
+    paths: Paths | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        record = f", record {self.record}" if self.record else ""
+        return f"<Result: {self.instance.title}, {self.score.summary}{record}>"
+
+    def _repr_html_(self) -> str:
+        own = self.paths or Paths()
+        return trial_html(self.instance, self.score, own.lines(), own.last)
+
+    def asdict(self) -> dict[str, Any]:
+        """Return the score as one element of ``trials`` in ``run --json``."""
+        return self.score.asdict()
 
 
 def run_trial(
@@ -108,6 +128,7 @@ def run_trial(
     sinks: Sequence[Sink] = (),
     link: Link | None = None,
     simulator: Simulator | None = None,
+    sketch: bool = True,
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -130,6 +151,8 @@ def run_trial(
         ``+shield``: then that ego drives under the shield.
     simulator : Simulator, optional
         Instead of the one that the instance names; closed when the trial is over.
+    sketch : bool
+        Whether the result keeps a sketch of the ways of the cars, for pictures: some kilobytes for each car.
 
     Raises
     ------
@@ -144,13 +167,14 @@ def run_trial(
         name = controller if isinstance(controller, str) else type(controller).__name__
         driver = controllers.load(controller) if isinstance(controller, str) else controller
         driver = driver if link is None else LocalController(link, driver)
-    scorer = Scorer()
+    scorer, paths = Scorer(), Paths()
     writer = None
     if record is not None:
         writer = RecordWriter(record, controller=name, overwrite=overwrite)
     first = () if writer is None else (writer,)
+    drawn = (paths,) if sketch else ()
     try:
-        with Trial(instance, sinks=(*first, scorer, *sinks), link=link, simulator=simulator) as trial:
+        with Trial(instance, sinks=(*first, *drawn, scorer, *sinks), link=link, simulator=simulator) as trial:
             try:
                 ending, measured = run(trial, driver, deadline)
             finally:
@@ -165,7 +189,7 @@ def run_trial(
     if path is not None:
         wall.write(path, measured)
     score = scorer.result(controller=name, record=path, wall=measured)
-    return Result(instance, name, ending, score, measured, path)
+    return Result(instance, name, ending, score, measured, path, paths if sketch else None)
 
 
 def _over(link: Link, measured: wall.Wall) -> wall.Wall:

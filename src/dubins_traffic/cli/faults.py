@@ -11,7 +11,7 @@ from typing import Final
 
 import typer
 
-from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.errors import DubinsTrafficError, InputError
 
 OK: Final = 0
 FAILED: Final = 1
@@ -51,6 +51,8 @@ def tell(text: str) -> None:
 
 
 def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
+    if isinstance(error, InputError):
+        return error.on_command_line(), WRONG_INPUT
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT
     if isinstance(error, typer.TyperException):

@@ -22,14 +22,19 @@ def replay(
     from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.scoring.score import score
-    from dubins_traffic.viewer.marks import breach_marks, formula_marks
+    from dubins_traffic.viewer.marks import formula_marks
     from dubins_traffic.viewer.replay import write_replay
 
     output = output or options.beside(record, ".html")
     found = load_record(record)
     scored = score(found)
-    marks = formula_marks(scored.formulas)
-    if scored.verdict is not None:
-        marks += breach_marks(found.instance, scored.verdict.violations)
-    write_replay(output, found.instance, found.frames, found.ending, summary(scored), marks)
+    write_replay(
+        output,
+        found.instance,
+        found.frames,
+        found.ending,
+        summary(scored),
+        formula_marks(scored.formulas),
+        scored.verdict,
+    )
     options.tell(output)

@@ -12,6 +12,7 @@ from typing import Any
 
 from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.display import count
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.problem.faults import parse
@@ -57,6 +58,15 @@ class Configuration:
     file: str | None = None
     kept: dict[str, object] = field(default_factory=dict[str, object], init=False, repr=False, compare=False)
     """What has been worked out of the rest once; not part of it, and left behind when it is pickled."""
+
+    def __repr__(self) -> str:
+        parts = [
+            self.file or "a document",
+            "drawn networks" if self.network is None else self.network.summary,
+            count(len(self.agents), "e-agent"),
+            count(self.number_trials, "trial"),
+        ]
+        return f"<Configuration: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[object, ...]:
         return Configuration, (self.document, self.settings, self.network, self.agents, self.file)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.display import Pictured, count
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -54,7 +55,7 @@ class EAgent:
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(Pictured):
     """What a controller is told before a trial.
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
@@ -74,6 +75,20 @@ class Problem:
     rules: Mapping[str, Any]
     formulas: Mapping[str, str] = field(default_factory=dict[str, str])
 
+    def __repr__(self) -> str:
+        return f"<Problem: {self.summary}>"
+
+    @property
+    def summary(self) -> str:
+        """The problem in a few words."""
+        parts = [self.network.summary, count(len(self.goals), "goal")]
+        if self.e_agents:
+            parts.append(count(len(self.e_agents), "e-agent"))
+        if self.obstacles:
+            parts.append(count(len(self.obstacles), "obstacle"))
+        parts += ["rules"] * bool(self.rules) + ["formulas"] * bool(self.formulas)
+        return ", ".join(parts)
+
     @property
     def goal_vertices(self) -> tuple[int, ...]:
         """Numbers of the goals' intersections."""
@@ -86,7 +101,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True)
-class Instance:
+class Instance(Pictured):
     """One instance: everything that, with a controller, decides a trial.
 
     `starts` holds one pose per car, the ego first, then `e_agents` in order. `duration` is in seconds. All random
@@ -103,6 +118,14 @@ class Instance:
     end_on_collision: bool = False
     simulator: str = "embedded"
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def __repr__(self) -> str:
+        return f"<Instance: {self.title}, {self.duration:g} s; {self.problem.summary}>"
+
+    @property
+    def title(self) -> str:
+        """Which trial it is: ``trial 2 of seed 4``."""
+        return f"trial {self.trial} of seed {self.seed}"
 
     @property
     def ticks(self) -> int:

@@ -19,6 +19,7 @@ from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
 from dubins_traffic.cars.state import Contact, Event, Frames
+from dubins_traffic.display import Pictured
 from dubins_traffic.errors import RecordError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import header, schema, wall
@@ -29,7 +30,7 @@ _DAMAGE = (struct.error, ValueError, McapError, RuntimeError, OverflowError, Mem
 
 
 @dataclass(frozen=True)
-class Record:
+class Record(Pictured):
     """All that happened in a trial.
 
     `frames` is one block of the whole trial; `blocks` are its parts as the trial pushed them. `ending` is None in a
@@ -45,6 +46,12 @@ class Record:
     versions: Mapping[str, str]
     wall: wall.Wall | None = None
     file: str | None = None
+
+    def __repr__(self) -> str:
+        end = "cut off" if self.ending is None else f"end: {self.ending.end.value}"
+        span = max(0, len(self.frames) - 1) / self.frames.rate
+        parts = [self.instance.title, self.controller or "no controller named", f"{span:.4g} s", end]
+        return f"<Record{f' {self.file}' if self.file else ''}: {', '.join(parts)}>"
 
 
 @dataclass(frozen=True, slots=True)

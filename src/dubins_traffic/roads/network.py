@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic import files
+from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -25,7 +26,7 @@ Line = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class RoadNetwork:
+class RoadNetwork(Pictured):
     """A planar, connected network of straight roads; at most four meet at an intersection.
 
     Parameters
@@ -78,6 +79,17 @@ class RoadNetwork:
                 value=self.length,
                 expected=f"at most {rnd.WORLD:g} metres",
             )
+
+    def __repr__(self) -> str:
+        return f"<RoadNetwork {self.summary}>"
+
+    @property
+    def summary(self) -> str:
+        """The network in a few words: ``17 segments, 12 intersections on a 3 x 4 lattice``."""
+        rows, columns = self.shape
+        segments, points = len(self.segments), len(self.intersections)
+        found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
+        return f"{found} on a {rows} x {columns} lattice"
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind, when pickled, what can be worked out again."""

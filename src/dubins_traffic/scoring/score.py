@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from dubins_traffic.cars.state import Frames
+from dubins_traffic.display import Pictured, Tabulated, count
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.reader import Record
@@ -29,7 +31,7 @@ _BLOCK = 512
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class Score(Tabulated):
     """The score of one trial; one element of ``trials`` in ``run --json``.
 
     Attributes
@@ -88,6 +90,22 @@ class Score:
     paper_score: float
     icra2016: float | None
     interventions: int = 0
+
+    def __repr__(self) -> str:
+        return f"<Score: trial {self.trial} of seed {self.seed}, {self.summary}>"
+
+    @property
+    def summary(self) -> str:
+        """The score in a few words: controller, end, verdict, rounds, collisions."""
+        parts = [self.controller or "no controller named", f"end: {self.end or 'cut off'}"]
+        if self.verdict is not None:
+            parts.append(self.verdict.verdict.value)
+        parts += [count(self.rounds, "round"), count(len(self.collisions), "collision")]
+        return ", ".join(parts)
+
+    def asdict(self) -> dict[str, Any]:
+        """Return the score as `to_json` does."""
+        return self.to_json()
 
     def to_json(self) -> dict[str, Any]:
         """Return the score as a JSON object; the fields of `driven` stand beside the others."""
@@ -211,10 +229,28 @@ class Scorer:
 
 
 @dataclass(frozen=True, slots=True)
-class ScoreSheet:
+class ScoreSheet(Pictured, Tabulated):
     """The scores of several trials, in their order."""
 
     trials: tuple[Score, ...]
+
+    def __repr__(self) -> str:
+        return f"<ScoreSheet: {self.summary}>"
+
+    @property
+    def summary(self) -> str:
+        """The scores in a few words: how many there are, and how many of each verdict, or else of each end."""
+        found = Counter(
+            (own.end or "cut off") if own.verdict is None else own.verdict.verdict.value
+            for own in self.trials
+        )
+        return ", ".join(
+            [count(len(self.trials), "trial"), *(f"{n} {name}" for name, n in sorted(found.items()))]
+        )
+
+    def asdict(self) -> dict[str, Any]:
+        """Return the scores as `to_json` does."""
+        return self.to_json()
 
     @property
     def counted_rounds_sum(self) -> int:

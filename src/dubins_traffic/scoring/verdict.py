@@ -27,6 +27,8 @@ from dubins_traffic.spec.tables import ticks
 if TYPE_CHECKING:
     from dubins_traffic.spec.judge import Breach, Running
 
+EGO_NAME = "ego"
+"""Name of the ego among the cars."""
 EGO_RULES = ("1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear")
 """The rules of the ego that a finite run can break."""
 HELD: Final[Status] = "presumably true"
@@ -148,6 +150,15 @@ class Verdict:
     def assumption_broken(self) -> bool:
         """Whether the e-agents broke a part of the assumption that the problem makes, before or after the ego."""
         return any(self.formulas.get(part) == BROKEN for part in ASSUMPTIONS)
+
+    def __repr__(self) -> str:
+        own = sum(violation.car == EGO_NAME for violation in self.violations)
+        others = len(self.violations) - own
+        return f"<Verdict: {self.verdict.value}, breaches: {own} by the ego, {others} by others>"
+
+    def asdict(self) -> dict[str, Any]:
+        """Return the verdict as `to_json` does."""
+        return self.to_json()
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""

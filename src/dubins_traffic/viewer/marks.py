@@ -8,9 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.scoring.formulas import FormulaVerdict
-from dubins_traffic.scoring.verdict import Violation
+from dubins_traffic.scoring.verdict import EGO_NAME, Ruling, Verdict, Violation
+
+RULES = {
+    "1.collision": "touches another body",
+    "1.road": "leaves the road",
+    "2.left": "reaches over the centre line",
+    "2.return": "stays over the centre line",
+    "3.stop": "enters a crossing without a stop",
+    "3.order": "enters a crossing before its turn",
+    "3.clear": "enters a crossing that is taken",
+    "E2": "is at fault in a collision",
+    "E3.enter": "is first at a clear crossing and does not enter",
+    "E3.tickets": "loses its place in the order",
+    "E4": "stays in a disc with a free exit",
+    "E5": "lingers with a free way ahead",
+    "E6": "keeps a goal taken",
+}
+"""What a car does that breaks a rule, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +36,7 @@ class Mark:
 
     `kind` sets its colour: ``contact``, ``goal``, ``event``, ``breach``; others look like an event. `time` is in
     seconds; a mark that lasts began at `since`. `car` is the index of the car it is about (-1: none), `point` where
-    it happened, world frame, metres.
+    it happened, world frame, metres; `rule` names what was broken.
     """
 
     time: float
@@ -28,6 +45,7 @@ class Mark:
     car: int = NONE
     point: tuple[float, float] | None = None
     since: float | None = None
+    rule: str | None = None
 
 
 def contact_mark(instance: Instance, contact: Contact) -> Mark:
@@ -70,13 +88,45 @@ def breach_marks(instance: Instance, violations: Sequence[Violation]) -> list[Ma
         Mark(
             violation.time,
             "breach",
-            f"{violation.car} breaks {violation.rule}",
+            breach_text(violation),
             instance.names.index(violation.car),
             (violation.where.x, violation.where.y),
             violation.since if violation.since < violation.time else None,
+            violation.rule,
         )
         for violation in violations
     ]
+
+
+def breach_text(violation: Violation) -> str:
+    """Return in words who broke which rule, and how: ``agent0 breaks E4: stays in a disc with a free exit``."""
+    words = RULES.get(violation.rule)
+    text = f"{violation.car} breaks {violation.rule}"
+    return text if words is None else f"{text}: {words}"
+
+
+def verdict_text(verdict: Verdict) -> str:
+    """Return in words why a trial has its verdict: what the ego broke first, and what excused it."""
+    own = next((one for one in verdict.violations if one.car == EGO_NAME), None)
+    if own is None:
+        task = "and did its task" if verdict.verdict is Ruling.SATISFIED else "and did not do all of its task"
+        return f"The ego broke nothing {task}."
+    told = f"The ego broke {own.rule} at {own.time:.2f} s"
+    excuse = verdict.excuse
+    if excuse is None:
+        return f"{told}, while the others had kept their part."
+    fall = excuse.violation
+    when = "at the same instant" if fall.tick == own.tick else f"at {fall.time:.2f} s"
+    place = fall.where.intersection
+    where = "" if place is None else f" near ({place[0]}, {place[1]})"
+    words = RULES.get(fall.rule, "a rule broken")
+    seen = "the ego sensed it" if excuse.sensed else "the ego did not sense it"
+    return f"{told}. It is excused by {fall.car}, which broke {fall.rule} {when}{where} ({words}); {seen}."
+
+
+def excuse_mark(instance: Instance, verdict: Verdict) -> Mark | None:
+    """Return the mark of the breach that excuses the ego, equal to that among `breach_marks`; None without one."""
+    return None if verdict.excuse is None else breach_marks(instance, [verdict.excuse.violation])[0]
 
 
 def formula_marks(verdicts: Sequence[FormulaVerdict]) -> list[Mark]:
@@ -86,6 +136,14 @@ def formula_marks(verdicts: Sequence[FormulaVerdict]) -> list[Mark]:
         for found in verdicts
         if found.time is not None
     ]
+
+
+def goal_numbers(problem: Problem) -> dict[int, str]:
+    """Return the goals' intersections with the numbers that pictures give them: from 1, in the problem's order."""
+    order: dict[int, list[str]] = {}
+    for number, vertex in enumerate(problem.goal_vertices):
+        order.setdefault(vertex, []).append(str(number + 1))
+    return {vertex: "+".join(numbers) for vertex, numbers in order.items()}
 
 
 def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:
@@ -105,9 +163,11 @@ def marks_of(instance: Instance, frames: Frames, more: Sequence[Mark] = ()) -> l
     marks = [contact_mark(instance, contact) for contact in frames.contacts]
     marks += event_marks(instance, frames)
     points, lattice = instance.problem.network.points, instance.problem.network.intersections
+    numbers = goal_numbers(instance.problem)
     for frame, vertex in goal_visits(instance, frames):
         x, y = lattice[vertex]
         place = (float(points[vertex, 0]), float(points[vertex, 1]))
-        marks.append(Mark((frames.first + frame) / frames.rate, "goal", f"ego visits ({x}, {y})", EGO, place))
+        text = f"ego visits goal {numbers[vertex]} at ({x}, {y})"
+        marks.append(Mark((frames.first + frame) / frames.rate, "goal", text, EGO, place))
     marks += more
     return sorted(marks, key=lambda mark: mark.time)

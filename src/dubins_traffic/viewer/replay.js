@@ -9,10 +9,11 @@ const VIEW_WIDTHS = 8;
 const trial = new Trial(JSON.parse(find("data").textContent));
 const state = { time: trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
 const map = new MapView(find("map"), trial);
-const timeline = new Timeline(find("timeline"), trial);
-const panel = new Panel(trial, { choose, seek });
-const slider = find("slider");
 const show = {};
+const marks = new Marks(trial);
+const timeline = new Timeline(find("timeline"), trial, () => marks.shown(show));
+const panel = new Panel(trial, marks, show, { choose, go, filter });
+const slider = find("slider");
 let asked = false;
 
 Object.assign(slider, { min: trial.start, max: trial.end, step: 1 / trial.rate, value: trial.start });
@@ -87,6 +88,42 @@ function step(frames) {
   seek(trial.time(frames < 0 && part > 1e-3 ? frame + 1 + frames : frame + frames));
 }
 
+// Go to a mark: its instant, its car, and, if it lies beyond the map, its place.
+function go(mark) {
+  if (!mark) return;
+  pause();
+  marks.chosen = mark;
+  if (mark.car >= 0) state.chosen = mark.car;
+  if (mark.point && !map.holds(...mark.point)) {
+    state.fitted = false;
+    [map.camera.x, map.camera.y] = mark.point;
+  }
+  find("stage").scrollIntoView({ block: "nearest" });
+  seek(mark.time);
+}
+
+function stepMark(way, wanted = ({ group }) => show[group]) {
+  go(marks.step(way, state.time, wanted));
+}
+
+const isOwnBreach = ({ group }) => group === "breach";
+
+function filter() {
+  panel.listEvents();
+  timeline.draw();
+  refresh();
+}
+
+function toggleFilter(group) {
+  find(`filter-${group}`)?.click();
+}
+
+function toggleKeys() {
+  const box = find("legend");
+  box.open = !box.open;
+  if (box.open) box.scrollIntoView({ block: "nearest" });
+}
+
 function choose(car) {
   state.chosen = car;
   refresh();
@@ -141,6 +178,9 @@ function listenToControls() {
   find("play").addEventListener("click", toggle);
   find("back").addEventListener("click", () => step(-1));
   find("forward").addEventListener("click", () => step(1));
+  find("previous").addEventListener("click", () => stepMark(-1));
+  find("next").addEventListener("click", () => stepMark(1));
+  find("help").addEventListener("click", toggleKeys);
   slider.addEventListener("input", () => seek(slider.value));
   find("zoom-in").addEventListener("click", () => zoom(1.4));
   find("zoom-out").addEventListener("click", () => zoom(1 / 1.4));
@@ -161,7 +201,11 @@ function listenToControls() {
   find("theme").addEventListener("click", () => setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
   document.documentElement.dataset.theme = dark.matches ? "dark" : "light";
   const strip = find("timeline");
-  strip.addEventListener("click", ({ offsetX }) => seek(timeline.markAt(offsetX)?.time ?? timeline.time(offsetX)));
+  strip.addEventListener("click", ({ offsetX }) => {
+    const mark = timeline.markAt(offsetX);
+    if (mark) go(mark);
+    else seek(timeline.time(offsetX));
+  });
   strip.addEventListener("pointermove", ({ offsetX }) => {
     strip.title = timeline.markAt(offsetX)?.text ?? "";
   });
@@ -211,6 +255,14 @@ const ACTIONS = {
   ArrowRight: (event) => (event.shiftKey ? seek(state.time + 1) : step(1)),
   Home: () => seek(trial.start),
   End: () => seek(trial.end),
+  ",": () => stepMark(-1),
+  ".": () => stepMark(1),
+  b: () => stepMark(1, isOwnBreach),
+  B: () => stepMark(-1, isOwnBreach),
+  x: () => go(trial.marks[trial.verdict?.excuse ?? -1]),
+  o: () => toggleFilter("others"),
+  "?": toggleKeys,
+  Escape: () => choose(0),
   "<": () => setSpeed(SPEEDS[Math.max(0, SPEEDS.indexOf(state.speed) - 1)]),
   ">": () => setSpeed(SPEEDS[Math.min(SPEEDS.length - 1, SPEEDS.indexOf(state.speed) + 1)]),
   "+": () => zoom(1.25),
@@ -264,6 +316,9 @@ window.replay = {
   get start() { return trial.start; },
   get end() { return trial.end; },
   get frame() { return trial.place(state.time)[0]; },
+  get chosen() { return state.chosen; },
+  get mark() { return marks.chosen; },
+  get shown() { return marks.shown(show); },
   pose: (car) => trial.pose(car, state.time),
   seek, play, pause,
 };

@@ -23,12 +23,28 @@ from dubins_traffic.files import replace_file
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.verdict import Verdict
 from dubins_traffic.spec.propositions import NAMES
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.marks import Mark, goal_visits, marks_of
+from dubins_traffic.viewer.marks import (
+    Mark,
+    breach_marks,
+    excuse_mark,
+    goal_numbers,
+    goal_visits,
+    marks_of,
+    verdict_text,
+)
 from dubins_traffic.viewer.scene import centre_lines, lane_hints
 
-SCRIPTS = ("replay_data.js", "replay_map.js", "replay_timeline.js", "replay_panel.js", "replay.js")
+SCRIPTS = (
+    "replay_marks.js",
+    "replay_data.js",
+    "replay_map.js",
+    "replay_timeline.js",
+    "replay_panel.js",
+    "replay.js",
+)
 HEADING_STEPS = 32767
 UNITS = ("s", "m")
 
@@ -40,6 +56,7 @@ def write_replay(
     ending: Ending | None,
     summary: Mapping[str, object] | None = None,
     marks: Sequence[Mark] = (),
+    verdict: Verdict | None = None,
 ) -> None:
     """Write the page that replays a trial.
 
@@ -57,13 +74,15 @@ def write_replay(
         The score, name to value, shown beside the map in this order.
     marks : sequence of Mark
         What else to show on the timeline; contacts, events and visits of goals are there already.
+    verdict : Verdict, optional
+        The verdict on the trial: its breaches are marked on the timeline and on the map, and what excused the ego.
 
     Raises
     ------
     InputError
         If there is no frame, or the page can't be written.
     """
-    text = replay_page(instance, frames, ending, summary, marks)
+    text = replay_page(instance, frames, ending, summary, marks, verdict)
     replace_file(Path(path), lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
@@ -73,6 +92,7 @@ def replay_page(
     ending: Ending | None,
     summary: Mapping[str, object] | None = None,
     marks: Sequence[Mark] = (),
+    verdict: Verdict | None = None,
 ) -> str:
     """Return the page that `write_replay` writes; equal arguments give equal text."""
     if len(frames) == 0:
@@ -80,7 +100,10 @@ def replay_page(
     title = f"Trial {instance.trial} of seed {instance.seed}"
     style = _part("replay.css")
     script = "\n".join(["(() => {", '"use strict";', *(_part(name) for name in SCRIPTS), "})();"])
-    document = _document(title, instance, frames, ending, summary or {}, marks_of(instance, frames, marks))
+    breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
+    every = marks_of(instance, frames, [*marks, *breaches])
+    document = _document(title, instance, frames, ending, summary or {}, every)
+    document["verdict"] = None if verdict is None else _verdict(instance, verdict, every)
     fields = {
         "TITLE": html.escape(title),
         "STYLE": style,
@@ -136,8 +159,9 @@ def _document(
         "sensing": problem.sensing_radius,
         "roads": _roads(problem, origin),
         "goals": {
-            "vertices": list(dict.fromkeys(problem.goal_vertices)),
+            "vertices": list(goal_numbers(problem)),
             "radius": problem.intersection_radius,
+            "numbers": list(goal_numbers(problem).values()),
             "visits": goal_visits(instance, frames),
         },
         "obstacles": [_obstacle(obstacle, origin) for obstacle in problem.obstacles],
@@ -208,6 +232,16 @@ def _obstacle(obstacle: Obstacle, origin: Floats) -> dict[str, Any]:
     return {"polygon": (np.asarray(obstacle.vertices) - origin).tolist()}
 
 
+def _verdict(instance: Instance, verdict: Verdict, marks: Sequence[Mark]) -> dict[str, Any]:
+    """Return the ruling, why it is so, and which of `marks` excuses the ego."""
+    mark = excuse_mark(instance, verdict)
+    return {
+        "ruling": verdict.verdict.value,
+        "why": verdict_text(verdict),
+        "excuse": None if mark is None else marks.index(mark),
+    }
+
+
 def _mark(mark: Mark, origin: Floats) -> dict[str, Any]:
     point = (
         None if mark.point is None else [mark.point[0] - float(origin[0]), mark.point[1] - float(origin[1])]
@@ -218,6 +252,7 @@ def _mark(mark: Mark, origin: Floats) -> dict[str, Any]:
         "kind": mark.kind,
         "text": mark.text,
         "car": mark.car,
+        "rule": mark.rule,
         "point": point,
     }
 

@@ -47,7 +47,9 @@ class Trial {
       this[name] = unpackRuns(series[name], this.cars.length, this.frames);
     }
     this.reach = this.body.radius ?? Math.hypot(this.body.length, this.body.width) / 2;
+    for (const mark of this.marks) mark.group = groupOf(mark);
     this.contacts = this.marks.filter((mark) => mark.kind === "contact" && mark.point);
+    this.breaches = this.marks.filter((mark) => mark.kind === "breach" && mark.point);
   }
 
   // Number of the last frame at or before the time, and how far the next one is on its way to it.

@@ -2,7 +2,6 @@
 
 const TRAIL_SECONDS = 10;
 const TRAIL_STEPS = 14;
-const RING_SECONDS = 1.2;
 const CROWD = 12;
 
 const font = (size, weight) => `${weight} ${size}px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif`;
@@ -62,7 +61,7 @@ class MapView {
   recolour() {
     const style = getComputedStyle(document.documentElement);
     for (const name of ["ground", "road", "kerb", "line", "hint", "ink", "faint", "halo", "edge",
-      "goal", "goal-ink", "contact", "obstacle", "accent"]) {
+      "goal", "goal-ink", "contact", "breach", "others", "obstacle", "accent"]) {
       this.colours[name] = style.getPropertyValue(`--${name}`).trim();
     }
   }
@@ -96,6 +95,12 @@ class MapView {
     camera.y = (bottom + top) / 2 + (above - below) / 2 / camera.scale;
   }
 
+  // Whether a point of the world is well within the canvas.
+  holds(x, y) {
+    const [px, py] = this.camera.toScreen(x, y);
+    return px > 10 && py > 10 && px < this.camera.width - 10 && py < this.camera.height - 10;
+  }
+
   // The car under a point of the screen, or -1.
   carAt(px, py, time) {
     const [x, y] = this.camera.toWorld(px, py);
@@ -126,10 +131,12 @@ class MapView {
     this.drawObstacles();
     if (show.trails) trial.cars.forEach((_, index) => this.drawTrail(trial.cars.length - 1 - index, time));
     if (show.sensing) this.drawSensing(chosen, time);
-    this.drawContacts(time);
+    drawContacts(this, time, show);
+    drawBreaches(this, time, show);
     for (let car = trial.cars.length - 1; car >= 0; car -= 1) this.drawCar(car, time, car === chosen);
     this.inPixels();
     if (show.labels) this.drawNames(time, chosen);
+    nameBreaches(this, time, show);
     this.drawScale();
   }
 
@@ -234,34 +241,6 @@ class MapView {
     c.setLineDash([]);
   }
 
-  drawContacts(time) {
-    const { context: c, trial, colours, pixel } = this;
-    for (const { time: when, point: [x, y] } of trial.contacts) {
-      if (when > time) break;
-      const arm = Math.max(0.3 * trial.w, 4 * pixel);
-      for (const [colour, width] of [[colours.halo, 4.5], [colours.contact, 2.4]]) {
-        c.strokeStyle = colour;
-        c.lineWidth = width * pixel;
-        c.lineCap = "round";
-        c.beginPath();
-        c.moveTo(x - arm, y - arm);
-        c.lineTo(x + arm, y + arm);
-        c.moveTo(x - arm, y + arm);
-        c.lineTo(x + arm, y - arm);
-        c.stroke();
-      }
-      const age = (time - when) / RING_SECONDS;
-      if (age >= 1) continue;
-      c.strokeStyle = colours.contact;
-      c.globalAlpha = 1 - age;
-      c.lineWidth = 3 * pixel;
-      c.beginPath();
-      c.arc(x, y, (0.5 + 2 * age) * Math.max(trial.reach, 10 * pixel), 0, 2 * Math.PI);
-      c.stroke();
-      c.globalAlpha = 1;
-    }
-  }
-
   drawCar(car, time, chosen) {
     const { context: c, trial, colours, pixel } = this;
     const { x, y, theta } = trial.pose(car, time);
@@ -315,17 +294,17 @@ class MapView {
     c.fillText(words, px, py);
   }
 
+  // Lattice points; goals bear the numbers that they have in pictures, too.
   drawPlaces() {
     const { trial, camera, colours } = this;
-    const goals = new Set(trial.goals.vertices);
+    const goals = new Map(trial.goals.vertices.map((vertex, index) => [vertex, trial.goals.numbers[index]]));
     const small = camera.scale * trial.width;
     trial.points.forEach(([x, y], vertex) => {
-      if (small < 22 && !goals.has(vertex)) return;
+      const goal = goals.get(vertex);
       const [px, py] = camera.toScreen(x, y);
-      const look = goals.has(vertex)
-        ? { size: 13, weight: 700, colour: colours["goal-ink"] }
-        : { size: Math.min(12, 0.28 * small), colour: colours.faint };
-      if (look.size >= 8) this.text(trial.lattice[vertex].join(","), px, py, look);
+      const size = Math.min(12, 0.28 * small);
+      if (goal) this.text(`goal ${goal}`, px, size < 8 ? py : py - 7, { size: 13, weight: 700, colour: colours["goal-ink"] });
+      if (size >= 8 && small >= 22) this.text(trial.lattice[vertex].join(","), px, goal ? py + 8 : py, { size, colour: colours.faint });
     });
   }
 

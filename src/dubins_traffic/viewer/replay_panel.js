@@ -3,7 +3,9 @@
 const MOST_EVENTS = 500;
 const KEYS = [
   ["space", "play or pause"], ["← →", "one frame"], ["shift ← →", "one second"], ["home end", "first, last frame"],
-  ["< >", "slower, faster"], ["+ − 0", "zoom, fit"], ["f t l n r", "follow, trails, labels, lanes, sensing"],
+  [", .", "previous, next event"], ["b shift b", "next, previous breach of the ego"], ["x", "what excused the ego"],
+  ["o", "show the others' breaches or not"], ["< >", "slower, faster"], ["+ − 0", "zoom, fit"],
+  ["f t l n r", "follow, trails, labels, lanes, sensing"], ["esc", "back to the ego"], ["?", "this legend"],
 ];
 
 function make(tag, text = "", className = "") {
@@ -17,21 +19,61 @@ const find = (id) => document.getElementById(id);
 const decimals = (value, places) => value.toFixed(places).replace("-", "−");
 
 class Panel {
-  constructor(trial, { choose, seek }) {
+  constructor(trial, marks, show, { choose, go, filter }) {
     this.trial = trial;
+    this.marks = marks;
+    this.show = show;
+    this.go = go;
     find("title").textContent = trial.title;
     find("ending").textContent = trial.ending
       ? [`End: ${trial.ending.end.replaceAll("_", " ")}`, trial.ending.detail].filter(Boolean).join(", ")
       : "The record was cut off";
-    this.goals = trial.goals.vertices.map((vertex) => find("goals").appendChild(make("li", trial.lattice[vertex].join(","))));
+    this.goals = trial.goals.vertices.map(() => find("goals").appendChild(make("li")));
     find("goals-box").hidden = this.goals.length === 0;
     this.rows = trial.cars.map((car, index) => this.addCar(car, () => choose(index)));
     for (const [name, value] of trial.summary) find("score").append(make("dt", name), make("dd", value));
     find("score-box").hidden = trial.summary.length === 0;
     for (const [keys, effect] of KEYS) find("keys").append(make("dt", keys), make("dd", effect));
-    this.events = trial.marks.slice(0, MOST_EVENTS).map((mark) => this.addEvent(mark, seek));
-    const rest = trial.marks.length - this.events.length;
-    find("count").textContent = rest > 0 ? `${trial.marks.length}, the first ${MOST_EVENTS} listed` : `${trial.marks.length}`;
+    this.addVerdict();
+    for (const [group, name] of Object.entries(GROUPS)) this.addFilter(group, name, filter);
+    this.listEvents();
+  }
+
+  // What was decided, why, and the way to what excused it.
+  addVerdict() {
+    const { verdict } = this.trial;
+    find("verdict-box").hidden = !verdict;
+    if (!verdict) return;
+    find("verdict").textContent = verdict.ruling;
+    find("verdict").className = verdict.ruling;
+    find("why").textContent = verdict.why;
+    find("excuse").hidden = verdict.excuse === null;
+    find("excuse").addEventListener("click", () => this.go(this.trial.marks[verdict.excuse]));
+  }
+
+  addFilter(group, name, filter) {
+    const count = this.marks.counts[group];
+    this.show[group] = true;
+    if (!count) return;
+    const label = find("filters").appendChild(make("label", "", group));
+    const box = label.appendChild(make("input"));
+    Object.assign(box, { type: "checkbox", checked: true, id: `filter-${group}` });
+    label.append(make("i"), make("span", `${name} `), make("small", String(count)));
+    box.addEventListener("change", () => {
+      this.show[group] = box.checked;
+      filter();
+    });
+  }
+
+  // List the marks that are shown, the first `MOST_EVENTS` of them.
+  listEvents() {
+    const shown = this.marks.shown(this.show);
+    this.listed = shown.slice(0, MOST_EVENTS);
+    find("events").replaceChildren();
+    this.events = this.listed.map((mark) => this.addEvent(mark));
+    const few = shown.length > MOST_EVENTS ? `, the first ${MOST_EVENTS} listed` : "";
+    const all = this.trial.marks.length;
+    find("count").textContent = (shown.length < all ? `${shown.length} of ${all}` : `${all}`) + few;
   }
 
   addCar({ name, kind, colour }, choose) {
@@ -46,12 +88,14 @@ class Panel {
     return { row, cells: ["", "", "", ""].map(() => row.appendChild(make("td"))) };
   }
 
-  addEvent(mark, seek) {
-    const item = find("events").appendChild(make("li", "", mark.kind.replace(/[^a-z0-9_-]/gi, "-")));
+  addEvent(mark) {
+    const kind = mark.kind.replace(/[^a-z0-9_-]/gi, "-");
+    const item = find("events").appendChild(make("li", "", mark.group === "others" ? "breach others" : kind));
     const button = item.appendChild(make("button"));
     button.type = "button";
     button.append(make("time", `${decimals(mark.time, 2)} s`), make("i"), make("span", mark.text));
-    button.addEventListener("click", () => seek(mark.time));
+    if (mark === this.trial.marks[this.trial.verdict?.excuse ?? -1]) button.append(make("em", "excuses the ego"));
+    button.addEventListener("click", () => this.go(mark));
     return item;
   }
 
@@ -62,7 +106,8 @@ class Panel {
     trial.goals.vertices.forEach((vertex, index) => {
       const visits = counts.get(vertex);
       this.goals[index].classList.toggle("on", lit.has(vertex));
-      this.goals[index].textContent = `${trial.lattice[vertex].join(",")} × ${visits}`;
+      this.goals[index].replaceChildren(
+        make("b", `${trial.goals.numbers[index]}`), `  ${trial.lattice[vertex].join(",")} × ${visits}`);
     });
     this.rows.forEach(({ row, cells }, car) => {
       const pose = trial.pose(car, time);
@@ -78,6 +123,12 @@ class Panel {
     find("chosen").textContent = trial.cars[chosen].name;
     find("current").replaceChildren(...trial.labels(chosen, time).map((label) => make("code", label)));
     find("propositions").textContent = trial.propositions(chosen, time).join(", ").replaceAll("_", " ");
-    this.events.forEach((item, index) => item.classList.toggle("past", trial.marks[index].time <= time + 1e-9));
+    this.events.forEach((item, index) => {
+      const mark = this.listed[index];
+      item.classList.toggle("past", mark.time <= time + 1e-9);
+      const here = mark === this.marks.chosen && Math.abs(mark.time - time) < 1e-6;
+      if (here && !item.classList.contains("here")) item.parentNode.scrollTop = item.offsetTop - item.parentNode.clientHeight / 2;
+      item.classList.toggle("here", here);
+    });
   }
 }

@@ -55,6 +55,7 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
         f"<title>{_text(name)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f"{_head(comparison)}\n<main>\n{''.join(sections)}</main>\n</body>\n</html>\n"
     )
@@ -91,7 +92,10 @@ def _overview(comparison: Comparison) -> str:
     figures = ""
     if any(standing.verdicts for standing in comparison.standings):
         figures += _image(plots.verdicts(comparison), "Shares of the verdicts")
-    figures += _image(plots.faults(comparison), "Collisions by fault")
+    silent = plots.no_faults(comparison)
+    if not silent:
+        figures += _image(plots.faults(comparison), "Collisions by fault")
+    note = "<p>No chart of collisions by fault: the egos had none.</p>" if silent else ""
     judged = [
         [
             _name(standing, k),
@@ -113,7 +117,10 @@ def _overview(comparison: Comparison) -> str:
     ]
     at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
     ruled = ["controller", "judged", "clean", "counted rounds", *plots.VERDICTS]
-    return f'<div class="figures wide">{figures}</div>{_table(ruled, judged)}{_table(at_fault, collided)}'
+    return (
+        f'<div class="figures wide">{figures}</div>{note}'
+        f"{_table(ruled, judged)}{_table(at_fault, collided)}"
+    )
 
 
 def _formulas(comparison: Comparison) -> str:
@@ -174,11 +181,16 @@ def _difference(one: Difference) -> list[str]:
 
 
 def _plots(comparison: Comparison, factor: str) -> str:
+    """Return the plots against a factor, and a line that names the metrics which have none: 0 or absent everywhere."""
+    silent = [metric for metric in comparison.metrics if plots.says_nothing(comparison, factor, metric)]
     images = (
         _image(plots.against(comparison, factor, metric), f"{metric.heading} against {words(factor)}")
         for metric in comparison.metrics
+        if metric not in silent
     )
-    return f'<div class="figures">{"".join(images)}</div>'
+    names = "; ".join(metric.name for metric in silent)
+    note = f"<p>No chart of what is 0 or absent everywhere: {_text(names)}.</p>" if silent else ""
+    return f'<div class="figures">{"".join(images)}</div>{note}'
 
 
 def _worst(worst: Mapping[str, Sequence[Bad]]) -> str:
@@ -238,14 +250,20 @@ def _section(title: str, body: str) -> str:
 
 
 def _table(head: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -> str:
-    """Return a table; cells that begin with <th are whole elements, an empty first cell is spanned from above."""
+    """Return a table; cells that begin with <th are whole elements, an empty first cell is spanned from above.
+
+    Each cell repeats its heading, for narrow pages, on which the cells of a row stand below one another.
+    """
     heading = "".join(f"<th>{_text(cell)}</th>" for cell in head)
+    labels = [_text(cell) for cell in head]
     rows: list[str] = []
     for cells in body:
         spanned = kind == "grouped" and not cells[0]
-        rows.append(
-            "".join(cell if cell.startswith("<th") else f"<td>{cell}</td>" for cell in cells[spanned:])
-        )
+        told = [
+            cell if cell.startswith("<th") else f'<td data-head="{label}">{cell}</td>'
+            for label, cell in zip(labels, cells, strict=True)
+        ]
+        rows.append("".join(told[spanned:]))
     lines = "\n".join(f"<tr>{row}</tr>" for row in rows)
     return (
         f'<div class="scroll"><table class="{kind}"><thead><tr>{heading}</tr></thead>\n'
@@ -311,8 +329,15 @@ def _text(text: str) -> str:
 
 def _style(comparison: Comparison) -> str:
     own = resources.files("dubins_traffic.campaign.report") / "report.css"
-    dots = (f".c{k} {{ background: {plots.colour(k)} }}" for k in range(len(comparison.campaign.controllers)))
-    return "\n".join([own.read_text(encoding="utf-8").strip(), *dots])
+    colours = [plots.colour(k) for k in range(len(comparison.campaign.controllers))]
+    dots = [f".c{k} {{ background: {colour} }}" for k, colour in enumerate(colours)]
+    dark = [
+        f".c{k} {{ background: {plots.DARK[colour]} }}"
+        for k, colour in enumerate(colours)
+        if colour in plots.DARK
+    ]
+    scheme = f"@media (prefers-color-scheme: dark) {{ {' '.join(dark)} }}"
+    return "\n".join([own.read_text(encoding="utf-8").strip(), *dots, scheme])
 
 
 def _hash(text: str) -> str:

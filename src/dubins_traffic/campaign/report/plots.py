@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from itertools import pairwise
@@ -12,8 +13,18 @@ from dubins_traffic.campaign.report.comparison import Comparison, Level
 from dubins_traffic.campaign.report.metrics import Metric, words
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.plot import METADATA, STYLE
+from dubins_traffic.viewer.canvas import METADATA
+from dubins_traffic.viewer.plot import STYLE
 
+GRID_COLOUR = "#E4E6EA"
+DARK: Mapping[str, str] = {
+    palette.INK_COLOUR: "#E8EAED",
+    palette.FAINT_COLOUR: "#9AA4B0",
+    GRID_COLOUR: "#2F363E",
+    palette.EGO_COLOUR: "#2A8CD0",
+    "#882255": "#C9669A",
+}
+"""Colours that are others on a dark ground, where the light ones can't be seen."""
 SIZE = (3.5, 2.5)
 DODGE = 0.16
 """Distance of the controllers beside one another, in distances of two values of a factor."""
@@ -72,7 +83,7 @@ def against(comparison: Comparison, factor: str, metric: Metric) -> str:
         axes.set_xlabel(words(factor))
         _show_zero(axes, levels)
         axes.set_title(metric.heading, loc="left", fontsize=9.5, fontweight="bold")
-        axes.grid(axis="y", color="#E4E6EA", linewidth=0.8)
+        axes.grid(axis="y", color=GRID_COLOUR, linewidth=0.8)
         axes.set_axisbelow(True)
 
     return _svg(draw, SIZE)
@@ -96,6 +107,17 @@ def formula(comparison: Comparison, name: str) -> str:
         if name in standing.formulas
     }
     return _bars(rows, FORMULA, f"{name}: share of the trials", percent=True)
+
+
+def says_nothing(comparison: Comparison, factor: str, metric: Metric) -> bool:
+    """Tell whether the plot of a metric against a factor would show nothing: it is 0 or absent everywhere."""
+    own = (level for level in comparison.levels if level.factor == factor and level.metric is metric)
+    return not any(level.estimate.mean for level in own)
+
+
+def no_faults(comparison: Comparison) -> bool:
+    """Tell whether no controller had a collision, so that there is nothing to show of whose fault it was."""
+    return not any(standing.faults[name] for standing in comparison.standings for name in FAULTS)
 
 
 def faults(comparison: Comparison) -> str:
@@ -151,11 +173,11 @@ def _line(axes: Any, places: Sequence[float], levels: Sequence[Level], index: in
 
 
 def _show_zero(axes: Any, levels: Sequence[Level]) -> None:
-    """Give a metric that is the same everywhere an axis that shows how large it is."""
+    """Give a metric that is the same everywhere, and not 0, an axis that shows how large it is."""
     means = {level.estimate.mean for level in levels}
     if len(means) == 1 and None not in means:
         value = float(means.pop() or 0.0)
-        low, high = min(0.0, 1.1 * value), max(1.0 if value == 0.0 else 0.0, 1.1 * value)
+        low, high = min(0.0, 1.1 * value), max(0.0, 1.1 * value)
         axes.set_ylim(low - 0.05 * (high - low), high)
 
 
@@ -200,4 +222,17 @@ def _svg(draw: Any, size: tuple[float, float]) -> str:
         draw(figure.add_subplot())
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata=METADATA[".svg"], transparent=True)
-    return stream.getvalue()
+    return _themed(stream.getvalue())
+
+
+def _themed(svg: str) -> str:
+    """Return a picture whose colours follow the reader's choice of a light or a dark ground."""
+    names = {light: f"--c{number}" for number, light in enumerate(DARK)}
+    for light, name in names.items():
+        svg = re.sub(re.escape(light) + r"\b", f"var({name})", svg, flags=re.IGNORECASE)
+    own = "".join(f"{names[light]}:{light};" for light in DARK)
+    other = "".join(f"{names[light]}:{dark};" for light, dark in DARK.items())
+    style = f"<style>:root{{{own}}}@media(prefers-color-scheme:dark){{:root{{{other}}}}}</style>"
+    head, start, rest = svg.partition("<svg")
+    tag, close, body = rest.partition(">")
+    return f"{head}{start}{tag}{close}\n{style}{body}"

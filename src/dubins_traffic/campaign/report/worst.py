@@ -21,7 +21,6 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
 from dubins_traffic.record.sink import FAULTS, End
 from dubins_traffic.scoring.score import score
-from dubins_traffic.viewer.marks import breach_marks
 from dubins_traffic.viewer.replay import write_replay
 
 FOLDER = "replays"
@@ -181,7 +180,6 @@ def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
         result = job.run()
         found = reader.read(record)
     verdict = score(found).verdict
-    marks = () if verdict is None else breach_marks(found.instance, verdict.violations)
     summary = {"controller": row["controller"], **{name: row[name] for name in SUMMARY}}
-    write_replay(page, found.instance, found.frames, found.ending, summary, marks)
+    write_replay(page, found.instance, found.frames, found.ending, summary, verdict=verdict)
     return rows.row(chunk.number, result.ending, result.score, result.wall.act_s)

@@ -1,0 +1,70 @@
+"""What notebooks and data frames ask of a value, answered by rooms above the one in which the value is defined.
+
+A road network knows nothing of drawing, and a score nothing of tables of campaigns; imports only go down. So the
+classes here find those who can draw and tabulate by name, when they are asked.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from dubins_traffic.errors import MissingExtraError
+
+HTML = "dubins_traffic.viewer.notebook"
+TABLES = "dubins_traffic.campaign.frames"
+
+
+class Pictured:
+    """A value that notebooks show as a small page with a picture."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return import_module(HTML).html_of(self)
+
+
+class Tabulated:
+    """A value that becomes a table of trials, one a row, with the columns of a campaign's table."""
+
+    __slots__ = ()
+
+    def to_pandas(self) -> Any:
+        """Return a pandas `DataFrame` with one row a trial; the columns are those of docs/campaigns.md.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        return data_frame(import_module(TABLES).rows_of(self))
+
+
+def data_frame(rows: Any) -> Any:
+    """Return rows (name to value), or columns, as a pandas `DataFrame`.
+
+    Raises
+    ------
+    MissingExtraError
+        If pandas is not installed.
+    """
+    return pandas().DataFrame(rows)
+
+
+def pandas() -> Any:
+    """Return pandas.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed.
+    """
+    try:
+        return import_module("pandas")
+    except ImportError:
+        raise MissingExtraError("a DataFrame", "pandas") from None
+
+
+def count(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 goal``, ``3 goals``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,126 @@
+"""How notebooks show values: a picture and a few numbers as HTML, with nothing in it that runs or is loaded."""
+
+from __future__ import annotations
+
+import html
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.display import Tabulated
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.scoring.score import Score, ScoreSheet
+from dubins_traffic.viewer import svg
+from dubins_traffic.viewer.marks import Mark, breach_marks, contact_mark, verdict_text
+from dubins_traffic.viewer.paths import Paths
+
+ROWS = 12
+"""Most rows of a table."""
+MARKS = 200
+"""Most contacts, and most breaches, that are drawn."""
+
+
+class Sheeted(Tabulated):
+    """A value with a score sheet, shown and tabulated as that is."""
+
+    __slots__ = ()
+
+    @property
+    def sheet(self) -> ScoreSheet:
+        """The scores."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.sheet.summary}>"
+
+    def _repr_html_(self) -> str:
+        return sheet_html(type(self).__name__, self.sheet)
+
+    def asdict(self) -> dict[str, Any]:
+        """Return the scores as ``run --json`` prints them."""
+        return self.sheet.to_json()
+
+
+def html_of(subject: object) -> str:
+    """Return the HTML of a road network, a problem, an instance, a record or a score sheet."""
+    if isinstance(subject, RoadNetwork):
+        return _page(svg.network_picture(subject), "Road network", subject.summary)
+    if isinstance(subject, Problem):
+        return _page(svg.problem_picture(subject), "Problem", subject.summary)
+    if isinstance(subject, Instance):
+        told = f"{subject.title}, {subject.duration:g} s; {subject.problem.summary}"
+        return _page(svg.trial_picture(subject), "Instance", told)
+    if isinstance(subject, Record):
+        return record_html(subject)
+    if isinstance(subject, ScoreSheet):
+        return sheet_html("Scores", subject)
+    raise TypeError(f"no picture of a {type(subject).__name__}")
+
+
+def record_html(record: Record) -> str:
+    """Return the HTML of a record: all paths, contacts, and where the cars ended."""
+    told = repr(record).strip("<>").removeprefix("Record")
+    if len(record.frames) == 0:
+        return _page(svg.trial_picture(record.instance), "Record", told.strip(": "))
+    marks = [contact_mark(record.instance, contact) for contact in record.frames.contacts[:MARKS]]
+    own = Paths.of(record.instance, record.frames)
+    picture = svg.trial_picture(record.instance, own.last, own.lines(), marks)
+    return _page(picture, "Record", told.strip(": "))
+
+
+def trial_html(
+    instance: Instance, score: Score, paths: Sequence[Floats] = (), end: Sequence[Pose] = ()
+) -> str:
+    """Return the HTML of a trial that was run: its paths, breaches and contacts, and its score."""
+    marks: list[Mark] = []
+    if score.verdict is not None:
+        marks = breach_marks(instance, score.verdict.violations[:MARKS])
+    picture = svg.trial_picture(instance, end or None, paths, marks)
+    why = "" if score.verdict is None else verdict_text(score.verdict)
+    told = f"{instance.title}, {score.summary}. {why}"
+    return _page(picture, "Result", told)
+
+
+def sheet_html(heading: str, sheet: ScoreSheet) -> str:
+    """Return the HTML of scores: the shares of their verdicts, or ends, and the first trials as a table."""
+    found: dict[str, Counter[str]] = {}
+    for own in sheet.trials:
+        word = (own.end or "cut off") if own.verdict is None else own.verdict.verdict.value
+        found.setdefault(own.controller or "-", Counter())[word] += 1
+    head = ("trial", "controller", "verdict", "end", "rounds", "goals visited", "collisions")
+    rows = [
+        (
+            str(own.trial),
+            own.controller or "-",
+            "-" if own.verdict is None else own.verdict.verdict.value,
+            (own.end or "cut off").replace("_", " "),
+            str(own.rounds),
+            f"{own.goals_visited:.0%}",
+            str(len(own.collisions)),
+        )
+        for own in sheet.trials[:ROWS]
+    ]
+    return shares_html(heading, sheet.summary, found, table(head, rows, len(sheet.trials)))
+
+
+def shares_html(heading: str, told: str, shares: Mapping[str, Mapping[str, int]], more: str = "") -> str:
+    """Return the HTML of counts: a bar for each row, and `more`, which is HTML already."""
+    picture = svg.bars({row: dict(sorted(counts.items())) for row, counts in shares.items()})
+    return _page(picture, heading, told) + more
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], total: int) -> str:
+    """Return a table as HTML; `total` is how many rows there would be."""
+    top = "".join(f'<th style="text-align:left">{html.escape(cell)}</th>' for cell in head)
+    lines = ("".join(f'<td style="text-align:left">{html.escape(cell)}</td>' for cell in row) for row in rows)
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    rest = f"<p>and {total - len(rows)} more</p>" if total > len(rows) else ""
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>{rest}"
+
+
+def _page(picture: str, heading: str, told: str) -> str:
+    return f"<div>{picture}<p><b>{html.escape(heading)}</b> {html.escape(told)}</p></div>"
