@@ -86,10 +86,14 @@ def _verified(
 def _first_difference(record: Record, data: bytes, expected: Instance | None) -> Difference | None:
     other = None if expected is None else instance_difference(record, expected)
     head = next(pieces(data)).messages[0].data
-    found = other or header_difference(head, record) or trial_difference(record)
-    if found is None and record.instance.simulator != OURS:
-        found = world_difference(record)
+    found = other or header_difference(head, record) or _earlier(record)
     return found or written_difference(data, record)
+
+
+def _earlier(record: Record) -> Difference | None:
+    """Return the first thing that can't be: by the bounds of a world that is not ours, or by what follows."""
+    found = [None if record.instance.simulator == OURS else world_difference(record), trial_difference(record)]
+    return min((one for one in found if one is not None), key=lambda one: one.tick or 0, default=None)
 
 
 def _unchecked(record: Record) -> tuple[str, ...]:
