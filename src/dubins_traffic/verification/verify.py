@@ -92,7 +92,10 @@ def _first_difference(record: Record, data: bytes, expected: Instance | None) ->
 
 def _earlier(record: Record) -> Difference | None:
     """Return the first thing that can't be: by the bounds of a world that is not ours, or by what follows."""
-    found = [None if record.instance.simulator == OURS else world_difference(record), trial_difference(record)]
+    found = [
+        None if record.instance.simulator == OURS else world_difference(record),
+        trial_difference(record),
+    ]
     return min((one for one in found if one is not None), key=lambda one: one.tick or 0, default=None)
 
 
