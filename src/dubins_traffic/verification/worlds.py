@@ -102,13 +102,14 @@ class FromPoses:
     """A world in which every tick begins where its recorded frame says (a `protocols.Simulator`).
 
     The contacts of a tick are those of the recorded commands from there; where that leaves out bodies that overlap in a
-    frame, they touch in that frame.
+    frame, they touch in that frame. A world that is not ours may tell of them a tick later.
     """
 
     capabilities = Capabilities(batched=False, deterministic=True, lockstep=True)
 
     def __init__(self, frames: Frames, world: Embedded | Shown, slack: float) -> None:
         self._frames, self._world, self._slack = frames, world, slack
+        self._soon = by_tick(frames.contacts) if isinstance(world, Shown) else {}
 
     def reset(self, instances: Sequence[Instance]) -> State:
         """Return the state of the first frame."""
@@ -126,7 +127,7 @@ class FromPoses:
         (found,) = self._world.step(commands)
         self._tick += 1
         put_frame(self.state, self._frames, self._tick)
-        self._meetings.note(tuple(found))
+        self._meetings.note((*found, *self._soon.get(self._tick + 1, ())))
         own = tuple(
             self._at_frames.contact(self._tick, self.state, pair)
             for pair, gap in self._meetings.gaps(self._tick, self.state)
