@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
     from dubins_traffic.scoring.verdict import Judging, Verdict
+    from dubins_traffic.verification.result import Difference, Verification
+    from dubins_traffic.verification.verify import verify
     from dubins_traffic.viewer.plot import plot, write_plot
     from dubins_traffic.viewer.replay import write_replay
 
@@ -57,6 +59,8 @@ _PLACES = {
     "roads.network": ("RoadNetwork",),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
     "scoring.verdict": ("Judging", "Verdict"),
+    "verification.result": ("Difference", "Verification"),
+    "verification.verify": ("verify",),
     "viewer.plot": ("plot", "write_plot"),
     "viewer.replay": ("write_replay",),
 }
@@ -78,6 +82,7 @@ __all__ = [
     "Contact",
     "Controller",
     "ControllerError",
+    "Difference",
     "Disc",
     "DiscObstacle",
     "DubinsTrafficError",
@@ -110,6 +115,7 @@ __all__ = [
     "Trial",
     "Twist",
     "Verdict",
+    "Verification",
     "__version__",
     "draw",
     "generate_network",
@@ -127,6 +133,7 @@ __all__ = [
     "run_trial",
     "run_trials",
     "score",
+    "verify",
     "write_plot",
     "write_replay",
 ]

@@ -11,6 +11,7 @@ when the trial is over), `send(speed, yaw_rate, tick)`, `hang_up()`, and for `Un
 from __future__ import annotations
 
 import math
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -78,7 +79,15 @@ class TransportConformance:
     def run(
         self, behave: Callable[[Any], object], clock: Any = None, record: Path | None = None, car: str = "ego"
     ) -> Result:
-        """Run one trial in which the peer of `car` behaves so."""
+        """Run one trial in which the peer of `car` behaves so, and verify its record."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = record or Path(folder) / "a.mcap"
+            result = self._run(behave, clock, path, car)
+            found = dt.verify(path)
+            assert found.verified, found
+        return result
+
+    def _run(self, behave: Callable[[Any], object], clock: Any, record: Path, car: str) -> Result:
         instance = make_instance(names=("agent0",), ticks=self.ticks)
         with self.link(clock or Lockstep(1.0), ego=car == "ego") as link, ThreadPoolExecutor(1) as pool:
             peer = self.connect(link.transport, car)

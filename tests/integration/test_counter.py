@@ -12,8 +12,11 @@ from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.problem.kinds import parameters_of
-from dubins_traffic.record.reader import read
+from dubins_traffic.record.reader import from_bytes, read
+from dubins_traffic.record.schema import EVENTS
+from dubins_traffic.verification.verify import verify
 from dubins_traffic.viewer.marks import event_marks
+from tests.tampering import Chunks, find, rebuilt
 
 FAIRNESS, NO_E4, NO_E3 = CASES
 NO_E5 = Case(3, 3, 3, ("E1", "E2", "E3", "E4", "E6"))
@@ -42,6 +45,11 @@ def test_where_the_ego_wins_the_team_keeps_it_from_nothing() -> None:
     assert found.gap < 60.0
 
 
+def without_first_event(chunks: Chunks) -> None:
+    m, k = find(chunks, EVENTS)
+    del chunks[m][k]
+
+
 def test_the_reason_is_in_the_record_and_in_the_replay(tmp_path: Path) -> None:
     path = tmp_path / "counter.mcap"
     own = instance(FAIRNESS, 1, 20.0)
@@ -51,6 +59,9 @@ def test_the_reason_is_in_the_record_and_in_the_replay(tmp_path: Path) -> None:
     assert details[0] == "assumed: E2,E6"
     assert details[1].startswith("From here the ego can be kept from goal [")
     assert any("e-agent 1 holds" in detail and "is not assumed" in detail for detail in details)
+    assert verify(path).verified
+    silent = rebuilt(path.read_bytes(), without_first_event)
+    assert "event at tick" in str(verify(from_bytes(silent)))
     shown = [mark.text for mark in event_marks(own, record.frames)]
     assert all(any(detail in text for text in shown) for detail in details)
 

@@ -27,6 +27,7 @@ from dubins_traffic.simulators.gazebo import prefix
 from dubins_traffic.simulators.gazebo.link import Kind, LostError
 from dubins_traffic.simulators.gazebo.simulator import Gazebo
 from dubins_traffic.simulators.gazebo.vehicle import WHEEL_RADIUS
+from dubins_traffic.verification.contacts import from_poses
 from tests.batches import pose, scene
 from tests.gazebo import installation
 from tests.recordings import make_instance
@@ -109,9 +110,36 @@ def test_a_trial_on_wheels_is_scored_replayed_and_the_same_again(tmp_path: Path)
         assert other.driven.distance_m > 5.0
     record = dt.load_record(twice[0])
     assert record.instance.simulator == "gazebo"
+    assert dt.verify(twice[0]).verified
     again = Scorer()
     replay(record, [again])
     assert again.result(controller="lanes", record=twice[0], wall=results[0].wall) == score
+
+
+class Rammer:
+    """Drives into what is ahead, again and again."""
+
+    def start(self, problem: dt.Problem) -> None:
+        self.problem = problem
+
+    def act(self, observation: dt.Observation) -> tuple[float, float]:
+        return (1.0, 0.0) if observation.tick % 40 < 30 else (-0.5, 0.3)
+
+
+@pytest.mark.parametrize("body", [Disc(), Rectangle(0.5, 0.3)])
+def test_records_with_collisions_are_verified_and_their_contacts_fit_the_poses(
+    body: Disc | Rectangle, tmp_path: Path
+) -> None:
+    post = [DiscObstacle(4.6, -0.3, 0.1)]
+    instance = make_instance(names=("agent0",), ticks=200, body=body, obstacles=post)
+    run_trial(replace(instance, simulator="gazebo"), Rammer(), record=tmp_path / "a.mcap")
+    record = dt.load_record(tmp_path / "a.mcap")
+    assert record.frames.contacts
+    found = dt.verify(tmp_path / "a.mcap")
+    assert found.verified, found
+    assert from_poses(record).frames.contacts == record.frames.contacts
+    bare = replace(record, frames=replace(record.frames, contacts=()))
+    assert not dt.verify(bare).verified
 
 
 @pytest.mark.parametrize(

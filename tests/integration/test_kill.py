@@ -15,6 +15,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record import reader
 from dubins_traffic.scoring.score import score
+from dubins_traffic.verification.verify import verify
 
 PACED = """
 import sys, time
@@ -57,6 +58,9 @@ def test_a_killed_run_leaves_a_record_up_to_its_last_second(
     assert found.frames.command_speed[1:, 0] == pytest.approx(0.3)
     assert (np.diff(found.frames.time) > 0).all()
     assert score(found).end is None
+    verified = verify(record)
+    assert verified.verified, verified
+    assert str(verified).startswith("verified, ends early: cut off after tick")
 
 
 def test_the_instance_of_a_killed_record_runs_again(tmp_path: Path) -> None:

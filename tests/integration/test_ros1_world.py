@@ -44,6 +44,9 @@ def run(ros: Graph, folder: Path, fault: str, **more: object) -> dt.Record:
     ]
     status, _, err = finish(ros.session(configuration(folder, **{**COURSE, **more}), *options))
     assert status in (0, 1), err
+    found = dt.verify(records / "trial-0000.mcap")
+    assert found.verified, found
+    assert found.world == "ros1-world"
     return dt.load_record(records / "trial-0000.mcap")
 
 

@@ -233,6 +233,7 @@ def test_what_is_no_record_is_refused(tmp_path: Path, data: bytes, told: str) ->
         ("/trial", b"{}", "not a record of a trial"),
         ("/trial", b"[1]", "not a record of a trial"),
         ("/trial", b"{", "damaged header"),
+        ("/trial", b"[" * 100_000, "damaged header"),
         ("/trial", b'{"format": "dubins-traffic record", "version": 2}', "version: unknown version"),
         ("/trial", b'{"format": "dubins-traffic record", "version": 1}', "package: missing"),
         ("/trial", header(libraries=3), "libraries: missing from the header or of a wrong type: got 3"),
@@ -294,8 +295,26 @@ def test_the_sidecar_stands_beside_the_record(path: Path) -> None:
     assert sorted(each.name for each in path.parent.iterdir()) == ["a.mcap", "a.wall.json"]
 
 
+SIDECAR = '{"version": 1, "time_to_begin_s": 1, "act_s": {}, "reproducible": true, "date": "", "machine": {}}'
+
+
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"version": 1}', '{"version": 9}', '{"version": 1, "x": 2}']
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        "[" * 100_000,
+        '{"version": 1}',
+        '{"version": 9}',
+        '{"version": 1, "x": 2}',
+        SIDECAR.replace("{}", "[]"),
+        SIDECAR.replace("true", "1"),
+        SIDECAR.replace('""', "2"),
+        SIDECAR.replace('"act_s": {}', '"act_s": {"mean": "soon"}'),
+        SIDECAR.replace(": 1, ", ': 1, "transport": 3, '),
+        SIDECAR.replace('"time_to_begin_s": 1', '"time_to_begin_s": "soon"'),
+    ],
 )
 def test_a_bad_sidecar_is_refused(path: Path, text: str) -> None:
     wall.sidecar(path).write_text(text)

@@ -65,7 +65,7 @@ def load_record(source: str | os.PathLike[str]) -> Record:
         If it can't be read or is no record.
     """
     if os.fspath(source) == STANDARD_INPUT:
-        return reader.from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT)
+        return reader.from_bytes(reader.take_bytes(sys.stdin.buffer, STANDARD_INPUT), STANDARD_INPUT)
     return reader.read(os.fspath(source))
 
 

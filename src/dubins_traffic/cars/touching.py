@@ -78,7 +78,7 @@ class Touching:
                 self._touching.discard(pair)
             elif between[0] <= 0.0 and pair not in self._touching:
                 self._touching.add(pair)
-                found.append(self._contact(tick, state, pair, between))
+                found.append(self.contact(tick, state, pair))
         self._touching = {pair for pair in self._touching if pair[1] < 0 or pair in near}
         return tuple(found)
 
@@ -86,9 +86,10 @@ class Touching:
         dx, dy = state.x[0, other] - state.x[0, car], state.y[0, other] - state.y[0, car]
         return math.hypot(dx, dy) <= 2.0 * self._bodies.reach + PARTED
 
-    def _contact(self, tick: int, state: State, pair: tuple[int, int], between: Separation) -> Contact:
+    def contact(self, tick: int, state: State, pair: tuple[int, int]) -> Contact:
+        """Return the contact of a pair, a car and another or obstacle -1 - k, that touches in frame `tick`."""
         car, other = pair
-        _, nx, ny, x, y = between
+        _, nx, ny, x, y = self._bodies.separation(state, *pair)
         its = (0.0, False) if other < 0 else self._motion(state, other, (x, y), (-nx, -ny))
         own = self._motion(state, car, (x, y), (nx, ny))
         return Contact(

@@ -25,12 +25,16 @@ def check(
     ],
     json: options.Json = False,
 ) -> None:
-    """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car."""
+    """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car.
+
+    Labels and contacts are found again from poses and commands, whatever the records say of them.
+    """
     from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.scoring.notice import assumption_notice
     from dubins_traffic.scoring.score import ScoreSheet, score
+    from dubins_traffic.verification.contacts import from_poses
 
-    scores = [(record, score(load_record(record))) for record in records]
+    scores = [(record, score(from_poses(load_record(record)))) for record in records]
     if json:
         found = [_document(record, scored) for record, scored in scores]
         print(json_text.dumps({"records": found}, indent=2))

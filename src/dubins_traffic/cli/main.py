@@ -28,6 +28,7 @@ from dubins_traffic.cli import (
     score,
     spec,
     synth,
+    verify,
 )
 
 app = typer.Typer(
@@ -67,6 +68,7 @@ app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("verify", epilog=verify.EXAMPLES)(verify.verify)
 app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
 app.command("synth", epilog=synth.EXAMPLES)(synth.synth)

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import PurePath
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from dubins_traffic.errors import InputError, RecordError
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import schema
+
+PACKAGE: Final = "dubins-traffic"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +31,28 @@ def bare_name(controller: str) -> str:
     return PurePath(controller).name
 
 
-def encode(instance: Instance, controller: str | None) -> bytes:
+def encode(instance: Instance, controller: str | None, versions: Mapping[str, str] | None = None) -> bytes:
     """Return the message on ``/trial``, the same bytes for the same instance, controller and versions.
 
-    Of a controller given by a file's path only the last part of the path is kept (`bare_name`).
+    Of a controller given by a file's path only the last part of the path is kept (`bare_name`). The versions are those
+    of this package and of the encoding library unless given.
     """
+    written = document(instance, controller, versions)
+    return json.dumps(written, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def document(
+    instance: Instance, controller: str | None, versions: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Return what `encode` encodes."""
     bounds = instance.problem.car.bounds
-    document = {
+    if versions is None:
+        versions = {PACKAGE: version(PACKAGE), "mcap": version("mcap")}
+    return {
         "format": schema.FORMAT,
         "version": schema.VERSION,
-        "package": version("dubins-traffic"),
-        "libraries": {"mcap": version("mcap")},
+        "package": versions[PACKAGE],
+        "libraries": {name: text for name, text in versions.items() if name != PACKAGE},
         "seed": instance.seed,
         "trial": instance.trial,
         "controller": None if controller is None else bare_name(controller),
@@ -53,7 +66,6 @@ def encode(instance: Instance, controller: str | None) -> bytes:
         },
         "instance": instance_to_document(instance),
     }
-    return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
 def decode(data: bytes, file: str | None = None) -> Header:
@@ -65,10 +77,10 @@ def decode(data: bytes, file: str | None = None) -> Header:
         If it is not the header of a record, or one of a version that this package does not know.
     """
     try:
-        document: Any = json.loads(data)
-    except ValueError as error:
+        found: Any = json.loads(data)
+    except (ValueError, RecursionError) as error:
         raise RecordError("damaged header", file=file, expected="JSON") from error
-    fields = cast("dict[str, Any]", document) if isinstance(document, dict) else {}
+    fields = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
     if fields.get("format") != schema.FORMAT:
         raise RecordError("not a record of a trial", file=file, expected=f"an MCAP file with {schema.HEADER}")
     if fields.get("version") != schema.VERSION:
@@ -90,5 +102,5 @@ def decode(data: bytes, file: str | None = None) -> Header:
     except InputError as error:
         placed = error.within(field="instance")
         raise RecordError(f"{placed.field}: {placed.problem}", file=file, expected=placed.expected) from error
-    versions = {"dubins-traffic": fields["package"], **fields["libraries"]}
+    versions = {**fields["libraries"], PACKAGE: fields["package"]}
     return Header(instance, fields["controller"], versions)

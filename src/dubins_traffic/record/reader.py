@@ -5,28 +5,24 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 import numpy.typing as npt
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message
-from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
-from dubins_traffic.cars.state import Contact, Event, Frames
+from dubins_traffic.cars.state import NONE, Contact, Event, Frames
 from dubins_traffic.display import Pictured
 from dubins_traffic.errors import RecordError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import header, schema, wall
+from dubins_traffic.record.chunks import Entry, pieces
 from dubins_traffic.record.header import Header
 from dubins_traffic.record.sink import End, Ending, Sink
 
-_DAMAGE = (struct.error, ValueError, McapError, RuntimeError, OverflowError, MemoryError)
+LARGEST: Final = 2**31
+"""Bytes that a record may have; what goes on after them never ends."""
 
 
 @dataclass(frozen=True)
@@ -71,27 +67,47 @@ def read(path: Path | str) -> Record:
         If the file can't be read, is no record, ends before its first frame could have been written, is damaged,
         or is of an unknown version.
     """
+    return replace(from_bytes(read_bytes(path), file=str(path)), wall=wall.read(path))
+
+
+def read_bytes(path: Path | str) -> bytes:
+    """Return the bytes of the record at `path`, which is opened and read once: it may be a pipe.
+
+    Raises
+    ------
+    RecordError
+        If the file can't be read, does not begin as a record or does not end.
+    """
     try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        problem = f"can't be read: {error.strerror}"
+        with Path(path).open("rb") as stream:
+            return take_bytes(stream, str(path))
+    except (OSError, ValueError) as error:
+        problem = f"can't be read: {getattr(error, 'strerror', None) or error}"
         raise RecordError(problem, file=str(path), expected="a record, NAME.mcap") from error
-    record = from_bytes(data, file=str(path))
-    return replace(record, wall=wall.read(path))
+
+
+def take_bytes(stream: BinaryIO, file: str) -> bytes:
+    """Return the bytes of the record in `stream`; the errors are those of `read_bytes`."""
+    first = stream.read(len(MCAP0_MAGIC))
+    if first != MCAP0_MAGIC:
+        raise RecordError("not a record", file=file, expected="an MCAP file, NAME.mcap")
+    data = first + stream.read(LARGEST)
+    if len(data) > LARGEST:
+        raise RecordError("does not end", file=file, expected=f"a record of at most {LARGEST} bytes")
+    return data
 
 
 def from_bytes(data: bytes, file: str | None = None) -> Record:
     """Read a record from the bytes of its file; see `read`. `file` is the name that errors mention."""
-    messages = _chunks(data, file)
-    first = next(messages, None)
+    chunks = (piece.messages for piece in pieces(data, file))
+    first = next(chunks, None)
     if not first:
         raise RecordError("cut off before its first frame", file=file, expected="a record, NAME.mcap")
-    topic, message = first[0]
-    if topic != schema.HEADER:
+    if first[0].topic != schema.HEADER:
         raise RecordError("not a record of a trial", file=file, expected=f"an MCAP file with {schema.HEADER}")
-    head = header.decode(message, file)
+    head = header.decode(first[0].data, file)
     try:
-        return _assemble(head, messages, file)
+        return _assemble(head, chunks, file)
     except (struct.error, ValueError) as error:
         raise RecordError(f"damaged record ({error})", file=file) from error
 
@@ -108,53 +124,15 @@ def replay(record: Record, sinks: Sequence[Sink]) -> None:
             sink.end(record.ending)
 
 
-def _chunks(data: bytes, file: str | None) -> Iterator[list[tuple[str, bytes]]]:
-    """Yield (topic, message) of each whole chunk in order; stop where the file was cut off."""
-    if not data.startswith(MCAP0_MAGIC):
-        raise RecordError("not a record", file=file, expected="an MCAP file, NAME.mcap")
-    topics: dict[int, str] = {}
-    damaged = False
-    for body in _bodies(data, Opcode.CHUNK):
-        if damaged:
-            raise RecordError("damaged record", file=file, expected="chunks that match their checksums")
-        try:
-            parts = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(body))), validate_crc=True)
-        except _DAMAGE:
-            damaged = True  # the last chunk of a file that was cut off may be torn; any other may not
-            continue
-        yield _messages(parts, topics)
-
-
-def _bodies(data: bytes, opcode: Opcode) -> Iterator[bytes]:
-    """Yield the content of every whole MCAP record of one kind in the data section."""
-    at = len(MCAP0_MAGIC)
-    while at + 9 <= len(data):
-        kind, length = struct.unpack_from("<BQ", data, at)
-        at += 9
-        if at + length > len(data) or kind == Opcode.DATA_END:
-            return
-        if kind == opcode:
-            yield data[at : at + length]
-        at += length
-
-
-def _messages(parts: Sequence[McapRecord], topics: dict[int, str]) -> list[tuple[str, bytes]]:
-    found: list[tuple[str, bytes]] = []
-    for part in parts:
-        if isinstance(part, Channel):
-            topics[part.id] = part.topic
-        elif isinstance(part, Message):
-            found.append((topics.get(part.channel_id, ""), part.data))
-    return found
-
-
-def _assemble(head: Header, chunks: Iterator[list[tuple[str, bytes]]], file: str | None) -> Record:
+def _assemble(head: Header, chunks: Iterator[Sequence[Entry]], file: str | None) -> Record:
     blocks: list[_Block] = []
     ending: Ending | None = None
     for messages in chunks:
         by_topic: dict[str, list[bytes]] = {}
-        for topic, message in messages:
-            by_topic.setdefault(topic, []).append(message)
+        for message in messages:
+            by_topic.setdefault(message.topic, []).append(message.data)
+        if ending is not None:
+            raise ValueError("something follows its end")
         if schema.END in by_topic:
             ending = _ending(by_topic[schema.END][0])
         blocks.append(
@@ -168,6 +146,8 @@ def _assemble(head: Header, chunks: Iterator[list[tuple[str, bytes]]], file: str
     cars = len(head.instance.names)
     if any(max(c.car, c.other) >= cars or c.car < 0 for block in blocks for c in block.contacts):
         raise ValueError("a contact of an unknown car")
+    if any(not NONE <= event.car < cars for block in blocks for event in block.events):
+        raise ValueError("an event of an unknown car")
     blocks = [block for block in blocks if block.frames or block.contacts or block.events]
     frames = _frames(head.instance, blocks)
     parts: list[Frames] = []
@@ -180,10 +160,12 @@ def _assemble(head: Header, chunks: Iterator[list[tuple[str, bytes]]], file: str
 
 def _frames(instance: Instance, blocks: Sequence[_Block]) -> Frames:
     cars = len(instance.names)
-    rows = _rows([data for block in blocks for data in block.frames], schema.frame_dtype(cars))
-    labels = _rows([data for block in blocks for data in block.labels], schema.labels_dtype(cars))
+    rows = _rows([data for block in blocks for data in block.frames], schema.frame_dtype(cars), cars)
+    labels = _rows([data for block in blocks for data in block.labels], schema.labels_dtype(cars), cars)
     if not np.array_equal(rows["tick"], np.arange(len(rows))):
         raise ValueError("frames are missing")
+    if not all(np.isfinite(rows[name]).all() for name in schema.FRAME_FIELDS):
+        raise ValueError("a frame holds what is not finite")
     last = np.searchsorted(labels["tick"], rows["tick"], side="right") - 1
     if len(last) and last[0] < 0:
         raise ValueError("labels are missing")
@@ -199,11 +181,15 @@ def _frames(instance: Instance, blocks: Sequence[_Block]) -> Frames:
     )
 
 
-def _rows(messages: Sequence[bytes], layout: npt.DTypeLike) -> np.ndarray:
+def _rows(messages: Sequence[bytes], layout: npt.DTypeLike, cars: int) -> np.ndarray:
     size = np.dtype(layout).itemsize
     if any(len(message) != size for message in messages):
         raise ValueError(f"a message is not {size} bytes long")
-    return np.frombuffer(b"".join(messages), dtype=layout)
+    rows = np.frombuffer(b"".join(messages), dtype=layout)
+    names = rows.dtype.names or ()
+    if any((rows[name] != cars).any() for name in names if name.endswith("_length")):
+        raise ValueError(f"a message does not tell of {cars} cars")
+    return rows
 
 
 def _part(frames: Frames, first: int, end: int, block: _Block) -> Frames:
@@ -222,18 +208,27 @@ def _event(data: bytes) -> Event:
     (tick,) = struct.unpack_from("<I", data)
     kind, at = _string(data, 4)
     (car,) = struct.unpack_from("<i", data, at)
-    detail, _ = _string(data, at + 4)
+    detail, end = _string(data, at + 4)
+    _check_end(data, end)
     return Event(tick, kind, car, detail)
 
 
 def _ending(data: bytes) -> Ending:
-    end, at = _string(data, 0)
+    name, at = _string(data, 0)
     (ticks,) = struct.unpack_from("<I", data, at)
-    detail, _ = _string(data, at + 4)
-    return Ending(End(end), ticks, detail)
+    detail, end = _string(data, at + 4)
+    _check_end(data, end)
+    return Ending(End(name), ticks, detail)
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", data, at)
     end = at + 4 + length
+    if end > len(data):
+        raise ValueError("a text is longer than its message")
     return data[at + 4 : end].decode(), end
+
+
+def _check_end(data: bytes, end: int) -> None:
+    if end != len(data):
+        raise ValueError("something follows in a message")

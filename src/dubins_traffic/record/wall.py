@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -93,7 +93,7 @@ def read(record: Path | str) -> Wall | None:
         document: Any = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RecordError(
             "can't be read as a sidecar of a record", file=str(path), expected="JSON"
         ) from error
@@ -104,7 +104,32 @@ def read(record: Path | str) -> Wall | None:
         raise RecordError(
             "not a version of a sidecar", file=str(path), field="version", expected=str(VERSION)
         )
+    for name, value in fields.items():
+        told = _TYPES.get(name)
+        if told is not None and not told[0](value):
+            raise RecordError(
+                "not a sidecar of a record", file=str(path), field=name, value=value, expected=told[1]
+            )
     try:
         return Wall(**fields)
     except TypeError as error:
         raise RecordError(f"not a sidecar of a record: {error}", file=str(path)) from error
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _holds_numbers(value: object) -> bool:
+    return isinstance(value, dict) and all(map(_is_number, cast("dict[str, Any]", value).values()))
+
+
+_TYPES: Final[Mapping[str, tuple[Callable[[object], bool], str]]] = {
+    "time_to_begin_s": (lambda value: value is None or _is_number(value), "seconds or null"),
+    "act_s": (_holds_numbers, "an object of numbers"),
+    "reproducible": (lambda value: isinstance(value, bool), "true or false"),
+    "date": (lambda value: isinstance(value, str), "a text"),
+    "machine": (lambda value: isinstance(value, dict), "an object"),
+    "transport": (lambda value: isinstance(value, dict), "an object"),
+}
+"""What the fields of a sidecar must be."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -16,6 +16,61 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import header, schema, wall
 from dubins_traffic.record.mcap_file import McapFile, Message
 from dubins_traffic.record.sink import Ending
+
+
+class RecordEncoder:
+    """A sink that encodes the record of one trial into a stream, a chunk for each block.
+
+    Parameters
+    ----------
+    stream : binary stream
+        Where the record goes; it stays open.
+    controller : str, optional
+        Name of the ego's controller, kept in the header.
+    versions : mapping, optional
+        Versions to write into the header, by default those of this package and its encoding library.
+    """
+
+    def __init__(
+        self, stream: BinaryIO, controller: str | None = None, versions: Mapping[str, str] | None = None
+    ) -> None:
+        self._stream = stream
+        self._controller = controller
+        self._versions = versions
+
+    def begin(self, instance: Instance) -> None:
+        """Write the header, alone in the first chunk."""
+        message = header.encode(instance, self._controller, self._versions)
+        self._cars = len(instance.names)
+        self._rate = instance.problem.rate
+        self._mcap = McapFile(self._stream, library=f"dubins-traffic record {schema.VERSION}")
+        description = json.dumps(schema.header_schema()).encode()
+        form = (schema.HEADER_NAME, "jsonschema", description)
+        self._channel = {schema.HEADER: self._mcap.register(schema.HEADER, "json", form)}
+        for topic, (name, definition) in schema.MESSAGES.items():
+            form = (name, "ros1msg", definition.encode())
+            self._channel[topic] = self._mcap.register(topic, "ros1", form)
+        self._chunk({schema.HEADER: [Message(0, 0, message)]})
+
+    def frames(self, frames: Frames) -> None:
+        """Write a block of frames as one chunk and flush it."""
+        self._chunk(
+            {
+                schema.FRAMES: encode_frames(frames, self._cars),
+                schema.LABELS: encode_labels(frames, self._cars),
+                schema.CONTACTS: [encode_contact(contact) for contact in frames.contacts],
+                schema.EVENTS: [encode_event(event, self._rate) for event in frames.events],
+            }
+        )
+
+    def end(self, ending: Ending) -> None:
+        """Write the end of the trial and the index of the file."""
+        message = schema.pack_strings(ending.end.value, ending.ticks, ending.detail)
+        self._chunk({schema.END: [Message(schema.log_time(ending.ticks, self._rate), 0, message)]})
+        self._mcap.finish()
+
+    def _chunk(self, messages: dict[str, list[Message]]) -> None:
+        self._mcap.chunk({self._channel[topic]: group for topic, group in messages.items()})
 
 
 class RecordWriter:
@@ -40,8 +95,6 @@ class RecordWriter:
         self._controller = controller
         self._overwrite = overwrite
         self._file: BinaryIO | None = None
-        self._cars = 0
-        self._rate = 1.0
 
     def begin(self, instance: Instance) -> None:
         """Make the file and write its header.
@@ -51,37 +104,20 @@ class RecordWriter:
         InputError
             If the file exists and may not be replaced, or can't be made.
         """
-        message = header.encode(instance, self._controller)
-        self._cars = len(instance.names)
-        self._rate = instance.problem.rate
         self._file = self._open()
+        self._encoder = RecordEncoder(self._file, self._controller)
         with self._written():
-            self._mcap = McapFile(self._file, library=f"dubins-traffic record {schema.VERSION}")
-        description = json.dumps(schema.header_schema()).encode()
-        form = (schema.HEADER_NAME, "jsonschema", description)
-        self._channel = {schema.HEADER: self._mcap.register(schema.HEADER, "json", form)}
-        for topic, (name, definition) in schema.MESSAGES.items():
-            form = (name, "ros1msg", definition.encode())
-            self._channel[topic] = self._mcap.register(topic, "ros1", form)
-        self._chunk({schema.HEADER: [Message(0, 0, message)]})
+            self._encoder.begin(instance)
 
     def frames(self, frames: Frames) -> None:
         """Write a block of frames as one chunk and flush it to the file."""
-        self._chunk(
-            {
-                schema.FRAMES: encode_frames(frames, self._cars),
-                schema.LABELS: encode_labels(frames, self._cars),
-                schema.CONTACTS: [encode_contact(contact) for contact in frames.contacts],
-                schema.EVENTS: [encode_event(event, self._rate) for event in frames.events],
-            }
-        )
+        with self._written():
+            self._encoder.frames(frames)
 
     def end(self, ending: Ending) -> None:
         """Write the end of the trial and the index, and close the file."""
-        message = schema.pack_strings(ending.end.value, ending.ticks, ending.detail)
-        self._chunk({schema.END: [Message(schema.log_time(ending.ticks, self._rate), 0, message)]})
         with self._written():
-            self._mcap.finish()
+            self._encoder.end(ending)
         self.close()
 
     def close(self) -> None:
@@ -107,10 +143,6 @@ class RecordWriter:
             raise InputError("the file exists", file=str(self.path), expected=expected) from error
         except OSError as error:
             raise InputError(f"can't be written: {error.strerror}", file=str(self.path)) from error
-
-    def _chunk(self, messages: dict[str, list[Message]]) -> None:
-        with self._written():
-            self._mcap.chunk({self._channel[topic]: group for topic, group in messages.items()})
 
 
 def encode_frames(frames: Frames, cars: int) -> list[Message]:

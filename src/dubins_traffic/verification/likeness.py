@@ -1,0 +1,46 @@
+"""The first place in which two documents differ."""
+
+from __future__ import annotations
+
+import json
+from itertools import zip_longest
+from typing import Any, cast
+
+from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record import header
+from dubins_traffic.record.reader import Record
+from dubins_traffic.verification.result import Difference
+
+
+def header_difference(written: bytes, record: Record) -> Difference | None:
+    """Return where the header of `record`, as it is `written`, says other things than its own instance does."""
+    expected = header.document(record.instance, record.controller, record.versions)
+    return unlike("header", json.loads(written), _as_json(expected))
+
+
+def instance_difference(record: Record, expected: Instance) -> Difference | None:
+    """Return where the instance of `record` is another than the one that was to be run."""
+    documents = [_as_json(instance_to_document(instance)) for instance in (record.instance, expected)]
+    return unlike("instance", documents[0], documents[1])
+
+
+def unlike(path: str, recorded: object, expected: object) -> Difference | None:
+    """Return the first place in which two JSON values differ; numbers are equal if they are written alike."""
+    if isinstance(recorded, dict) and isinstance(expected, dict):
+        one, two = cast("dict[str, object]", recorded), cast("dict[str, object]", expected)
+        for name in [*two, *(name for name in one if name not in two)]:
+            found = unlike(f"{path}.{name}", one.get(name), two.get(name))
+            if found is not None or (name in one) != (name in two):
+                return found or Difference(f"{path}.{name}", one.get(name), two.get(name))
+        return None
+    if isinstance(recorded, list) and isinstance(expected, list):
+        rows = zip_longest(cast("list[object]", recorded), cast("list[object]", expected))
+        return next((found for k, pair in enumerate(rows) if (found := unlike(f"{path}[{k}]", *pair))), None)
+    if json.dumps(recorded) == json.dumps(expected):
+        return None
+    return Difference(path, recorded, expected)
+
+
+def _as_json(document: dict[str, Any]) -> Any:
+    return json.loads(json.dumps(document))

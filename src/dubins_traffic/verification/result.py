@@ -1,0 +1,98 @@
+"""What comes of verifying a record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What differs first: `what`, of which car in which frame where it has them, as recorded and as expected."""
+
+    what: str
+    recorded: Any
+    expected: Any
+    tick: int | None = None
+    car: str | None = None
+
+    def __str__(self) -> str:
+        place = "" if self.car is None else f" of {self.car}"
+        place += "" if self.tick is None else f" at tick {self.tick}"
+        return f"{self.what}{place}: recorded {_told(self.recorded)}, expected {_told(self.expected)}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the difference as a JSON object."""
+        values = {name: _plain(getattr(self, name)) for name in ("recorded", "expected")}
+        return {"what": self.what, "tick": self.tick, "car": self.car, **values}
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """The outcome for one record.
+
+    Attributes
+    ----------
+    record : str or None
+        The name it was read from.
+    difference : Difference or None
+        What differs first, None if nothing does.
+    world : str
+        The simulator that the record's instance names; `embedded` is simulated again, others are not ours.
+    ticks, cars : int
+        Ticks of the trial that the record holds, and its cars.
+    end : str or None
+        The named end; None if the record was cut off, and what is there has been verified.
+    unchecked : tuple of str
+        What could not be checked, and is taken as it was recorded.
+    """
+
+    record: str | None
+    difference: Difference | None
+    world: str
+    ticks: int
+    cars: int
+    end: str | None
+    unchecked: tuple[str, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether nothing differs."""
+        return self.difference is None
+
+    def __str__(self) -> str:
+        if self.difference is not None:
+            return f"differs: {self.difference}"
+        early = "" if self.end is not None else f", ends early: cut off after tick {self.ticks}"
+        only = (
+            ""
+            if self.world == OURS
+            else f", in the world {self.world}: frames fit the bounds, contacts the poses"
+        )
+        return f"verified{early}{only}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the outcome as a JSON object."""
+        return {
+            "record": self.record,
+            "verified": self.verified,
+            "difference": None if self.difference is None else self.difference.to_json(),
+            "world": self.world,
+            "ticks": self.ticks,
+            "cars": self.cars,
+            "end": self.end,
+            "unchecked": list(self.unchecked),
+        }
+
+
+OURS = "embedded"
+"""The simulator whose trials are simulated again."""
+
+
+def _told(value: Any) -> str:
+    text = "nothing" if value is None else value if isinstance(value, str) else repr(value)
+    return text if len(text) <= 300 else f"{text[:297]}..."
+
+
+def _plain(value: Any) -> Any:
+    return value if value is None or isinstance(value, bool | int | float | str) else _told(value)

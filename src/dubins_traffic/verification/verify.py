@@ -1,0 +1,109 @@
+"""Verification of records: whether what a record says is what happened."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from dubins_traffic.errors import InputError, RecordError
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.record import reader
+from dubins_traffic.record.chunks import pieces
+from dubins_traffic.record.reader import Record
+from dubins_traffic.verification.again import trial_difference
+from dubins_traffic.verification.elsewhere import world_difference
+from dubins_traffic.verification.likeness import header_difference, instance_difference
+from dubins_traffic.verification.result import OURS, Difference, Verification
+from dubins_traffic.verification.written import encoded, written_difference
+
+STANDARD_INPUT = "-"
+
+
+def verify(
+    record: Record | str | os.PathLike[str],
+    *,
+    instance: Instance | Callable[[Record], Instance] | None = None,
+) -> Verification:
+    """Go through a recorded trial again and compare all of it with its record, bit for bit.
+
+    Where the world is ours the trial is simulated again from its instance and its recorded commands, and the e-agents
+    that it drives by itself are decided again. Of other worlds it is checked that frames fit the bounds and contacts
+    the poses (docs/records.md has the tolerances); labels, faults, commands of e-agents and ends are compared as well.
+
+    Parameters
+    ----------
+    record : path or Record
+        What to verify; of a path (``-``: standard input) also that the file is written as a trial writes it.
+    instance : Instance or callable, optional
+        The instance that was to be run, or a function that returns it for the record; by default the record's own is
+        taken to be it.
+
+    Raises
+    ------
+    RecordError
+        If the file can't be read as a record.
+
+    Examples
+    --------
+    >>> verify("out/trial-0000.mcap").verified     # doctest: +SKIP
+    True
+    """
+    if isinstance(record, Record):
+        return _verified(record, encoded(record), instance)
+    name = os.fspath(record)
+    stdin = name == STANDARD_INPUT
+    data = reader.take_bytes(sys.stdin.buffer, name) if stdin else reader.read_bytes(Path(name))
+    return _verified(reader.from_bytes(data, name), data, instance)
+
+
+def _verified(
+    record: Record, data: bytes, instance: Instance | Callable[[Record], Instance] | None
+) -> Verification:
+    expected = instance(record) if callable(instance) else instance
+    try:
+        difference = _first_difference(record, data, expected)
+    except InputError as error:
+        raise RecordError(
+            f"its instance can't be run ({error.problem})",
+            file=record.file,
+            field=error.field,
+            expected=error.expected,
+        ) from error
+    return Verification(
+        record=record.file,
+        difference=difference,
+        world=record.instance.simulator,
+        ticks=max(0, len(record.frames) - 1),
+        cars=len(record.instance.names),
+        end=None if record.ending is None else record.ending.end.value,
+        unchecked=_unchecked(record),
+    )
+
+
+def _first_difference(record: Record, data: bytes, expected: Instance | None) -> Difference | None:
+    other = None if expected is None else instance_difference(record, expected)
+    head = next(pieces(data)).messages[0].data
+    found = other or header_difference(head, record) or _earlier(record)
+    return found or written_difference(data, record)
+
+
+def _earlier(record: Record) -> Difference | None:
+    """Return the first thing that can't be: by the bounds of a world that is not ours, or by what follows."""
+    found = [
+        None if record.instance.simulator == OURS else world_difference(record),
+        trial_difference(record),
+    ]
+    return min((one for one in found if one is not None), key=lambda one: one.tick or 0, default=None)
+
+
+def _unchecked(record: Record) -> tuple[str, ...]:
+    """Return what is taken as it was recorded."""
+    remote = [agent.name for agent in record.instance.e_agents if agent.kind == REMOTE]
+    taken = ["commands of the ego", *(f"commands of {name}" for name in remote)]
+    taken.append("what the controller reported")
+    if record.instance.simulator != OURS:
+        taken.append(f"poses within the bounds: the world is {record.instance.simulator}")
+    return (*taken, "the sidecar")
