@@ -62,6 +62,18 @@ def run_remote(session: Session) -> Iterator[Result]:
     InputError
         If an instance has no e-agent of a name in `remote`.
     """
+    maestro = session.maestro
+    try:
+        if maestro is not None:
+            session.link.mark = lambda running: maestro.enter(Phase.RUNNING if running else Phase.PREPARING)
+        yield from _trials(session)
+    finally:
+        if maestro is not None:
+            maestro.close()
+
+
+def _trials(session: Session) -> Iterator[Result]:
+    """Run one trial after another."""
     done = number = repetition = 0
     instance: Instance | None = None
     while session.trials is None or done < session.trials:
@@ -129,9 +141,6 @@ def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
             instance = _placed(instance, inbox.placed())
     except PeerError as error:
         raise TransportError(error.detail) from error
-    if maestro.next is Next.RUN:
-        maestro.enter(Phase.RUNNING)
-        return Next.RUN, instance
     return maestro.next, instance
 
 

@@ -72,6 +72,8 @@ class Link:
         self._polled = transport if isinstance(transport, Polled) else None
         self._between = self._stream is not None and not clock.lockstep
         self._interval = IDLE if self._stream is None else self._stream.interval
+        self.mark: Callable[[bool], None] = lambda _running: None
+        """Called when a trial begins (True) and when it is over (False), before its peers are told."""
         transport.open(self.inbox)
 
     def begin(self, instance: Instance) -> None:
@@ -111,6 +113,7 @@ class Link:
         if self._running:
             return
         self._running = True
+        self.mark(True)
         self.inbox.stale()
         self.transport.announce(self._instance)
         self._announced = monotonic()
@@ -157,6 +160,7 @@ class Link:
     def finish(self, ending: Ending) -> None:
         """Tell the peers that the trial is over."""
         self._running = self._moving = False
+        self.mark(False)
         self.transport.end(ending)
 
     def close(self) -> None:
@@ -175,6 +179,7 @@ class Link:
                 "commands": slot.commands,
                 "late": self._late[car],
                 "reconnections": slot.reconnections,
+                "peers": slot.peers,
                 "answer_s": summary(self._answers[car]),
             }
             for car, slot in ((car, self.inbox.slot(car)) for car in self._remote)

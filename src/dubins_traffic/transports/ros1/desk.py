@@ -91,14 +91,14 @@ class Desk:
         self._publish("", stamp)
         self._problem.impl.latch = None
 
-    def close(self) -> None:
-        """Take everything back."""
+    def close(self, *, forget: bool = True) -> None:
+        """Take everything back; unless `forget`, parameters stay, which may be another maestro's by now."""
         for service in self._services:
             service.shutdown("the session is over")
         if self._placing is not None:
             self._placing.unregister()
         self._problem.unregister()
-        for name in self._set:
+        for name in self._set if forget else ():
             if self._rospy.has_param(name):
                 self._rospy.delete_param(name)
 

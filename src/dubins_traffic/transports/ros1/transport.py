@@ -63,7 +63,7 @@ class Ros1:
         self._simulated_here = simulated
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
-        self._there: set[str] = set()
+        self._there: dict[str, int] = {}
         self._open = self._lost = False
 
     @property
@@ -79,6 +79,7 @@ class Ros1:
         self._desk = Desk(self._rospy, mailbox, self._maestro, self._told, simulated=self._simulated_here)
         self._watch = Watch(self._uri, self._look, self._lose)
         self._open = True
+        self._rospy.core.add_preshutdown_hook(self._displaced)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
@@ -116,13 +117,14 @@ class Ros1:
         with self._guarded():
             self._topics.close()
             self._listen(())
-            self._desk.close()
+            self._desk.close(forget=not self._lost)
 
     def _listen(self, remote: Sequence[str]) -> None:
         """Subscribe to the commands of the cars `remote`, and to no others."""
         for car in [car for car in self._subscribers if car not in remote]:
             self._subscribers.pop(car).unregister()
-            self._there.discard(car)
+            for _ in range(self._there.pop(car, 0)):
+                self._mailbox.left(car)
         for car in remote:
             if car not in self._subscribers:
                 self._subscribers[car] = self._rospy.Subscriber(
@@ -144,6 +146,12 @@ class Ros1:
         self._mailbox.stop(End.TRANSPORT_LOST, detail)
         abandon(self._rospy, detail)
 
+    def _displaced(self, reason: str) -> None:
+        """End all that is under way: the master has told this node to go, since another has taken its name."""
+        if self._open and not self._lost:
+            self._lost = True
+            self._mailbox.stop(End.TRANSPORT_LOST, f"the ROS master has shut this node down: {reason}")
+
     def _publish(self, view: View, *, frame: bool) -> None:
         self._stamps.see(view)
         if self._world is not None and not self._lost:
@@ -159,10 +167,10 @@ class Ros1:
             implementation = subscriber.impl
             if implementation is None:
                 continue
-            there = any(connection.socket is not None for connection in implementation.connections)
-            if there and car not in self._there:
-                self._there.add(car)
+            there = sum(connection.socket is not None for connection in list(implementation.connections))
+            before = self._there.get(car, 0)
+            self._there[car] = there
+            for _ in range(before, there):
                 self._mailbox.joined(car)
-            elif not there and car in self._there:
-                self._there.discard(car)
+            for _ in range(there, before):
                 self._mailbox.left(car)
