@@ -16,6 +16,10 @@ from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro, Next, Phase
 
 
+def quiet(_line: str) -> None:
+    """Say nothing."""
+
+
 @dataclass(frozen=True, slots=True)
 class Session:
     """What is run over a transport.
@@ -38,6 +42,8 @@ class Session:
         Instead of the one that instances name.
     records : Path, optional
         Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
+    say : callable
+        Is told, in lines for people, what the session does and waits for.
     """
 
     link: Link
@@ -48,6 +54,11 @@ class Session:
     remote: tuple[str, ...] = ()
     records: Path | None = None
     simulator: Simulator | None = None
+    say: Callable[[str], None] = quiet
+
+    def which(self, instance: Instance, done: int) -> str:
+        """Return the words for the trial of `instance`, which follows `done` others."""
+        return f"trial {instance.trial}" + ("" if self.trials is None else f" ({done + 1} of {self.trials})")
 
 
 def run_remote(session: Session) -> Iterator[Result]:
@@ -63,6 +74,7 @@ def run_remote(session: Session) -> Iterator[Result]:
         If an instance has no e-agent of a name in `remote`.
     """
     maestro = session.maestro
+    session.link.inbox.warn = session.say
     try:
         if maestro is not None:
             session.link.mark = lambda running: maestro.enter(Phase.RUNNING if running else Phase.PREPARING)
@@ -79,10 +91,13 @@ def _trials(session: Session) -> Iterator[Result]:
     while session.trials is None or done < session.trials:
         if instance is None:
             instance = hand_over(session.supply(number), session.remote)
-        asked, instance = _await_start(session, instance)
+        which = session.which(instance, done)
+        asked, instance = _await_start(session, instance, which)
         if asked is Next.DRAW:
             instance, number, repetition = None, number + 1, 0
             continue
+        ego = "; the first command of ego is waited for" if session.link.ego else ""
+        session.say(f"{which}: begins{ego}")
         yield run_trial(
             instance,
             session.controller,
@@ -121,7 +136,7 @@ def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
     return replace(instance, e_agents=agents)
 
 
-def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
+def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next, Instance]:
     """Show the world until someone starts it or wants another one; return it with its cars where they were put."""
     maestro, link = session.maestro, session.link
     if maestro is None:
@@ -134,11 +149,12 @@ def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
         while True:
             with Trial(instance, simulator=session.simulator, link=link):
                 if maestro.phase is Phase.PREPARING:
+                    session.say(f"{which}: waiting for READY and START from the program that drives ego")
                     maestro.enter(Phase.READY)
                 link.idle(lambda: maestro.next is not None or inbox.news)
+            instance = _placed(instance, inbox.placed())
             if maestro.next is not None:
                 break
-            instance = _placed(instance, inbox.placed())
     except PeerError as error:
         raise TransportError(error.detail) from error
     return maestro.next, instance

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
-from dubins_traffic.campaign.sessions import Pace, Programme, moved_by, rehearse
+from dubins_traffic.campaign.sessions import Pace, Programme, moved_by
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import InputError
 from dubins_traffic.transports.maestro import Maestro
@@ -62,7 +62,7 @@ def run_over_ros1(
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
     ego = programme.controller is None
     maestro = Maestro() if ego else None
-    rehearse(programme.supply(0))
+    programme.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master is not None:
@@ -70,6 +70,7 @@ def run_over_ros1(
             stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
             uri = started.uri
+        programme.say(f"ROS master at {uri}")
         stack.callback(leave)
         transport = Ros1(uri, maestro=maestro, told=_told(programme), clock=clock, simulated=not world)
         if not world:

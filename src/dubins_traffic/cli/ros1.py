@@ -13,7 +13,7 @@ from dubins_traffic.errors import InputError
 app = typer.Typer(help="Trials over ROS 1, with the topics and services of 2016.", no_args_is_help=True)
 EXAMPLES = options.examples(
     "ros1 run demo --master",
-    "ros1 run my-trials.json --master 11411 --trials 3 --records out -f data.json",
+    "ros1 run my-trials.json --master --port 11411 --trials 3 --records out -f data.json",
     "ros1 run demo --remote agent0 --controller lanes --lockstep",
 )
 

@@ -187,9 +187,8 @@ class Lcm:
 
     def _grant(self, asked: mode_t) -> None:
         """Answer a request; one that can't be answered before the next instance is up waits for it."""
-        if self._maestro is None:
-            granted = asked.mode in (Mode.READY, Mode.START)
-        else:
+        granted: bool | None = asked.mode in (Mode.READY, Mode.START)
+        if self._maestro is not None:
             granted = self._maestro.answer(asked.mode)
         if granted is None:
             self._waiting.append(asked)
