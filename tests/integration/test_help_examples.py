@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shlex
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,9 +16,7 @@ import pytest
 import typer
 
 from dubins_traffic.cli.main import app
-from tests.ros import ROOT, Graph, configuration, free_port, graph, need_ros
-
-LIMIT = 240.0
+from tests.ros import PATIENCE, ROOT, Graph, configuration, free_port, graph, need_ros, read_until
 
 
 def commands(group: Any) -> Iterator[Any]:
@@ -64,9 +60,9 @@ def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path:
         command = [sys.executable, "-m", "dubins_traffic.cli", *shlex.split(line)]
         around = {**ros.environment, "ROS_DOMAIN_ID": "77", "PYTHONPATH": str(ROOT / "src")}
         process = subprocess.Popen(command, cwd=tmp_path, env=around, stderr=subprocess.PIPE, text=True)
-        said = read_until(process, r"\((1 of \d+)\): (waiting for READY|begins)")
+        said = read_until(process, r"\((1 of \d+)\): (waiting for|begins)")
         os.kill(process.pid, signal.SIGTERM)
-        _, rest = process.communicate(timeout=LIMIT)
+        _, rest = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert "interrupted after 0 trials" in rest
     place = {
@@ -102,22 +98,6 @@ def test_the_launch_file_works_as_typed(tmp_path: Path) -> None:
         said = read_until(process, r"trial 0 \(1 of \d+\): begins")
     finally:
         os.killpg(process.pid, signal.SIGINT)
-        process.communicate(timeout=LIMIT)
+        process.communicate(timeout=PATIENCE)
     assert "waiting for READY and START" in said
     assert "ModuleNotFoundError" not in said
-
-
-def read_until(process: subprocess.Popen[str], pattern: str) -> str:
-    """Return what a process has said on standard error when that fits; it fails if the process ends before."""
-    assert process.stderr is not None
-    said = ""
-    watchdog = threading.Timer(LIMIT, process.kill)
-    watchdog.start()
-    try:
-        for line in process.stderr:
-            said += line
-            if re.search(pattern, line):
-                return said
-    finally:
-        watchdog.cancel()
-    raise AssertionError(json.dumps(said))

@@ -101,18 +101,23 @@ def _trials(session: Session) -> Iterator[Result]:
         yield run_trial(
             instance,
             session.controller,
-            record=_record(session.records, number, repetition),
+            record=record_path(session.records, number, repetition),
             overwrite=True,
             link=session.link,
             simulator=session.simulator,
         )
-        lost = session.link.inbox.stopped
-        if lost is not None and lost[0] is End.TRANSPORT_LOST:
-            raise TransportError(lost[1])
+        check_lost(session.link)
         if session.maestro is not None and session.maestro.next is Next.REPEAT:
             repetition += 1
         else:
             done, instance, number, repetition = done + 1, None, number + 1, 0
+
+
+def check_lost(link: Link) -> None:
+    """Raise TransportError if the transport has been lost."""
+    lost = link.inbox.stopped
+    if lost is not None and lost[0] is End.TRANSPORT_LOST:
+        raise TransportError(lost[1])
 
 
 def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
@@ -152,7 +157,7 @@ def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next
                     session.say(f"{which}: waiting for READY and START from the program that drives ego")
                     maestro.enter(Phase.READY)
                 link.idle(lambda: maestro.next is not None or inbox.news)
-            instance = _placed(instance, inbox.placed())
+            instance = placed(instance, inbox.placed())
             if maestro.next is not None:
                 break
     except PeerError as error:
@@ -160,13 +165,14 @@ def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next
     return maestro.next, instance
 
 
-def _placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
+def placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
     """Return `instance` with cars at other starts."""
     old = zip(instance.names, instance.starts, strict=True)
     return replace(instance, starts=tuple(places.get(name, start) for name, start in old))
 
 
-def _record(folder: Path | None, number: int, repetition: int) -> Path | None:
+def record_path(folder: Path | None, number: int, repetition: int) -> Path | None:
+    """Return where the record of an instance's trial stands, None where none is wanted."""
     if folder is None:
         return None
     suffix = f"-{repetition}" if repetition else ""

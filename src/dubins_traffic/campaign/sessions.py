@@ -12,6 +12,7 @@ from time import monotonic
 
 import numpy as np
 
+from dubins_traffic.campaign.foreign import run_under
 from dubins_traffic.campaign.plan import check_data_file, check_folder, check_simulator
 from dubins_traffic.campaign.remote import Session, hand_over, quiet, run_remote
 from dubins_traffic.campaign.single import Result, run_trial
@@ -31,6 +32,7 @@ from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.link import Link, Patience
 from dubins_traffic.transports.maestro import Maestro
 
@@ -99,14 +101,22 @@ class Programme:
         maestro: Maestro | None,
         world: Callable[[], Simulator] | None = None,
         at: Callable[[], str] | None = None,
+        foreign: ForeignMaestro | None = None,
     ) -> Iterator[Result]:
         """Run it over `transport`, which is closed however that ends; see `remote.run_remote`.
 
         Once the transport is open, `world` makes the simulator, instead of the one that instances name, and `at`
-        returns a line for people that says where the transport is.
+        returns a line for people that says where the transport is. `foreign` starts and ends the trials if it is given,
+        see `foreign.run_under`.
         """
         try:
-            link = Link(transport, pace.clock(), ego=self.controller is None, patience=pace.patience)
+            link = Link(
+                transport,
+                pace.clock(),
+                ego=self.controller is None,
+                patience=pace.patience,
+                at_once=foreign is not None,
+            )
             if at is not None:
                 self.say(at())
             session = Session(
@@ -120,9 +130,20 @@ class Programme:
                 None if world is None else world(),
                 self.say,
             )
-            yield from run_remote(session)
+            if foreign is None:
+                yield from run_remote(session)
+            else:
+                yield from run_under(session, foreign, self.shortest)
         finally:
             transport.close()
+
+    @property
+    def shortest(self) -> float:
+        """The shortest duration that a trial may have, seconds."""
+        settings = None if self.configuration is None else self.configuration.settings
+        if settings is None:
+            return self.supply(0).duration
+        return float(settings.duration_bounds[0] if settings.duration is None else settings.duration)
 
     def rehearse(self) -> None:
         """Compile all that trials need, before anyone waits for them."""

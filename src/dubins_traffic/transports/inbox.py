@@ -18,7 +18,7 @@ class Slot:
     """The latest command of one car, and what is counted of its peer.
 
     `tick` is the frame that it says it answers; `fresh` whether it came since the last frame was sent; `arrived` when,
-    monotonic seconds, None before the first. `gone_since` is set while a peer that was there is away. `peers` is how
+    monotonic seconds, None before the first, and `began` when the first did. `gone_since` is set while a peer that was there is away. `peers` is how
     many there were at most at a time, 0 where the transport does not know.
     """
 
@@ -27,6 +27,7 @@ class Slot:
     tick: int | None = None
     fresh: bool = False
     arrived: float | None = None
+    began: float | None = None
     gone_since: float | None = None
     fault: tuple[End, str] | None = None
     commands: int = 0
@@ -97,6 +98,7 @@ class Inbox:
                 slot.fault = (End.PEER_FLOOD, f"more than {self._flood} commands in a second")
             slot.speed, slot.yaw_rate, slot.tick = speed, yaw_rate, tick
             slot.fresh, slot.arrived = True, now
+            slot.began = now if slot.began is None else slot.began
             self.condition.notify_all()
 
     def fault(self, car: str, end: End, detail: str) -> None:

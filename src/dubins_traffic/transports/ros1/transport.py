@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from xmlrpc.client import Error as XmlRpcError
 
 from dubins_traffic.protocols import End, Ending, Mailbox, View
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.desk import Desk, Told
 from dubins_traffic.transports.ros1.messages import load
-from dubins_traffic.transports.ros1.node import Watch, abandon, join
+from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join
 from dubins_traffic.transports.ros1.world import Topics, World
 from dubins_traffic.transports.stamps import Stamps
 
@@ -42,6 +43,8 @@ class Ros1:
         Whether the cars are simulated here; else only labels are published, and what is the maestro's.
     rate : float
         How many model states a second are published in real time, at least.
+    foreign : ForeignMaestro, optional
+        Another process is the maestro, and this is told what that says.
     """
 
     name = "ros1"
@@ -56,11 +59,12 @@ class Ros1:
         clock: bool = False,
         simulated: bool = True,
         rate: float = 120.0,
+        foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
         self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
         self._stamps = Stamps(self.interval, clock=clock)
-        self._simulated_here = simulated
+        self._simulated_here, self._foreign = simulated, foreign
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
@@ -73,10 +77,17 @@ class Ros1:
 
     def open(self, mailbox: Mailbox) -> None:
         """Join the graph; TransportError or MissingRosError if that can't be."""
-        self._rospy = join(self._uri)
+        self._rospy = join(self._uri, NAME if self._foreign is None else REFEREE)
         self._mailbox = mailbox
         self._topics = Topics(self._rospy)
-        self._desk = Desk(self._rospy, mailbox, self._maestro, self._told, simulated=self._simulated_here)
+        self._desk = Desk(
+            self._rospy,
+            mailbox,
+            self._maestro,
+            self._told,
+            simulated=self._simulated_here,
+            foreign=self._foreign,
+        )
         self._watch = Watch(self._uri, self._look, self._lose)
         self._open = True
         self._rospy.core.add_preshutdown_hook(self._displaced)
