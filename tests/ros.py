@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +25,8 @@ from dubins_traffic.transports.ros1.messages import write_python
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM_PYTHON = "/usr/bin/python3"
+PATIENCE = 600.0
+"""Seconds after which a test gives up: more than anything takes on a busy machine."""
 
 
 def need_ros() -> None:
@@ -68,7 +72,7 @@ class Graph:
 
     def await_master(self) -> None:
         """Wait until there is a master."""
-        until = time.monotonic() + 20
+        until = time.monotonic() + PATIENCE
         while not answers(self.uri):
             assert time.monotonic() < until, "no master answers"
             time.sleep(0.05)
@@ -114,7 +118,7 @@ class Graph:
                 os.killpg(process.pid, signal.SIGTERM)
         for process in self.processes:
             try:
-                process.communicate(timeout=5)
+                process.communicate(timeout=30)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.communicate()
@@ -132,7 +136,23 @@ def graph(folder: Path, *, core: bool = True) -> Iterator[Graph]:
         made.close()
 
 
-def finish(process: subprocess.Popen[str], seconds: float = 90) -> tuple[int, str, str]:
+def read_until(process: subprocess.Popen[str], pattern: str) -> str:
+    """Return what a process has said on standard error when that fits; it fails if the process ends before."""
+    assert process.stderr is not None
+    said = ""
+    watchdog = threading.Timer(PATIENCE, process.kill)
+    watchdog.start()
+    try:
+        for line in process.stderr:
+            said += line
+            if re.search(pattern, line):
+                return said
+    finally:
+        watchdog.cancel()
+    raise AssertionError(f"it never said {pattern!r} but {said!r}")
+
+
+def finish(process: subprocess.Popen[str], seconds: float = PATIENCE) -> tuple[int, str, str]:
     """Wait for `process` and return its status, output and errors."""
     out, err = process.communicate(timeout=seconds)
     return process.returncode, out, err

@@ -31,8 +31,10 @@ out = rospy.Publisher("/gazebo/model_states", ModelStates, queue_size=10)
 trackers = [rospy.Publisher(f"/tracker/{name}", PoseStamped, queue_size=10) for name in names]
 for name in names:
     rospy.Subscriber(f"/{name}/mobile_base/commands/velocity", Twist, take, name)
-moving, step, shown = 0.0, 0.01, None
+moving, pause, shown = 0.0, 0.01, None
+before = time.monotonic()
 while not rospy.is_shutdown():
+    step, before = time.monotonic() - before, time.monotonic()
     with lock:
         for car in cars.values():
             car[0] += car[3] * math.cos(car[2]) * step
@@ -53,4 +55,4 @@ while not rospy.is_shutdown():
         out.publish(ModelStates(["ground_plane", *names], [Pose(), *shown], [Twist()] * (1 + len(names))))
     for tracker, pose in zip(trackers, poses, strict=True):
         tracker.publish(PoseStamped(pose=pose))
-    time.sleep(step)
+    time.sleep(pause)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.remote import hand_over
+from dubins_traffic.campaign.remote import Session, hand_over, run_remote
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.errors import InputError, TransportError
@@ -22,7 +22,8 @@ from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.lines_client import drive
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.observed import observation_from_document, observation_to_document
-from tests.conformance.transport import BRIEF, UntypedConformance, frames
+from tests.conformance.transport import BRIEF, UntypedConformance, answer, frames
+from tests.recordings import make_instance
 from tests.unit.test_bad_documents import base
 
 
@@ -96,6 +97,70 @@ def test_a_line_without_end_is_refused_in_bounded_memory() -> None:
             return
 
     assert TestLines().run(spill).ending.end is End.PEER_GARBAGE
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"[" * 60_000,
+        b'{"a":' * 10_000,
+        b'{"command": [' + b"9" * 400 + b', 0], "tick": 0}',
+        b'{"command": [' + b"9" * 5_000 + b', 0], "tick": 0}',
+        b'{"command": [0.1, 0.0], "tick": ' + b"7" * 5_000 + b"}",
+        b'{"command": ["\\ud800", 0], "tick": 0}',
+        b'{"command": [0.1], "tick": 0}',
+        b"\x00" * 60_000,
+        b"",
+    ],
+    ids=[
+        "deep",
+        "deep objects",
+        "huge",
+        "longer than Python reads",
+        "huge tick",
+        "text",
+        "short",
+        "zeros",
+        "nothing",
+    ],
+)
+def test_a_hostile_line_is_garbage_and_the_next_trial_goes_on(line: bytes) -> None:
+    instances = [replace(make_instance(names=(), ticks=10), trial=k) for k in range(2)]
+
+    def drive(peer: LinesPeer) -> None:
+        peer.problem()
+        peer.frame()
+        peer.socket.sendall(line + b"\n")
+        while peer.frame() is not None:
+            pass
+        answer()(peer)
+
+    with TestLines().link(Lockstep(30.0)) as link, ThreadPoolExecutor(1) as pool:
+        peer = LinesPeer(link.transport.address, "ego")
+        future = pool.submit(drive, peer)
+        ends = [result.ending.end for result in run_remote(Session(link, instances.__getitem__, 2))]
+        future.result(timeout=60)
+        peer.hang_up()
+    assert ends == [End.PEER_GARBAGE, End.DURATION]
+
+
+@pytest.mark.parametrize(
+    ("line", "end"),
+    [
+        (b'{"command": [NaN, 0], "tick": 0}', End.CONTROLLER_FAULT),
+        (b'{"command": [1e999, 0], "tick": 0}', End.CONTROLLER_FAULT),
+        (b'{"bye": "\\ud800 \\u001b[2J"}', End.GAVE_UP),
+    ],
+)
+def test_a_hostile_message_ends_its_trial_by_name(line: bytes, end: End, tmp_path: Path) -> None:
+    def drive(peer: LinesPeer) -> None:
+        peer.problem()
+        peer.frame()
+        peer.socket.sendall(line + b"\n")
+
+    result = TestLines().run(drive, record=tmp_path / "one.mcap")
+    assert result.ending.end is end
+    assert dt.load_record(tmp_path / "one.mcap").ending == result.ending
 
 
 def test_a_built_in_controller_gives_the_same_record_from_elsewhere(tmp_path: Path) -> None:

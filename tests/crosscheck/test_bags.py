@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.bag_reader import bag_to_record
+from dubins_traffic.campaign.bag_reader import bag_to_records
 from dubins_traffic.campaign.bags import trial_data_path, typestore, write_bag
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
@@ -144,9 +144,12 @@ def test_a_bag_becomes_a_record_and_a_bag_again_with_equal_contents(folder: Path
                 )
 
 
-def test_a_bag_made_elsewhere_at_its_own_rate(folder: Path, tmp_path: Path) -> None:
-    """Without our own topics, poses at 100 Hz, a ground plane among the models, and time that began long ago."""
-    store, path = typestore(), tmp_path / "other.bag"
+def elsewhere(folder: Path, path: Path, *trials: tuple[float, float, float]) -> None:
+    """Write a bag without our own topics: poses at 100 Hz, a ground plane among the models, and time long ago.
+
+    Of each trial: when the problem is told, when the empty one is (NaN: never), and when poses end, in seconds.
+    """
+    store = typestore()
     types = store.types
     zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     still = types["geometry_msgs/msg/Twist"](zero, zero)
@@ -154,29 +157,58 @@ def test_a_bag_made_elsewhere_at_its_own_rate(folder: Path, tmp_path: Path) -> N
     problem = next(
         m.problemjson for topic, _, m in messages(folder / "trial.bag") if topic.endswith("instance_JSON")
     )
-    begin = 1_463_000_000_000_000_000
+    begin = 1_463_000_000
     with rosbag1.Writer(path) as writer:
         kind = "integrator_chains_msgs/msg/ProblemInstanceJSON"
         told = writer.add_connection("/dubins_traffic_maestro/probleminstance_JSON", kind, typestore=store)
-        when = types["builtin_interfaces/msg/Time"](1_463_000_000, 0)
-        writer.write(told, begin, store.serialize_ros1(types[kind](when, problem), kind))
-        kind = "gazebo_msgs/msg/ModelStates"
-        states = writer.add_connection("/gazebo/model_states", kind, typestore=store)
-        for k in range(301):
-            point = types["geometry_msgs/msg/Point"](0.005 * k, 0.0, 0.0)
-            pose = types["geometry_msgs/msg/Pose"](point, turned)
-            away = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](3.0, 3.0, 0.0), turned)
-            message = types[kind](["ground_plane", "ego", "agent0"], [away, pose, away], [still] * 3)
-            writer.write(states, begin + k * 10_000_000, store.serialize_ros1(message, kind))
-    bag_to_record(path, tmp_path / "other.mcap")
+
+        def tell(seconds: float, text: str) -> None:
+            when = types["builtin_interfaces/msg/Time"](begin, 0)
+            data = store.serialize_ros1(types[kind](when, text), kind)
+            writer.write(told, begin * 10**9 + round(seconds * 1e9), data)
+
+        poses = "gazebo_msgs/msg/ModelStates"
+        states = writer.add_connection("/gazebo/model_states", poses, typestore=store)
+        for first, over, last in trials:
+            tell(first, problem)
+            for k in range(round(first * 100), round(last * 100) + 1):
+                point = types["geometry_msgs/msg/Point"](0.005 * k, 0.0, 0.0)
+                pose = types["geometry_msgs/msg/Pose"](point, turned)
+                away = types["geometry_msgs/msg/Pose"](
+                    types["geometry_msgs/msg/Point"](3.0, 3.0, 0.0), turned
+                )
+                message = types[poses](["ground_plane", "ego", "agent0"], [away, pose, away], [still] * 3)
+                writer.write(states, begin * 10**9 + k * 10_000_000, store.serialize_ros1(message, poses))
+            if not math.isnan(over):
+                tell(over, "")
+
+
+def test_a_bag_made_elsewhere_at_its_own_rate(folder: Path, tmp_path: Path) -> None:
+    elsewhere(folder, tmp_path / "other.bag", (0.0, math.nan, 3.0))
+    assert bag_to_records(tmp_path / "other.bag", tmp_path / "other.mcap") == [tmp_path / "other.mcap"]
     record = dt.load_record(tmp_path / "other.mcap")
     assert record.instance.names == ("ego", "agent0")
     assert len(record.frames) == 91
     assert record.frames.x[30, 0] == pytest.approx(0.5)
 
 
+def test_a_bag_of_several_trials_becomes_as_many_records_of_whole_seconds(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, out = tmp_path / "three.bag", tmp_path / "three.mcap"
+    elsewhere(folder, bag, (0.0, 14.985, 14.97), (16.0, 31.04, 31.04), (32.0, 39.5, 39.5))
+    assert main(["convert", str(bag), "-o", str(out)]) == 0
+    paths = [out, tmp_path / "three-1.mcap", tmp_path / "three-2.mcap"]
+    assert capsys.readouterr().out.split("\n") == ["3 trials, 3 records:", *map(str, paths), ""]
+    records = [dt.load_record(path) for path in paths]
+    assert [record.instance.duration for record in records] == [15.0, 15.0, 7.5]
+    assert [len(record.frames) for record in records] == [451, 451, 226]
+    assert [record.instance.trial for record in records] == [0, 1, 2]
+    assert records[1].frames.x[0, 0] == pytest.approx(8.0)
+
+
 def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "bad.bag"
     path.write_bytes(b"#ROSBAG V2.0\nnothing")
     with pytest.raises(InputError, match=r"bad\.bag"):
-        bag_to_record(path, tmp_path / "out.mcap")
+        bag_to_records(path, tmp_path / "out.mcap")

@@ -1,9 +1,11 @@
 """`dubins-traffic check-controller` on controllers with one fault each."""
 
 import json
+import os
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 from dubins_traffic.campaign import checkup
 from dubins_traffic.campaign.checkup import Checkup, check_controller
 from dubins_traffic.campaign.course import course
+from dubins_traffic.campaign.course_watch import Waited, see_off
 from dubins_traffic.cli.main import main
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
@@ -50,9 +53,18 @@ class Everything(Good):
 
 class Deadly(Good):
     def act(self, observation):
-        if observation.tick == 20:
-            os._exit(3)
+        if observation.tick == 50:
+            os._exit(7)
         return 0.3, 0.0
+
+class Killed(Good):
+    def start(self, problem):
+        os.kill(os.getpid(), 9)
+
+class Lingering(Good):
+    def close(self):
+        import threading
+        threading.Thread(target=time.sleep, args=(600,)).start()
 """
 
 
@@ -106,10 +118,47 @@ def test_what_differs_from_run_to_run_is_found(faulty: str, capsys: pytest.Captu
     assert out.count("FAILED") == 1
 
 
-def test_a_controller_that_kills_its_process(faulty: str) -> None:
+def test_a_controller_that_kills_its_process_in_mid_trial(faulty: str) -> None:
     found = check_controller(f"{faulty}:Deadly")
-    assert not verdicts(found)["survives odd instances"]
-    assert any("status 3" in finding.detail for finding in found.findings)
+    assert {name for name, passed in verdicts(found).items() if not passed} == {
+        "survives odd instances",
+        "answers in time",
+    }
+    details = {finding.check: finding.detail for finding in found.findings}
+    said = "two goals and two e-agents: died at tick 50: the process ended with status 7; 6 of 7 trials were not run"
+    assert details["survives odd instances"] == said
+    (drive,) = found.drives
+    assert (drive.end, drive.ticks) == ("died", 50)
+
+
+def test_a_controller_that_kills_its_process_in_start(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Killed")
+    assert not verdicts(found)["starts"]
+    assert "the process was ended by SIGKILL" in found.findings[0].detail
+
+
+def test_what_a_controller_leaves_behind_is_no_clean_end(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Lingering")
+    assert [finding.detail for finding in found.findings if not finding.passed] == [
+        "the process was still there after 5 s"
+    ]
+
+
+def test_a_process_that_waits_for_a_processor_is_not_late() -> None:
+    spin = [sys.executable, "-c", "while True: pass"]
+    crowd = [subprocess.Popen(spin) for _ in range(2 * len(os.sched_getaffinity(0)))]
+    slow = subprocess.Popen(["nice", "-n", "19", *spin])
+    try:
+        waited, began = Waited(slow.pid), time.monotonic()
+        while (elapsed := time.monotonic() - began) < 2.0:
+            time.sleep(0.05)
+        assert waited.seconds() < elapsed / 2
+        assert see_off(slow.pid, slow.poll, 0.05).startswith("the process was still there")
+    finally:
+        for process in (*crowd, slow):
+            process.kill()
+            process.wait()
+    assert see_off(slow.pid, slow.poll) == ""
 
 
 def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[str]) -> None:

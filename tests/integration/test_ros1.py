@@ -21,7 +21,7 @@ from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.record.sink import End
 from dubins_traffic.transports.ros1.master import pid_at
 from dubins_traffic.transports.ros1.messages import MD5, load
-from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros
+from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros, read_until
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
@@ -236,6 +236,41 @@ def test_a_master_that_is_killed_ends_the_session(tmp_path: Path) -> None:
     assert status == 2
     assert "master" in err
     assert ends(records) == {"trial-0000": End.TRANSPORT_LOST}
+
+
+@pytest.mark.parametrize("running", [True, False], ids=["in a trial", "between trials"])
+def test_a_session_whose_node_is_displaced_ends(ros: Graph, tmp_path: Path, running: bool) -> None:
+    records = tmp_path / "out"
+    session = ros.session(configuration(tmp_path, duration=600.0), "--records", records)
+    if running:
+        ros.client("drive")
+    read_until(session, "begins" if running else "waiting for READY")
+    while running and not list(records.glob("*.mcap")):
+        time.sleep(0.05)
+    code = "import rospy; rospy.init_node('dubins_traffic_maestro'); rospy.spin()"
+    ros.start([SYSTEM_PYTHON, "-c", code])
+    status, _, err = finish(session)
+    assert status == 2
+    assert "shut this node down" in err
+    assert "new node registered with same name" in err
+    assert ends(records) == ({"trial-0000": End.TRANSPORT_LOST} if running else {})
+
+
+def test_two_programs_that_drive_one_car_are_told_of_at_once_and_counted(ros: Graph, tmp_path: Path) -> None:
+    records = tmp_path / "out"
+    session = ros.session(configuration(tmp_path, number_trials=1), "--records", records)
+    code = (
+        "import rospy; from geometry_msgs.msg import Twist; rospy.init_node('other');"
+        "out = rospy.Publisher('/ego/mobile_base/commands/velocity', Twist, queue_size=1); rospy.spin()"
+    )
+    ros.start([SYSTEM_PYTHON, "-c", code])
+    client = ros.client("drive")
+    read_until(session, "2 programs send commands for ego at once")
+    assert not list(records.glob("*.wall.json"))
+    assert finish(client)[0] == 0
+    assert finish(session)[0] == 0
+    wall = json.loads((records / "trial-0000.wall.json").read_text())
+    assert wall["transport"]["drivers"]["ego"]["peers"] == 2
 
 
 def test_own_master_port_in_use_second_maestro_and_interruption(tmp_path: Path) -> None:

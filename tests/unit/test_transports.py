@@ -1,4 +1,5 @@
 import math
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
 
@@ -22,9 +23,11 @@ def maestro(phase: Phase) -> Maestro:
 @pytest.mark.parametrize(
     ("phase", "mode", "granted", "following"),
     [
-        (Phase.PREPARING, Mode.READY, False, None),
-        (Phase.PREPARING, Mode.START, False, None),
-        (Phase.PREPARING, Mode.RESET, False, None),
+        (Phase.PREPARING, Mode.READY, None, None),
+        (Phase.PREPARING, Mode.START, None, None),
+        (Phase.PREPARING, Mode.RESET, None, None),
+        (Phase.PREPARING, Mode.RESTART, None, None),
+        (Phase.PREPARING, 77, False, None),
         (Phase.READY, Mode.READY, True, None),
         (Phase.READY, Mode.START, True, Next.RUN),
         (Phase.READY, Mode.RESET, True, Next.DRAW),
@@ -36,10 +39,59 @@ def maestro(phase: Phase) -> Maestro:
         (Phase.RUNNING, Mode.RESTART, True, Next.REPEAT),
     ],
 )
-def test_what_the_maestro_grants(phase: Phase, mode: int, granted: bool, following: Next | None) -> None:
+def test_what_the_maestro_grants(
+    phase: Phase, mode: int, granted: bool | None, following: Next | None
+) -> None:
     asked = maestro(phase)
-    assert asked.request(mode) is granted
+    assert asked.answer(mode) is granted
     assert asked.next is following
+
+
+def test_between_two_instances_every_request_waits_for_the_next_one() -> None:
+    asked = maestro(Phase.RUNNING)
+    assert asked.request(Mode.RESET)
+    assert [asked.answer(mode) for mode in (Mode.READY, Mode.START)] == [None, None]
+    with ThreadPoolExecutor(2) as pool:
+        ready = pool.submit(asked.request, Mode.READY)
+        asked.enter(Phase.PREPARING)
+        start = pool.submit(lambda: (ready.result(), asked.request(Mode.START)))
+        assert asked.next is Next.DRAW
+        assert not wait([ready], 0.1).done
+        asked.enter(Phase.READY)
+        assert start.result(60) == (True, True)
+    assert asked.next is Next.RUN
+
+
+def test_who_waits_for_an_instance_is_refused_when_the_session_is_over() -> None:
+    asked = maestro(Phase.PREPARING)
+    with ThreadPoolExecutor(1) as pool:
+        held = pool.submit(asked.request, Mode.START)
+        assert not wait([held], 0.1).done
+        asked.close()
+        assert held.result(60) is False
+    assert asked.request(Mode.READY) is False
+
+
+def test_a_reset_right_after_start_waits_for_the_trial_it_ends() -> None:
+    asked = maestro(Phase.READY)
+    assert asked.request(Mode.START)
+    assert asked.answer(Mode.RESET) is None
+    asked.enter(Phase.RUNNING)
+    assert asked.answer(Mode.RESET) is True
+
+
+def test_two_programs_for_one_car_are_told_and_counted() -> None:
+    inbox, told = Inbox(flood=50), list[str]()
+    inbox.warn = told.append
+    inbox.expect(["ego"])
+    inbox.joined("ego")
+    assert not told
+    inbox.joined("ego")
+    assert told == ["2 programs send commands for ego at once: the latest command counts"]
+    inbox.left("ego")
+    assert (inbox.slot("ego").peers, inbox.slot("ego").gone_since) == (2, None)
+    inbox.expect(["ego"])
+    assert inbox.slot("ego").peers == 1
 
 
 def test_a_start_is_granted_once() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -28,6 +29,8 @@ from dubins_traffic.trial.buffer import FrameBuffer
 
 SLACK = 1_000
 """Nanoseconds by which a message may be later than the frame it belongs to."""
+WHOLE = 0.1
+"""Seconds by which a trial of 2016, of whole seconds, may seem longer or shorter in a bag, or outlast its poses."""
 MAGIC = b"#ROSBAG V2.0"
 Sample = tuple[float, ...]
 
@@ -49,18 +52,39 @@ class _Track:
         k = int(np.searchsorted(self.times, time + SLACK, side="right")) - 1
         return self.samples[k] if k >= 0 else None
 
+    def until(self, time: int) -> int:
+        """Return the time of the latest sample at `time`; that of the first if there is none."""
+        return self.times[max(0, int(np.searchsorted(self.times, time, side="right")) - 1)]
+
+
+@dataclass(slots=True)
+class _Run:
+    """One trial in a bag: when its problem was told and with which text; when it was over, and what ours say of it."""
+
+    began: int
+    text: str
+    over: int | None = None
+    instance: str | None = None
+    notes: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+
 
 @dataclass(slots=True)
 class _Bag:
-    """What is read of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; texts."""
+    """What is read of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; trials; texts."""
 
     poses: dict[str, _Track] = field(default_factory=dict[str, _Track])
     twists: dict[str, _Track] = field(default_factory=dict[str, _Track])
     commands: dict[str, _Track] = field(default_factory=dict[str, _Track])
-    problem: tuple[int, str] | None = None
-    over: int | None = None
-    instance: str | None = None
-    notes: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    runs: list[_Run] = field(default_factory=list[_Run])
+    instances: list[tuple[int, str]] = field(default_factory=list[tuple[int, str]])
+    notes: list[tuple[int, str]] = field(default_factory=list[tuple[int, str]])
+
+    def assign(self) -> None:
+        """Give each trial what ours say of it: messages of one time come in any order."""
+        for run, following in zip(self.runs, [*self.runs[1:], None], strict=True):
+            end = math.inf if following is None else following.began
+            run.instance = next((text for time, text in self.instances if run.began <= time < end), None)
+            run.notes = [json.loads(text) for time, text in self.notes if run.began <= time < end]
 
 
 def is_bag(path: Path | str) -> bool:
@@ -72,33 +96,44 @@ def is_bag(path: Path | str) -> bool:
         return False
 
 
-def bag_to_record(path: Path | str, output: Path | str, *, overwrite: bool = False) -> None:
-    """Write the first trial in the bag at `path` as a record.
+def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = False) -> list[Path]:
+    """Write each trial in the bag at `path` as a record, the first to `output`, others to ``-1``, ``-2``, ... of it.
 
-    The trial begins with the problem instance and ends with the empty one, or with the last poses. Frames are taken at
+    A trial begins with the problem instance and ends with the empty one, or with the last poses. Frames are taken at
     the control rate, each the latest poses at its time. A bag made elsewhere has no contacts and says nothing of
-    cars and bounds: those are the usual ones, and the e-agents are remote.
+    cars and bounds: those are the usual ones, the e-agents are remote, and a duration within 0.1 s of whole seconds is
+    taken for them, as all durations of 2016 are.
+
+    Returns
+    -------
+    list of Path
+        The records.
 
     Raises
     ------
     MissingExtraError
         Without the extra `ros1`.
     InputError
-        If the file is no bag, lacks poses or a problem instance, or the record can't be written.
+        If the file is no bag, lacks poses or a problem instance, or a record can't be written.
     """
-    name = str(path)
+    name, output = str(path), Path(output)
     bag = _read(Path(path))
-    if bag.problem is None:
+    if not bag.runs:
         raise InputError("no problem instance", file=name, expected=f"a message on {PROBLEM}")
     if "ego" not in bag.poses:
         raise InputError("no poses of the ego", file=name, expected=f"messages on {STATES}")
-    instance = _instance(bag, name)
-    controller = next((note["controller"] for note in bag.notes if "controller" in note), None)
-    writer = RecordWriter(output, controller=controller, overwrite=overwrite)
-    try:
-        _replay(bag, instance, writer)
-    finally:
-        writer.close()
+    written: list[Path] = []
+    for number, run in enumerate(bag.runs):
+        instance = _instance(bag, run, number, name)
+        controller = next((note["controller"] for note in run.notes if "controller" in note), None)
+        record = output.with_stem(f"{output.stem}-{number}") if number else output
+        writer = RecordWriter(record, controller=controller, overwrite=overwrite)
+        try:
+            _replay(bag, run, instance, writer)
+        finally:
+            writer.close()
+        written.append(record)
+    return written
 
 
 def _read(path: Path) -> _Bag:
@@ -115,6 +150,7 @@ def _read(path: Path) -> _Bag:
         raise InputError(
             f"can't be read as a bag: {error}", file=str(path), expected="a ROS 1 bag"
         ) from error
+    bag.assign()
     return bag
 
 
@@ -130,14 +166,11 @@ def _take(bag: _Bag, topic: str, time: int, message: Any) -> None:
             sample = (pose.position.x, pose.position.y, c, s, speed, twist.angular.z)
             bag.poses.setdefault(name, _Track()).add(time, sample)
     elif topic == PROBLEM:
-        if message.problemjson and bag.problem is None:
-            bag.problem = time, message.problemjson
-        elif not message.problemjson and bag.problem is not None and bag.over is None:
-            bag.over = time
+        _take_problem(bag, time, message.problemjson)
     elif topic == INSTANCE:
-        bag.instance = bag.instance or message.problemjson
+        bag.instances.append((time, message.problemjson))
     elif topic == NOTES:
-        bag.notes.append(json.loads(message.data))
+        bag.notes.append((time, message.data))
     elif topic.startswith(_BEFORE) and topic.endswith(_AFTER):
         name = topic[len(_BEFORE) : -len(_AFTER)]
         bag.commands.setdefault(name, _Track()).add(time, (message.linear.x, message.angular.z))
@@ -147,38 +180,57 @@ def _take(bag: _Bag, topic: str, time: int, message: Any) -> None:
         bag.twists.setdefault(name, _Track()).add(time, (twist.linear.x, twist.angular.z))
 
 
-def _instance(bag: _Bag, file: str) -> Instance:
+def _take_problem(bag: _Bag, time: int, text: str) -> None:
+    """Begin a trial, or end one; what is latched may be told twice."""
+    running = bag.runs[-1] if bag.runs and bag.runs[-1].over is None else None
+    if running is not None and text != running.text:
+        running.over, running = time, None
+    if running is None and text:
+        bag.runs.append(_Run(time, text))
+
+
+def _instance(bag: _Bag, run: _Run, number: int, file: str) -> Instance:
     """Return the instance: the whole one of a bag of ours, else the problem with cars where they began."""
-    assert bag.problem is not None
-    began, text = bag.problem
-    if bag.instance is not None:
-        return instance_from_document(parse_json(bag.instance, file), file)
+    if run.instance is not None:
+        return instance_from_document(parse_json(run.instance, file), file)
     others = [
         name for name in bag.poses if name != "ego" and (name in bag.twists or name.startswith("agent"))
     ]
-    document = parse_json(text, file)
+    document = parse_json(run.text, file)
     alone = instance_from_document({**document, "version": 1, "duration": 1.0, "e-agents": []}, file)
-    starts = [bag.poses[name].at(began) or bag.poses[name].samples[0] for name in ("ego", *others)]
-    last = bag.over if bag.over is not None else bag.poses["ego"].times[-1]
-    ticks = max(1, int((last - began + SLACK) * 1e-9 * alone.problem.rate))
+    starts = [bag.poses[name].at(run.began) or bag.poses[name].samples[0] for name in ("ego", *others)]
+    last = run.over if run.over is not None else bag.poses["ego"].times[-1]
     return replace(
         alone,
         problem=replace(alone.problem, e_agents=tuple(others)),
         starts=tuple(Pose(*start[:4]) for start in starts),
-        duration=ticks / alone.problem.rate,
+        duration=_duration((last - run.began) * 1e-9, alone.problem.rate),
         e_agents=tuple(EAgent(REMOTE, name, REMOTE) for name in others),
+        trial=number,
     )
 
 
-def _replay(bag: _Bag, instance: Instance, sink: Sink) -> None:
+def _duration(seconds: float, rate: float) -> float:
+    """Return the duration of a trial that took so long in a bag."""
+    whole = round(seconds)
+    if whole > 0 and abs(seconds - whole) <= WHOLE:
+        return float(whole)
+    return max(1, int((seconds + SLACK * 1e-9) * rate)) / rate
+
+
+def _replay(bag: _Bag, run: _Run, instance: Instance, sink: Sink) -> None:
     """Label the frames as a trial does and push them."""
-    assert bag.problem is not None
-    began, rate = bag.problem[0], instance.problem.rate
-    last = min(track.times[-1] for name, track in bag.poses.items() if name in instance.names)
-    over = last if bag.over is None else min(last, bag.over)
-    ticks = min(instance.ticks, int((over - began + SLACK) * 1e-9 * rate + 1e-6))
+    began, rate = run.began, instance.problem.rate
+    over = math.inf if run.over is None else run.over
+    last = min(
+        track.times[-1] if run.over is None else track.until(run.over)
+        for name, track in bag.poses.items()
+        if name in instance.names
+    )
+    end = min(last, over) if run.instance is not None else last + WHOLE * 1e9
+    ticks = min(instance.ticks, int((end - began + SLACK) * 1e-9 * rate + 1e-6))
     times = [began + round(tick * 1e9 / rate) for tick in range(ticks + 1)]
-    contacts, events, ending = _notes(bag, ticks)
+    contacts, events, ending = _notes(run, ticks)
     labeller, buffer = Labeller([instance]), FrameBuffer(instance, [sink])
     state = _state(bag, instance, times[0])
     labels = labeller.reset(state)
@@ -217,12 +269,12 @@ def _commands(bag: _Bag, instance: Instance, time: int, state: State) -> np.ndar
 
 
 def _notes(
-    bag: _Bag, ticks: int
+    run: _Run, ticks: int
 ) -> tuple[Mapping[int, tuple[Contact, ...]], Mapping[int, tuple[Event, ...]], Ending]:
     contacts: dict[int, tuple[Contact, ...]] = {}
     events: dict[int, tuple[Event, ...]] = {}
     ending = Ending(End.DURATION, ticks)
-    for note in bag.notes:
+    for note in run.notes:
         if "contact" in note:
             given: dict[str, Any] = dict(note["contact"])
             given.update({name: tuple(given[name]) for name in ("closing", "moved", "at_fault")})

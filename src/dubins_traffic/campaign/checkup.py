@@ -121,7 +121,7 @@ def _survives(run: Pass) -> Finding:
     whole = len(course())
     missing = whole - len(run.drives)
     if missing:
-        failed.append(f"{missing} of {whole} trials were not run: {run.lost}")
+        failed.append(f"{missing} of {whole} trials were not run" + (f": {run.lost}" if not failed else ""))
     return Finding("survives odd instances", not failed, "; ".join(failed) or f"all {whole} to their end")
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from threading import Event, Thread
 
 from dubins_traffic.campaign.course import course
-from dubins_traffic.campaign.course_run import DEADLINE, ERRORS, FAREWELL, PATIENCE, Drive, Pass, driven
+from dubins_traffic.campaign.course_run import DEADLINE, ERRORS, PATIENCE, Drive, Pass, driven
+from dubins_traffic.campaign.course_watch import Waited, ended, see_off
 from dubins_traffic.campaign.remote import Session, run_remote
 from dubins_traffic.campaign.ros2 import make_transport
 from dubins_traffic.errors import InputError, TransportError
@@ -102,13 +103,14 @@ class _Watch:
 
     def __init__(self, program: subprocess.Popen[bytes], inbox: Inbox) -> None:
         self._program, self._inbox = program, inbox
-        self._over, self._left = Event(), PATIENCE
+        self._over = Event()
+        self.proceed()
         self._thread = Thread(target=self._look, name="watch", daemon=True)
         self._thread.start()
 
     def proceed(self) -> None:
         """A trial has ended: the program has its time again."""
-        self._left = PATIENCE
+        self._waited = Waited(self._program.pid)
 
     def end(self) -> None:
         """Look no longer."""
@@ -116,12 +118,10 @@ class _Watch:
         self._thread.join()
 
     def _look(self) -> None:
-        step = 0.1
-        while not self._over.wait(step):
-            self._left -= step
+        while not self._over.wait(0.1):
             if self._program.poll() is not None:
-                self._inbox.stop(End.PEER_LOST, f"the program ended with status {self._program.returncode}")
-            elif self._left <= 0.0:
+                self._inbox.stop(End.PEER_LOST, f"the program {ended(self._program.returncode)}")
+            elif self._waited.seconds() > PATIENCE:
                 self._inbox.stop(End.PEER_SILENT, f"no trial began or ended within {PATIENCE:g} s")
 
 
@@ -145,12 +145,10 @@ def _dismiss(program: subprocess.Popen[bytes]) -> str:
     """End the program as Ctrl-C does, and say what was wrong with its end."""
     early = program.poll()
     if early is not None:
-        return f"the program had ended with status {early}"
+        return f"the program {ended(early)} before it was told to"
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         os.killpg(program.pid, number)
-        try:
-            program.wait(FAREWELL)
-        except subprocess.TimeoutExpired:
+        if see_off(program.pid, program.poll):
             continue
         return "" if number == signal.SIGINT else f"the program took {number.name} to end"
     return "the program could not be ended"

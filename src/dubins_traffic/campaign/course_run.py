@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import monotonic, perf_counter, sleep
+from time import perf_counter, sleep
 
 from dubins_traffic.campaign.course import course
+from dubins_traffic.campaign.course_watch import Place, Waited, ended, see_off
 from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry as controllers
@@ -26,8 +30,10 @@ REHEARSAL = 0.2
 """Simulated seconds that are driven once before the course."""
 PATIENCE = 60.0
 """Seconds for everything else: to load, to learn a problem, to drive the rest of a trial."""
-FAREWELL = 5.0
-"""Seconds in which a program that is no longer needed must end."""
+COMPILING = 3600.0
+"""Seconds to load and to compile all that is compiled on a first run."""
+DIED = "died"
+"""The end of a trial whose process ended in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +69,30 @@ def driven(name: str, result: Result, answers: list[float], commands: list[tuple
 
 
 class Witness:
-    """Passes on to a controller and notes what it answers."""
+    """Passes on to a controller and notes what it answers.
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
+    Parameters
+    ----------
+    controller : Controller
+        Who is asked.
+    mark : callable
+        Is told the time to begin (seconds) once the controller has started, and the tick before each answer.
+    """
+
+    def __init__(self, controller: Controller, mark: Callable[[float, int], None]) -> None:
+        self._controller, self._mark = controller, mark
         self.answers: list[float] = []
         self.commands: list[tuple[float, float]] = []
 
     def start(self, problem: Problem) -> None:
         """Pass on."""
+        began = perf_counter()
         self._controller.start(problem)
+        self._begin = perf_counter() - began
 
     def act(self, observation: Observation) -> Command | tuple[float, float] | None:
         """Pass on and note."""
+        self._mark(self._begin, observation.tick)
         began = perf_counter()
         command = self._controller.act(observation)
         self.answers.append(perf_counter() - began)
@@ -100,53 +117,61 @@ def run_here(controller: str, number: int) -> Pass:
         Of the pass.
     """
     with TemporaryDirectory() as folder:
-        out = Path(folder) / "drives"
+        out, place = Path(folder) / "drives", Path(folder) / "place"
         out.touch()
-        command = [sys.executable, "-m", __spec__.name, controller, str(out)]
-        environment = {**os.environ, "PYTHONHASHSEED": str(number)}
-        with subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=ERRORS) as child:
-            try:
-                lost = _await(child, out)
-            finally:
-                farewell = _see_off(child)
-        drives = [Drive(**json.loads(line)) for line in out.read_text(encoding="utf-8").splitlines()]
-    if len(drives) < len(course()):
-        return Pass(drives, lost=lost or farewell or "the process ended before the course")
-    return Pass(drives, farewell)
+        with Place.made(place) as reached:
+            command = [sys.executable, "-m", __spec__.name, controller, str(out), str(place)]
+            environment = {**os.environ, "PYTHONHASHSEED": str(number)}
+            with subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=ERRORS) as child:
+                try:
+                    lost = _await(child, out, reached)
+                finally:
+                    farewell = see_off(child.pid, child.poll)
+                    if farewell:
+                        child.kill()
+                    status = child.wait()
+            drives = [Drive(**json.loads(line)) for line in out.read_text(encoding="utf-8").splitlines()]
+            if len(drives) == len(course()):
+                return Pass(drives, farewell or ("" if status == 0 else f"the process {ended(status)}"))
+            lost = lost or f"the process {ended(status)}"
+            died = None if reached.trial != len(drives) else _died(reached, lost)
+    return Pass([*drives, died] if died is not None else drives, lost=lost)
 
 
-def _await(child: subprocess.Popen[bytes], out: Path) -> str:
-    """Wait until all drives are written or the child has ended; return what went wrong."""
+def _died(reached: Place, lost: str) -> Drive:
+    """Return the trial in which the process died."""
+    name, tick = list(course())[reached.trial], reached.tick
+    where = "before its first answer" if tick < 0 else f"at tick {tick}"
+    begin = reached.begin if tick >= 0 else None
+    return Drive(name, DIED, f"{where}: {lost}", max(0, tick), begin, [], [])
+
+
+def _await(child: subprocess.Popen[bytes], out: Path, reached: Place) -> str:
+    """Wait until all drives are written or the child has ended; return what went wrong.
+
+    As long as trials go on, nobody is hurried; before the first, the kernels are compiled.
+    """
     whole = len(course())
-    done, since = 0, monotonic() + PATIENCE  # a first run compiles for long
-    while child.poll() is None and done < whole:
+    waited, seen = Waited(child.pid), (0, -1, -1)
+    while child.poll() is None and seen[0] < whole:
         sleep(0.05)
-        now = len(out.read_bytes().splitlines())
-        if now > done:
-            done, since = now, monotonic()
-        if monotonic() - since > PATIENCE:
-            return f"nothing more after {PATIENCE:g} s"
+        now = (len(out.read_bytes().splitlines()), reached.trial, reached.tick)
+        if now != seen:
+            waited, seen = Waited(child.pid), now
+        if waited.seconds() > (PATIENCE if seen[1] >= 0 else COMPILING):
+            child.kill()
+            return f"was ended: nothing more after {PATIENCE:g} s"
     return ""
 
 
-def _see_off(child: subprocess.Popen[bytes]) -> str:
-    """Wait for the end of a process that is no longer needed, and say what was wrong with it."""
-    try:
-        status = child.wait(FAREWELL)
-    except subprocess.TimeoutExpired:
-        child.kill()
-        child.wait()
-        return f"the process was still there after {FAREWELL:g} s"
-    return "" if status == 0 else f"the process ended with status {status}"
-
-
-def _main(controller: str, out: str) -> None:
+def _main(controller: str, out: str, place: str) -> None:
     instances = course()
     rehearsal = replace(next(iter(instances.values())), duration=REHEARSAL)
     run_trial(rehearsal, controllers.load(controller))  # what is compiled on a first run is not measured
-    with Path(out).open("a", encoding="utf-8") as file:
-        for name, instance in instances.items():
-            witness = Witness(controllers.load(controller))
+    with Place.opened(Path(place)) as reached, Path(out).open("a", encoding="utf-8") as file:
+        for number, (name, instance) in enumerate(instances.items()):
+            reached.put(number, math.nan, -1)
+            witness = Witness(controllers.load(controller), partial(reached.put, number))
             result = run_trial(instance, witness, deadline=DEADLINE)
             drive = driven(name, result, witness.answers, witness.commands)
             file.write(json.dumps(asdict(drive)) + "\n")

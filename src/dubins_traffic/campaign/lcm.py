@@ -36,4 +36,6 @@ def run_over_lcm(
         If the URL is none of LCM, or an instance can't be drawn.
     """
     maestro = Maestro() if wait else None
-    yield from programme.run(Lcm(url, maestro), pace, maestro)
+    transport = Lcm(url, maestro)
+    programme.rehearse()
+    yield from programme.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

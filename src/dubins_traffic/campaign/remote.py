@@ -16,6 +16,10 @@ from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro, Next, Phase
 
 
+def quiet(_line: str) -> None:
+    """Say nothing."""
+
+
 @dataclass(frozen=True, slots=True)
 class Session:
     """What is run over a transport.
@@ -38,6 +42,8 @@ class Session:
         Instead of the one that instances name.
     records : Path, optional
         Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
+    say : callable
+        Is told, in lines for people, what the session does and waits for.
     """
 
     link: Link
@@ -48,6 +54,11 @@ class Session:
     remote: tuple[str, ...] = ()
     records: Path | None = None
     simulator: Simulator | None = None
+    say: Callable[[str], None] = quiet
+
+    def which(self, instance: Instance, done: int) -> str:
+        """Return the words for the trial of `instance`, which follows `done` others."""
+        return f"trial {instance.trial}" + ("" if self.trials is None else f" ({done + 1} of {self.trials})")
 
 
 def run_remote(session: Session) -> Iterator[Result]:
@@ -62,30 +73,51 @@ def run_remote(session: Session) -> Iterator[Result]:
     InputError
         If an instance has no e-agent of a name in `remote`.
     """
+    maestro = session.maestro
+    session.link.inbox.warn = session.say
+    try:
+        if maestro is not None:
+            session.link.mark = lambda running: maestro.enter(Phase.RUNNING if running else Phase.PREPARING)
+        yield from _trials(session)
+    finally:
+        if maestro is not None:
+            maestro.close()
+
+
+def _trials(session: Session) -> Iterator[Result]:
+    """Run one trial after another."""
     done = number = repetition = 0
     instance: Instance | None = None
     while session.trials is None or done < session.trials:
         if instance is None:
             instance = hand_over(session.supply(number), session.remote)
-        asked, instance = _await_start(session, instance)
+        which = session.which(instance, done)
+        asked, instance = _await_start(session, instance, which)
         if asked is Next.DRAW:
             instance, number, repetition = None, number + 1, 0
             continue
+        ego = "; the first command of ego is waited for" if session.link.ego else ""
+        session.say(f"{which}: begins{ego}")
         yield run_trial(
             instance,
             session.controller,
-            record=_record(session.records, number, repetition),
+            record=record_path(session.records, number, repetition),
             overwrite=True,
             link=session.link,
             simulator=session.simulator,
         )
-        lost = session.link.inbox.stopped
-        if lost is not None and lost[0] is End.TRANSPORT_LOST:
-            raise TransportError(lost[1])
+        check_lost(session.link)
         if session.maestro is not None and session.maestro.next is Next.REPEAT:
             repetition += 1
         else:
             done, instance, number, repetition = done + 1, None, number + 1, 0
+
+
+def check_lost(link: Link) -> None:
+    """Raise TransportError if the transport has been lost."""
+    lost = link.inbox.stopped
+    if lost is not None and lost[0] is End.TRANSPORT_LOST:
+        raise TransportError(lost[1])
 
 
 def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
@@ -109,7 +141,7 @@ def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
     return replace(instance, e_agents=agents)
 
 
-def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
+def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next, Instance]:
     """Show the world until someone starts it or wants another one; return it with its cars where they were put."""
     maestro, link = session.maestro, session.link
     if maestro is None:
@@ -122,26 +154,25 @@ def _await_start(session: Session, instance: Instance) -> tuple[Next, Instance]:
         while True:
             with Trial(instance, simulator=session.simulator, link=link):
                 if maestro.phase is Phase.PREPARING:
+                    session.say(f"{which}: waiting for READY and START from the program that drives ego")
                     maestro.enter(Phase.READY)
                 link.idle(lambda: maestro.next is not None or inbox.news)
+            instance = placed(instance, inbox.placed())
             if maestro.next is not None:
                 break
-            instance = _placed(instance, inbox.placed())
     except PeerError as error:
         raise TransportError(error.detail) from error
-    if maestro.next is Next.RUN:
-        maestro.enter(Phase.RUNNING)
-        return Next.RUN, instance
     return maestro.next, instance
 
 
-def _placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
+def placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
     """Return `instance` with cars at other starts."""
     old = zip(instance.names, instance.starts, strict=True)
     return replace(instance, starts=tuple(places.get(name, start) for name, start in old))
 
 
-def _record(folder: Path | None, number: int, repetition: int) -> Path | None:
+def record_path(folder: Path | None, number: int, repetition: int) -> Path | None:
+    """Return where the record of an instance's trial stands, None where none is wanted."""
     if folder is None:
         return None
     suffix = f"-{repetition}" if repetition else ""

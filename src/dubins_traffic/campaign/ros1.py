@@ -8,9 +8,10 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
-from dubins_traffic.campaign.sessions import Pace, Programme, moved_by, rehearse
+from dubins_traffic.campaign.sessions import Pace, Programme, moved_by
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import InputError
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.desk import Told
 from dubins_traffic.transports.ros1.external import NAME as WORLD
@@ -30,6 +31,7 @@ def run_over_ros1(
     clock: bool = False,
     world: bool = False,
     poses: str | None = None,
+    elsewhere: bool = False,
 ) -> Iterator[Result]:
     """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
 
@@ -47,6 +49,8 @@ def run_over_ros1(
         Whether the cars are not simulated here but somewhere in the graph, in real time.
     poses : str, optional
         Of such a world: the topic of each car's pose, ``{}`` in place of its name.
+    elsewhere : bool
+        Whether another process is the maestro, such as that of 2016: it tells problems, and starts and ends trials.
 
     Raises
     ------
@@ -60,9 +64,13 @@ def run_over_ros1(
     if world and (pace.lockstep or clock or pace.factor != 1.0):
         expected = "neither --lockstep nor --clock nor --factor"
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
+    if elsewhere and (pace.lockstep or pace.factor != 1.0):
+        expected = "neither --lockstep nor --factor"
+        raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
     ego = programme.controller is None
-    maestro = Maestro() if ego else None
-    rehearse(programme.supply(0))
+    maestro = Maestro() if ego and not elsewhere else None
+    foreign = ForeignMaestro() if elsewhere else None
+    programme.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master is not None:
@@ -70,13 +78,17 @@ def run_over_ros1(
             stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
             uri = started.uri
+        programme.say(f"ROS master at {uri}")
         stack.callback(leave)
-        transport = Ros1(uri, maestro=maestro, told=_told(programme), clock=clock, simulated=not world)
+        transport = Ros1(
+            uri, maestro=maestro, told=_told(programme), clock=clock, simulated=not world, foreign=foreign
+        )
         if not world:
-            yield from programme.run(transport, pace, maestro)
+            yield from programme.run(transport, pace, maestro, foreign=foreign)
             return
         programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
-        yield from programme.run(transport, pace, maestro, partial(_elsewhere, transport, ego, poses))
+        make = partial(_elsewhere, transport, ego, poses)
+        yield from programme.run(transport, pace, maestro, make, foreign=foreign)
 
 
 def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:

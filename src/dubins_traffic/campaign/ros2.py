@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.sessions import Pace, Programme
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.protocols import Transport
 from dubins_traffic.transports.maestro import Maestro
+
+if TYPE_CHECKING:
+    from dubins_traffic.transports.ros2.transport import Ros2
 
 
 def make_transport(
     domain: int | None, maestro: Maestro | None, *, here: bool = True, clock: bool = False
-) -> Transport:
+) -> Ros2:
     """Return the transport.
 
     Raises
@@ -61,4 +64,7 @@ def run_over_ros2(
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
     maestro = Maestro() if programme.controller is None else None
-    yield from programme.run(make_transport(domain, maestro, here=here, clock=clock), pace, maestro)
+    transport = make_transport(domain, maestro, here=here, clock=clock)
+    programme.rehearse()
+    where = f"DDS domain {transport.domain}{', within this machine' if here else ''}"
+    yield from programme.run(transport, pace, maestro, at=lambda: where)

@@ -8,26 +8,31 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 
+from dubins_traffic.campaign.foreign import run_under
 from dubins_traffic.campaign.plan import check_data_file, check_folder, check_simulator
-from dubins_traffic.campaign.remote import Session, hand_over, run_remote
+from dubins_traffic.campaign.remote import Session, hand_over, quiet, run_remote
 from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.campaign.sources import load
+from dubins_traffic.cars.state import State
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.scripted import Scripted
+from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Laser
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.problem.trial_data import TrialData
-from dubins_traffic.protocols import Clock, Simulator, Transport
+from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.link import Link, Patience
 from dubins_traffic.transports.maestro import Maestro
 
@@ -75,7 +80,7 @@ class Programme:
     """What a session runs: where its instances come from, how many trials, and where things are written.
 
     `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
-    the ego drives under the shield.
+    the ego drives under the shield. `say` is told, in lines for people, what the session does and waits for.
     """
 
     supply: Callable[[int], Instance]
@@ -86,6 +91,7 @@ class Programme:
     records: Path | None
     data: Path | None
     shield: bool = False
+    say: Callable[[str], None] = quiet
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def run(
@@ -94,13 +100,25 @@ class Programme:
         pace: Pace,
         maestro: Maestro | None,
         world: Callable[[], Simulator] | None = None,
+        at: Callable[[], str] | None = None,
+        foreign: ForeignMaestro | None = None,
     ) -> Iterator[Result]:
         """Run it over `transport`, which is closed however that ends; see `remote.run_remote`.
 
-        `world` makes the simulator, instead of the one that instances name, once the transport is open.
+        Once the transport is open, `world` makes the simulator, instead of the one that instances name, and `at`
+        returns a line for people that says where the transport is. `foreign` starts and ends the trials if it is given,
+        see `foreign.run_under`.
         """
         try:
-            link = Link(transport, pace.clock(), ego=self.controller is None, patience=pace.patience)
+            link = Link(
+                transport,
+                pace.clock(),
+                ego=self.controller is None,
+                patience=pace.patience,
+                at_once=foreign is not None,
+            )
+            if at is not None:
+                self.say(at())
             session = Session(
                 link,
                 self.supply,
@@ -110,10 +128,29 @@ class Programme:
                 self.remote,
                 self.records,
                 None if world is None else world(),
+                self.say,
             )
-            yield from run_remote(session)
+            if foreign is None:
+                yield from run_remote(session)
+            else:
+                yield from run_under(session, foreign, self.shortest)
         finally:
             transport.close()
+
+    @property
+    def shortest(self) -> float:
+        """The shortest duration that a trial may have, seconds."""
+        settings = None if self.configuration is None else self.configuration.settings
+        if settings is None:
+            return self.supply(0).duration
+        return float(settings.duration_bounds[0] if settings.duration is None else settings.duration)
+
+    def rehearse(self) -> None:
+        """Compile all that trials need, before anyone waits for them."""
+        self.say("compiling what trials need; the first time on a machine takes minutes")
+        began = monotonic()
+        rehearse(self.supply(0), shield=self.shield)
+        self.say(f"compiled, after {monotonic() - began:.1f} s")
 
     def conclude(self, results: Sequence[Result]) -> ScoreSheet:
         """Return the scores, and write the trial data file if one was asked for."""
@@ -204,8 +241,11 @@ def programme(
     )
 
 
-def rehearse(instance: Instance) -> None:
-    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts."""
+def rehearse(instance: Instance, *, shield: bool = False) -> None:
+    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts.
+
+    The ego drives under the shield if `shield`, and every laser sweeps once, as when someone listens to it.
+    """
     agents = tuple(
         replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
         if agent.kind == REMOTE
@@ -213,7 +253,10 @@ def rehearse(instance: Instance) -> None:
         for agent in instance.e_agents
     )
     brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
-    run_trial(brief, Scripted(np.zeros((brief.ticks, 2))))
+    nobody: Controller = Scripted(np.zeros((brief.ticks, 2)))
+    run_trial(brief, controllers.under_shield(nobody) if shield else nobody)
+    state = State.zeros(1, len(brief.starts))
+    Senses(brief, laser=brief.problem.laser or Laser()).sweep(state)
 
 
 def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> Instance:

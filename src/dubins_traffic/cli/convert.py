@@ -47,10 +47,10 @@ def convert(
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
-    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of a log another one (`-1.mcap`,
+    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
     ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
-    from dubins_traffic.campaign.bag_reader import bag_to_record, is_bag
+    from dubins_traffic.campaign.bag_reader import bag_to_records, is_bag
     from dubins_traffic.campaign.bags import write_bag
     from dubins_traffic.campaign.lcm_log import is_log, log_to_records
     from dubins_traffic.campaign.sources import load
@@ -65,12 +65,9 @@ def convert(
             raise InputError(
                 "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
             )
-        if is_bag(file):
-            bag_to_record(file, output, overwrite=True)
-            return
-        records = log_to_records(file, output, overwrite=True)
+        records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=True)
         if len(records) > 1:
-            options.tell("\n".join(map(str, records)))
+            options.tell("\n".join([f"{len(records)} trials, {len(records)} records:", *map(str, records)]))
         return
     found = load(file)
     suffix = Path(output).suffix.lower()

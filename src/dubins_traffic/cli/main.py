@@ -18,6 +18,7 @@ from dubins_traffic.cli import (
     gazebo,
     instance,
     lcm,
+    lines,
     listing,
     network,
     plot,
@@ -80,6 +81,7 @@ app.add_typer(ros1.app, name="ros1")
 app.add_typer(gazebo.app, name="gazebo")
 app.add_typer(lcm.app, name="lcm")
 app.add_typer(ros2.app, name="ros2")
+app.add_typer(lines.app, name="lines")
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

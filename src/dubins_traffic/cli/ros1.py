@@ -13,8 +13,9 @@ from dubins_traffic.errors import InputError
 app = typer.Typer(help="Trials over ROS 1, with the topics and services of 2016.", no_args_is_help=True)
 EXAMPLES = options.examples(
     "ros1 run demo --master",
-    "ros1 run my-trials.json --master 11411 --trials 3 --records out -f data.json",
+    "ros1 run my-trials.json --master --port 11411 --trials 3 --records out -f data.json",
     "ros1 run demo --remote agent0 --controller lanes --lockstep",
+    "ros1 run demo --master --maestro-elsewhere --records out",
 )
 
 
@@ -30,6 +31,13 @@ def run(
     port: Annotated[
         int, typer.Option("--port", metavar="PORT", min=0, max=65535, help="Of that master; 0: any free one.")
     ] = 11311,
+    elsewhere: Annotated[
+        bool,
+        typer.Option(
+            "--maestro-elsewhere",
+            help="Another process, such as that of 2016, is the maestro; simulator and referee are here.",
+        ),
+    ] = False,
     clock: session.Clock = False,
     simulator: Annotated[
         str | None,
@@ -53,7 +61,9 @@ def run(
     world = _is_world(simulator, poses)
     todo = asked.programme(None if world else simulator)
     at = port if master else None
-    results = run_over_ros1(todo, asked.pace(), master=at, clock=clock, world=world, poses=poses)
+    results = run_over_ros1(
+        todo, asked.pace(), master=at, clock=clock, world=world, poses=poses, elsewhere=elsewhere
+    )
     session.conduct(todo, results, json=asked.json)
 
 

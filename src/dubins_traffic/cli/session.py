@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from types import FrameType
@@ -82,11 +82,12 @@ class Asked:
         """Return what the session shall run."""
         from dubins_traffic.campaign.sessions import programme
 
-        return programme(
+        todo = programme(
             self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
             remote=self.remote or (), data=options.trial_data(self.data, self.data_over),
             overwrite_data=self.data is None, records=self.records, simulator=simulator, shield=self.shield,
         )  # fmt: skip
+        return replace(todo, say=faults.tell)
 
     def pace(self) -> Pace:
         """Return how drivers are waited for."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Condition
 from time import monotonic
@@ -18,7 +18,8 @@ class Slot:
     """The latest command of one car, and what is counted of its peer.
 
     `tick` is the frame that it says it answers; `fresh` whether it came since the last frame was sent; `arrived` when,
-    monotonic seconds, None before the first. `gone_since` is set while a peer that was there is away.
+    monotonic seconds, None before the first, and `began` when the first did. `gone_since` is set while a peer that was there is away. `peers` is how
+    many there were at most at a time, 0 where the transport does not know.
     """
 
     speed: float = 0.0
@@ -26,10 +27,12 @@ class Slot:
     tick: int | None = None
     fresh: bool = False
     arrived: float | None = None
+    began: float | None = None
     gone_since: float | None = None
     fault: tuple[End, str] | None = None
     commands: int = 0
     reconnections: int = 0
+    peers: int = 0
     window: float = 0.0
     in_window: int = 0
 
@@ -45,6 +48,8 @@ class Inbox:
 
     def __init__(self, flood: int) -> None:
         self.condition = Condition()
+        self.warn: Callable[[str], None] = lambda _line: None
+        """Called, with a line for people, when something is odd but nobody's fault."""
         self.paused = False
         self.unknown = 0
         self.returned = 0
@@ -57,7 +62,7 @@ class Inbox:
     def expect(self, cars: Sequence[str]) -> None:
         """Begin a trial in which the commands of `cars` are wanted; peers that are there stay there."""
         with self.condition:
-            self._slots = {car: Slot() for car in cars}
+            self._slots = {car: Slot(peers=self._peers.get(car, 0)) for car in cars}
             self.unknown = 0
             if self._stop is not None and self._stop[0] is not End.TRANSPORT_LOST:
                 self._stop = None
@@ -93,6 +98,7 @@ class Inbox:
                 slot.fault = (End.PEER_FLOOD, f"more than {self._flood} commands in a second")
             slot.speed, slot.yaw_rate, slot.tick = speed, yaw_rate, tick
             slot.fresh, slot.arrived = True, now
+            slot.began = now if slot.began is None else slot.began
             self.condition.notify_all()
 
     def fault(self, car: str, end: End, detail: str) -> None:
@@ -106,20 +112,26 @@ class Inbox:
     def joined(self, car: str) -> None:
         """Count a peer in."""
         with self.condition:
-            self._peers[car] = self._peers.get(car, 0) + 1
+            self._peers[car] = peers = self._peers.get(car, 0) + 1
             slot = self._slots.get(car)
+            if slot is not None:
+                slot.peers = max(slot.peers, peers)
             if slot is not None and slot.gone_since is not None:
                 slot.gone_since = None
                 slot.reconnections += 1
                 self.returned += 1
             self.condition.notify_all()
+        if slot is not None and peers > 1:
+            self.warn(f"{peers} programs send commands for {car} at once: the latest command counts")
 
     def left(self, car: str) -> None:
         """Count a peer out."""
         with self.condition:
-            self._peers[car] = max(0, self._peers.get(car, 0) - 1)
+            peers = self._peers.pop(car, 0) - 1
+            if peers > 0:
+                self._peers[car] = peers
             slot = self._slots.get(car)
-            if slot is not None and self._peers[car] == 0:
+            if slot is not None and peers <= 0:
                 slot.gone_since = monotonic()
             self.condition.notify_all()
 

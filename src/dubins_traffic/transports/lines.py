@@ -7,6 +7,7 @@ begins, ``{"frame": ...}`` (its car's own observation) every tick, and ``{"end":
 
 from __future__ import annotations
 
+import contextlib
 import json
 import selectors
 import socket
@@ -28,6 +29,8 @@ LONGEST = 1 << 16
 BACKLOG = 1 << 22
 """Bytes that a peer may leave unread before it is dropped."""
 CONNECTIONS = 4096
+NAME = 1000
+"""Characters of a car's name that is taken for one."""
 
 
 @dataclass(slots=True, eq=False)
@@ -138,7 +141,8 @@ class Lines:
             peer.unsent.clear()  # it has gone, which the listening thread will see
         if len(peer.unsent) > BACKLOG:
             peer.unsent.clear()
-            peer.socket.shutdown(socket.SHUT_RDWR)
+            with contextlib.suppress(OSError):  # it may have hung up already
+                peer.socket.shutdown(socket.SHUT_RDWR)
 
     def _listen(self) -> None:
         with selectors.DefaultSelector() as selector:
@@ -192,19 +196,23 @@ class Lines:
 
     def _take(self, peer: _Peer, line: bytes) -> None:
         try:
-            message: Any = json.loads(line)
-        except ValueError:
-            message = None
+            self._obey(peer, json.loads(line))
+        except (ValueError, OverflowError, RecursionError):
+            text = line[:60].decode(errors="replace")
+            self._mailbox.fault(peer.car, End.PEER_GARBAGE, f"not a message: {text!r}")
+
+    def _obey(self, peer: _Peer, message: Any) -> None:
+        """Do what a message says; ValueError or OverflowError if it says nothing that is known."""
         match message:
             case {"command": [float() | int() as speed, float() | int() as yaw_rate], "tick": int(tick)}:
                 self._mailbox.command(peer.car, float(speed), float(yaw_rate), tick)
-            case {"join": str(car)} if not peer.car:
+            case {"join": str(car)} if not peer.car and len(car) <= NAME:
                 self._join(peer, car)
             case {"bye": str(why)}:
-                self._mailbox.fault(peer.car, End.GAVE_UP, why[:200])
+                words = why[:200].encode(errors="replace").decode()  # half a surrogate pair is no text
+                self._mailbox.fault(peer.car, End.GAVE_UP, words)
             case _:
-                text = line[:60].decode(errors="replace")
-                self._mailbox.fault(peer.car, End.PEER_GARBAGE, f"not a message: {text!r}")
+                raise ValueError("unknown message")
 
     def _join(self, peer: _Peer, car: str) -> None:
         with self._lock:

@@ -58,20 +58,31 @@ class Link:
         Whether the ego is remote. E-agents are if their kind is `remote`.
     patience : Patience
         How long peers are waited for.
+    at_once : bool
+        Whether a trial's time begins with its announcement; else with the ego's first command, if the ego is remote.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, *, ego: bool = True, patience: Patience | None = None
+        self,
+        transport: Transport,
+        clock: Clock,
+        *,
+        ego: bool = True,
+        patience: Patience | None = None,
+        at_once: bool = False,
     ) -> None:
         self.transport = transport
         self.clock = clock
         self.ego = ego
+        self._at_once = at_once
         self._patience = patience or Patience()
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
         self._polled = transport if isinstance(transport, Polled) else None
         self._between = self._stream is not None and not clock.lockstep
         self._interval = IDLE if self._stream is None else self._stream.interval
+        self.mark: Callable[[bool], None] = lambda _running: None
+        """Called when a trial begins (True) and when it is over (False), before its peers are told."""
         transport.open(self.inbox)
 
     def begin(self, instance: Instance) -> None:
@@ -111,11 +122,12 @@ class Link:
         if self._running:
             return
         self._running = True
+        self.mark(True)
         self.inbox.stale()
         self.transport.announce(self._instance)
         self._announced = monotonic()
         self._send()
-        if self.ego:
+        if self.ego and not self._at_once:
             self._first_command(self.inbox.slot(EGO_NAME))
         self.clock.start(self._instance.problem.period, monotonic())
         self._sent = monotonic()
@@ -157,6 +169,7 @@ class Link:
     def finish(self, ending: Ending) -> None:
         """Tell the peers that the trial is over."""
         self._running = self._moving = False
+        self.mark(False)
         self.transport.end(ending)
 
     def close(self) -> None:
@@ -164,8 +177,16 @@ class Link:
         self.transport.close()
 
     @property
+    def running(self) -> bool:
+        """Whether a trial has begun and is not over."""
+        return self._running
+
+    @property
     def time_to_begin(self) -> float | None:
         """Seconds from the announcement to the ego's first command; None before, and for an ego that is here."""
+        if self.ego and self._at_once and self._begun is None:
+            began = self.inbox.slot(EGO_NAME).began
+            return None if began is None else max(0.0, began - self._announced)
         return self._begun
 
     def report(self) -> Mapping[str, Any]:
@@ -175,6 +196,7 @@ class Link:
                 "commands": slot.commands,
                 "late": self._late[car],
                 "reconnections": slot.reconnections,
+                "peers": slot.peers,
                 "answer_s": summary(self._answers[car]),
             }
             for car, slot in ((car, self.inbox.slot(car)) for car in self._remote)
@@ -204,9 +226,12 @@ class Link:
         """Name a peer that is there and says nothing; one that has gone is given its time to come back."""
         if slot.gone_since is not None:
             return
+        patience = self._patience.silence
+        if slot.arrived is None and self._at_once:
+            patience = max(patience, self._patience.begin)  # it may be planning
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
-        if monotonic() - since > self._patience.silence:
-            detail = f"no command for {self._patience.silence:g} s at tick {tick}"
+        if monotonic() - since > patience:
+            detail = f"no command for {patience:g} s at tick {tick}"
             raise PeerError(End.PEER_SILENT.value, detail)
 
     def _wait(self, done: Callable[[], bool], until: float, car: str | None, *, still: bool = False) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum, IntEnum
-from threading import Lock
+from threading import Condition
 
 
 class Mode(IntEnum):
@@ -36,13 +36,15 @@ class Maestro:
     """Answers mode requests from any thread.
 
     READY is granted once an instance is up, START only then; RESET ends a running trial, which counts, or passes over
-    the instance that is up; RESTART runs the same instance again.
+    the instance that is up; RESTART runs the same instance again. What is asked between two instances is answered when
+    the next one is up: programs of 2016 ask START once, and take any answer to READY for yes.
     """
 
     def __init__(self) -> None:
-        self._lock = Lock()
+        self._news = Condition()
         self._phase = Phase.PREPARING
         self._next: Next | None = None
+        self._closed = False
         self.interrupt: Callable[[str], None] = lambda _detail: None
         """Called, with a word of detail, to end the trial that is running; and with "" when there is news."""
 
@@ -57,30 +59,66 @@ class Maestro:
         return self._phase
 
     def enter(self, phase: Phase) -> None:
-        """Say where the session stands now."""
-        with self._lock:
-            if phase is not Phase.RUNNING:
+        """Say where the session stands now; who waits for an answer may get it."""
+        with self._news:
+            if phase is Phase.READY:
                 self._next = None
-            self._phase = phase
+            self._phase, self._closed = phase, False
+            self._news.notify_all()
+
+    def close(self) -> None:
+        """The session is over: who waits for an answer, or asks from now on, is refused."""
+        with self._news:
+            self._closed = True
+            self._news.notify_all()
 
     def request(self, mode: int) -> bool:
-        """Return whether what a client asks for is granted; unknown modes are not."""
-        with self._lock:
-            ready, running = self._phase is Phase.READY and self._next is None, self._phase is Phase.RUNNING
-            match mode:
-                case Mode.READY:
-                    return ready
-                case Mode.START if ready:
-                    self._next, detail = Next.RUN, ""
-                case Mode.RESET if ready:
-                    self._next, detail = Next.DRAW, ""
-                case Mode.RESET if running:
-                    self._next, detail = Next.DRAW, "reset asked for"
-                case Mode.RESTART if running:
-                    self._next, detail = Next.REPEAT, "restart asked for"
-                case Mode.RESTART:
-                    return ready
-                case _:
-                    return False
-        self.interrupt(detail)
-        return True
+        """Return whether what a client asks for is granted; wait until that can be said, or the session is over."""
+        while True:
+            with self._news:
+                granted, detail = self._decide(mode)
+                if granted is None:
+                    self._news.wait()
+                    continue
+            return self._tell(granted, detail)
+
+    def answer(self, mode: int) -> bool | None:
+        """Do as `request`, but return None at once if it can't be said yet: ask again later."""
+        with self._news:
+            granted, detail = self._decide(mode)
+        return None if granted is None else self._tell(granted, detail)
+
+    def _tell(self, granted: bool, detail: str | None) -> bool:
+        if detail is not None:
+            self.interrupt(detail)
+        return granted
+
+    def _decide(self, mode: int) -> tuple[bool | None, str | None]:
+        """Return the answer, None for "not yet", and what the session is told, None for nothing."""
+        if self._closed or mode not in set(Mode):
+            return False, None
+        match self._phase, self._next:
+            case Phase.READY, None:
+                return self._decide_ready(mode)
+            case Phase.RUNNING, _:
+                return self._decide_running(mode)
+            case Phase.READY, Next.RUN if mode in (Mode.READY, Mode.START):
+                return False, None
+            case _:
+                return None, None
+
+    def _decide_ready(self, mode: int) -> tuple[bool, str | None]:
+        if mode in (Mode.READY, Mode.RESTART):
+            return True, None
+        self._next = Next.RUN if mode == Mode.START else Next.DRAW
+        return True, ""
+
+    def _decide_running(self, mode: int) -> tuple[bool | None, str | None]:
+        """RESET and RESTART end the trial; from then on the others wait for the next instance."""
+        if mode == Mode.RESET:
+            self._next = Next.DRAW
+            return True, "reset asked for"
+        if mode == Mode.RESTART:
+            self._next = Next.REPEAT
+            return True, "restart asked for"
+        return (None if self._next in (Next.DRAW, Next.REPEAT) else False), None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from collections import deque
 from collections.abc import Callable, Sequence
 from select import select
 from time import monotonic, time_ns
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 NO_TRIAL = -1
 MOST_AT_ONCE = 256
 """Messages after which the trial is looked at again, however many there are."""
+MOST_WAITING = 1000
+"""Requests that may wait for the next instance; of more, the oldest are never answered."""
 ANSWER = 0.25
 """Seconds in which another session at the same URL would answer; it looks at what has come every 0.1 s."""
 GARBAGE = (ValueError, struct.error, IndexError)
@@ -60,6 +63,7 @@ class Lcm:
         self._trial = NO_TRIAL
         self._next = time_ns() // 1_000_000  # so that no program takes a new session's trial for an old one's
         self._announced = b""
+        self._waiting: deque[mode_t] = deque(maxlen=MOST_WAITING)
         self._open = False
 
     def open(self, mailbox: Mailbox) -> None:
@@ -120,6 +124,9 @@ class Lcm:
     def receive(self, seconds: float) -> None:
         """Take what has come, or comes within so long."""
         lcm = self._lcm
+        asked, self._waiting = self._waiting, deque(maxlen=MOST_WAITING)
+        for one in asked:
+            self._grant(one)
         if seconds > 0.0:
             select([lcm.fileno()], [], [], seconds)  # LCM itself waits for whole milliseconds
         for _ in range(MOST_AT_ONCE):
@@ -176,12 +183,18 @@ class Lcm:
             asked = mode_t.decode(data)
         except GARBAGE:
             return  # nobody can be told
+        self._grant(asked)
+
+    def _grant(self, asked: mode_t) -> None:
+        """Answer a request; one that can't be answered before the next instance is up waits for it."""
+        granted: bool | None = asked.mode in (Mode.READY, Mode.START)
+        if self._maestro is not None:
+            granted = self._maestro.answer(asked.mode)
+        if granted is None:
+            self._waiting.append(asked)
+            return
         grant = grant_t()
-        grant.sender, grant.mode = asked.sender, asked.mode
-        if self._maestro is None:
-            grant.result = asked.mode in (Mode.READY, Mode.START)
-        else:
-            grant.result = self._maestro.request(asked.mode)
+        grant.sender, grant.mode, grant.result = asked.sender, asked.mode, granted
         self._publish(connection.GRANT, grant.encode())
         if asked.mode == Mode.READY and self._announced:
             self._publish(connection.INSTANCE, self._announced)

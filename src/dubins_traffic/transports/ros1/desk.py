@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dubins_traffic.cars.body import Rectangle
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import Mailbox
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro, Mode
 from dubins_traffic.transports.quaternion import placed
 from dubins_traffic.transports.ros1.messages import load
@@ -18,6 +19,8 @@ from dubins_traffic.transports.ros1.node import NAME
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+
+PROBLEM = f"/{NAME}/probleminstance_JSON"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +51,30 @@ class Desk:
         The session, for parameters.
     simulated : bool
         Whether the cars are simulated here, so that pausing and placing them is served.
+    foreign : ForeignMaestro, optional
+        Another maestro: problems are heard from it instead of told, and what it has set of the parameters stays.
     """
 
     def __init__(
-        self, rospy: Any, mailbox: Mailbox, maestro: Maestro | None, told: Told, *, simulated: bool = True
+        self,
+        rospy: Any,
+        mailbox: Mailbox,
+        maestro: Maestro | None,
+        told: Told,
+        *,
+        simulated: bool = True,
+        foreign: ForeignMaestro | None = None,
     ) -> None:
         m = load()
         self._rospy, self._m, self._mailbox, self._maestro = rospy, m, mailbox, maestro
+        self._foreign = foreign
         self._set: list[str] = []
-        self._problem = rospy.Publisher(
-            f"/{NAME}/probleminstance_JSON", m.ProblemInstanceJSON, queue_size=1, latch=True, tcp_nodelay=True
-        )
+        if foreign is None:
+            self._problem = rospy.Publisher(
+                PROBLEM, m.ProblemInstanceJSON, queue_size=1, latch=True, tcp_nodelay=True
+            )
+        else:
+            self._problem = rospy.Subscriber(PROBLEM, m.ProblemInstanceJSON, self._hear, queue_size=10)
         self._services: list[Any] = []
         self._placing: Any = None
         if simulated:
@@ -89,28 +105,35 @@ class Desk:
     def end(self, stamp: float) -> None:
         """Publish that the trial is over. Who comes later is not told: he would take it for the next trial's end."""
         self._publish("", stamp)
-        self._problem.impl.latch = None
+        if self._foreign is None:
+            self._problem.impl.latch = None
 
-    def close(self) -> None:
-        """Take everything back."""
+    def close(self, *, forget: bool = True) -> None:
+        """Take everything back; unless `forget`, parameters stay, which may be another maestro's by now."""
         for service in self._services:
             service.shutdown("the session is over")
         if self._placing is not None:
             self._placing.unregister()
         self._problem.unregister()
-        for name in self._set:
+        for name in self._set if forget else ():
             if self._rospy.has_param(name):
                 self._rospy.delete_param(name)
 
     def _publish(self, text: str, stamp: float) -> None:
+        if self._foreign is not None:
+            return
         self._problem.publish(self._rospy.Time.from_sec(stamp), text)
 
     def _put(self, name: str, value: object) -> None:
-        if value is None:
+        if value is None or (self._foreign is not None and self._rospy.has_param(name)):
             return
         self._rospy.set_param(name, value)
         if name not in self._set:
             self._set.append(name)
+
+    def _hear(self, message: Any) -> None:
+        assert self._foreign is not None
+        self._foreign.tell(message.problemjson)
 
     def _mode(self, request: Any) -> Any:
         assert self._maestro is not None

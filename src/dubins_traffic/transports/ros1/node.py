@@ -14,6 +14,8 @@ from dubins_traffic.transports.ros1.debian import ros
 from dubins_traffic.transports.ros1.master import answers
 
 NAME = "dubins_traffic_maestro"
+REFEREE = "dubins_traffic_referee"
+"""Name of this process where the maestro is another one."""
 LOOK = 0.1
 """Seconds between two looks at who is connected."""
 PING = 10
@@ -23,8 +25,8 @@ MISSED = 2
 """Calls of the master in a row that may go unanswered, and one more."""
 
 
-def join(uri: str) -> Any:
-    """Make this process a node at the master `uri` and return rospy; once in the life of a process.
+def join(uri: str, name: str = NAME) -> Any:
+    """Make this process the node `name` at the master `uri` and return rospy; once in the life of a process.
 
     Raises
     ------
@@ -43,10 +45,11 @@ def join(uri: str) -> Any:
             f"no ROS master answers at {uri}: start roscore, set ROS_MASTER_URI, or say --master"
         )
     os.environ["ROS_MASTER_URI"] = uri
-    taken = _node_at(uri)
+    taken = _node_at(uri, name)
     if taken is not None and answers(taken):
-        raise TransportError(f"the ROS master at {uri} has a maestro already: /{NAME} at {taken}")
-    rospy.init_node(NAME, argv=[], disable_signals=True, disable_rosout=True)
+        other = "; --maestro-elsewhere leaves trials to it" if name == NAME else ""
+        raise TransportError(f"the ROS master at {uri} has a maestro already: /{name} at {taken}{other}")
+    rospy.init_node(name, argv=[], disable_signals=True, disable_rosout=True)
     return rospy
 
 
@@ -69,10 +72,10 @@ def abandon(rospy: Any, detail: str) -> None:
     rospy.signal_shutdown(detail)
 
 
-def _node_at(uri: str) -> str | None:
+def _node_at(uri: str, name: str) -> str | None:
     rosgraph = ros("rosgraph")
     try:
-        return str(rosgraph.Master(f"/{NAME}", master_uri=uri).lookupNode(f"/{NAME}"))
+        return str(rosgraph.Master(f"/{name}", master_uri=uri).lookupNode(f"/{name}"))
     except rosgraph.MasterError:
         return None
 

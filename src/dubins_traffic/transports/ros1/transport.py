@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from xmlrpc.client import Error as XmlRpcError
 
 from dubins_traffic.protocols import End, Ending, Mailbox, View
+from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.desk import Desk, Told
 from dubins_traffic.transports.ros1.messages import load
-from dubins_traffic.transports.ros1.node import Watch, abandon, join
+from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join
 from dubins_traffic.transports.ros1.world import Topics, World
 from dubins_traffic.transports.stamps import Stamps
 
@@ -42,6 +43,8 @@ class Ros1:
         Whether the cars are simulated here; else only labels are published, and what is the maestro's.
     rate : float
         How many model states a second are published in real time, at least.
+    foreign : ForeignMaestro, optional
+        Another process is the maestro, and this is told what that says.
     """
 
     name = "ros1"
@@ -56,14 +59,15 @@ class Ros1:
         clock: bool = False,
         simulated: bool = True,
         rate: float = 120.0,
+        foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
         self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
         self._stamps = Stamps(self.interval, clock=clock)
-        self._simulated_here = simulated
+        self._simulated_here, self._foreign = simulated, foreign
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
-        self._there: set[str] = set()
+        self._there: dict[str, int] = {}
         self._open = self._lost = False
 
     @property
@@ -73,12 +77,20 @@ class Ros1:
 
     def open(self, mailbox: Mailbox) -> None:
         """Join the graph; TransportError or MissingRosError if that can't be."""
-        self._rospy = join(self._uri)
+        self._rospy = join(self._uri, NAME if self._foreign is None else REFEREE)
         self._mailbox = mailbox
         self._topics = Topics(self._rospy)
-        self._desk = Desk(self._rospy, mailbox, self._maestro, self._told, simulated=self._simulated_here)
+        self._desk = Desk(
+            self._rospy,
+            mailbox,
+            self._maestro,
+            self._told,
+            simulated=self._simulated_here,
+            foreign=self._foreign,
+        )
         self._watch = Watch(self._uri, self._look, self._lose)
         self._open = True
+        self._rospy.core.add_preshutdown_hook(self._displaced)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
@@ -116,13 +128,14 @@ class Ros1:
         with self._guarded():
             self._topics.close()
             self._listen(())
-            self._desk.close()
+            self._desk.close(forget=not self._lost)
 
     def _listen(self, remote: Sequence[str]) -> None:
         """Subscribe to the commands of the cars `remote`, and to no others."""
         for car in [car for car in self._subscribers if car not in remote]:
             self._subscribers.pop(car).unregister()
-            self._there.discard(car)
+            for _ in range(self._there.pop(car, 0)):
+                self._mailbox.left(car)
         for car in remote:
             if car not in self._subscribers:
                 self._subscribers[car] = self._rospy.Subscriber(
@@ -144,6 +157,12 @@ class Ros1:
         self._mailbox.stop(End.TRANSPORT_LOST, detail)
         abandon(self._rospy, detail)
 
+    def _displaced(self, reason: str) -> None:
+        """End all that is under way: the master has told this node to go, since another has taken its name."""
+        if self._open and not self._lost:
+            self._lost = True
+            self._mailbox.stop(End.TRANSPORT_LOST, f"the ROS master has shut this node down: {reason}")
+
     def _publish(self, view: View, *, frame: bool) -> None:
         self._stamps.see(view)
         if self._world is not None and not self._lost:
@@ -159,10 +178,10 @@ class Ros1:
             implementation = subscriber.impl
             if implementation is None:
                 continue
-            there = any(connection.socket is not None for connection in implementation.connections)
-            if there and car not in self._there:
-                self._there.add(car)
+            there = sum(connection.socket is not None for connection in list(implementation.connections))
+            before = self._there.get(car, 0)
+            self._there[car] = there
+            for _ in range(before, there):
                 self._mailbox.joined(car)
-            elif not there and car in self._there:
-                self._there.discard(car)
+            for _ in range(there, before):
                 self._mailbox.left(car)

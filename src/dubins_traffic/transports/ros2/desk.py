@@ -24,11 +24,13 @@ PAUSE, UNPAUSE = "gazebo/pause_physics", "gazebo/unpause_physics"
 PLACE = "rt/gazebo/set_model_state"
 AT_ONCE = 100
 """Messages of one topic taken at a time."""
+MOST_WAITING = 1000
+"""Requests that may wait for the next instance; what is asked beyond is never answered."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Service:
-    """A service of ROS 2: a topic of requests, one of replies, and who answers."""
+    """A service of ROS 2: a topic of requests, one of replies, and who answers, with None for "not yet"."""
 
     requests: Any
     kind: Any
@@ -53,6 +55,7 @@ class Desk:
         self._graph, self._mailbox, self._maestro = graph, mailbox, maestro
         self._problem = graph.writer(INSTANCE, m.ProblemInstanceJSON, latched=True)
         self._places = graph.reader(PLACE, m.ModelState)
+        self._waiting: list[tuple[_Service, Any]] = []
         self._services = [
             self._service(PAUSE, m.EmptyRequest, m.EmptyReply, partial(self._pause, True)),
             self._service(UNPAUSE, m.EmptyRequest, m.EmptyReply, partial(self._pause, False)),
@@ -74,9 +77,15 @@ class Desk:
 
     def serve(self) -> None:
         """Answer what has been asked."""
+        asked, self._waiting = self._waiting, []
         for service in self._services:
-            for request in self._graph.take(service.requests, service.kind, AT_ONCE):
-                self._graph.put(service.replies, service.answer(request))
+            asked += [(service, one) for one in self._graph.take(service.requests, service.kind, AT_ONCE)]
+        for service, request in asked:
+            reply = service.answer(request)
+            if reply is not None:
+                self._graph.put(service.replies, reply)
+            elif len(self._waiting) < MOST_WAITING:
+                self._waiting.append((service, request))
         for message in self._graph.take(self._places, m.ModelState, AT_ONCE):
             position, turn = message.pose.position, message.pose.orientation
             pose = placed(position.x, position.y, turn.z, turn.w)
@@ -90,9 +99,11 @@ class Desk:
     def _publish(self, text: str, stamp: m.Time) -> None:
         self._graph.put(self._problem, m.ProblemInstanceJSON(stamp, text))
 
-    def _mode(self, request: m.ModeRequest) -> m.ModeReply:
+    def _mode(self, request: m.ModeRequest) -> m.ModeReply | None:
         assert self._maestro is not None
-        granted = self._maestro.request(request.mode)
+        granted = self._maestro.answer(request.mode)
+        if granted is None:
+            return None
         if granted and request.mode == Mode.START:
             self._mailbox.pause(False)
         return m.ModeReply(request.guid, request.seq, granted)
