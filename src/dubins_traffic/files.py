@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 from dubins_traffic.errors import InputError
 
 STANDARD = "-"
+LOCK = ".lock"
+"""Name of the file that is locked where a folder can't be."""
 
 
 def read_text(path: str | Path) -> str:
@@ -75,6 +78,32 @@ def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool =
     finally:
         with contextlib.suppress(OSError):
             neighbour.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Generator[None]:
+    """Hold the lock of a folder; the system lets go of it when this process ends, however it ends.
+
+    The lock is on the folder itself, or where its file system has no such locks on a file `.lock` in it.
+
+    Raises
+    ------
+    InputError
+        If another process holds it, or there is no such folder.
+    """
+    with contextlib.ExitStack() as held:
+        for name, flags in ((folder, os.O_RDONLY), (folder / LOCK, os.O_RDWR | os.O_CREAT)):
+            try:
+                descriptor = os.open(name, flags, 0o644)
+                held.callback(os.close, descriptor)
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                raise InputError("in use by another process", file=str(folder)) from None
+            except OSError as error:
+                if name != folder or not folder.is_dir():
+                    raise InputError(f"can't be locked ({error.strerror})", file=str(folder)) from None
+        yield
 
 
 def _flush(path: Path) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dubins_traffic.campaign.plan import check_data_file, check_folder, check_simulator
+from dubins_traffic.campaign.plan import check_data_file, check_simulator
+from dubins_traffic.campaign.record_folder import check_folder
 from dubins_traffic.campaign.remote import Session, hand_over, run_remote
 from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.campaign.sources import load
@@ -198,7 +199,7 @@ def programme(
         configuration,
         controller,
         tuple(remote),
-        None if records is None else check_folder(Path(records)),
+        None if records is None else check_folder(records),
         None if data is None else check_data_file(Path(data), overwrite_data),
         shield,
     )

@@ -108,6 +108,7 @@ def run_trial(
     sinks: Sequence[Sink] = (),
     link: Link | None = None,
     simulator: Simulator | None = None,
+    name: str | None = None,
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -130,20 +131,16 @@ def run_trial(
         ``+shield``: then that ego drives under the shield.
     simulator : Simulator, optional
         Instead of the one that the instance names; closed when the trial is over.
+    name : str, optional
+        What record and score call the controller; by default the name by which it was given, or that of its class.
 
     Raises
     ------
     InputError
         If the controller can't be loaded or the record can't be written.
     """
-    if link is not None and link.ego:
-        name, driver = link.transport.name, RemoteController(link)
-        if isinstance(controller, str) and controllers.is_shielded(controller):
-            name, driver = controllers.shielded(name), controllers.under_shield(driver, controller)
-    else:
-        name = controller if isinstance(controller, str) else type(controller).__name__
-        driver = controllers.load(controller) if isinstance(controller, str) else controller
-        driver = driver if link is None else LocalController(link, driver)
+    called, driver = _driver(controller, link)
+    name = called if name is None else name
     scorer = Scorer()
     writer = None
     if record is not None:
@@ -166,6 +163,18 @@ def run_trial(
         wall.write(path, measured)
     score = scorer.result(controller=name, record=path, wall=measured)
     return Result(instance, name, ending, score, measured, path)
+
+
+def _driver(controller: str | Controller, link: Link | None) -> tuple[str, Controller]:
+    """Return what the ego's controller is called, and the controller."""
+    if link is not None and link.ego:
+        name, driver = link.transport.name, RemoteController(link)
+        if isinstance(controller, str) and controllers.is_shielded(controller):
+            return controllers.shielded(name), controllers.under_shield(driver, controller)
+        return name, driver
+    name = controller if isinstance(controller, str) else type(controller).__name__
+    driver = controllers.load(controller) if isinstance(controller, str) else controller
+    return name, driver if link is None else LocalController(link, driver)
 
 
 def _over(link: Link, measured: wall.Wall) -> wall.Wall:

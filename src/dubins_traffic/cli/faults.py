@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from itertools import pairwise
-from typing import Final
+from typing import Final, NoReturn
 
 import typer
 
-from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.controllers.blame import DEBUG
+from dubins_traffic.errors import DubinsTrafficError, WorkerLostError, shown
 
 OK: Final = 0
 FAILED: Final = 1
@@ -47,10 +50,45 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
 
 def tell(text: str) -> None:
     """Print one line about something wrong on standard error."""
-    print(f"{PROGRAM}: {' '.join(text.split())}", file=sys.stderr)
+    print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def debugging(wanted: bool) -> Generator[None]:
+    """Let whole tracebacks of controllers be shown in the body, if `wanted`, also by processes that begin in it."""
+    if not wanted:
+        yield
+        return
+    os.environ[DEBUG] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[DEBUG]
+
+
+@contextlib.contextmanager
+def no_silent_end() -> Generator[None]:
+    """Let `os._exit` in this thread raise SystemExit: a controller that calls it ends its trial, not the program.
+
+    Elsewhere, in other threads and in processes that were forked, it does what it always does.
+    """
+    real, process, thread = os._exit, os.getpid(), threading.get_ident()
+
+    def leave(status: int) -> NoReturn:
+        if (os.getpid(), threading.get_ident()) != (process, thread):
+            real(status)
+        raise SystemExit(f"os._exit({status})")
+
+    os._exit = leave
+    try:
+        yield
+    finally:
+        os._exit = real
 
 
 def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
+    if isinstance(error, WorkerLostError):
+        return str(error), FAILED
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT
     if isinstance(error, typer.TyperException):

@@ -95,7 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
+        with faults.debugging("--debug" in arguments):
+            status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except Exception as error:
         return faults.conclude(error, arguments)
