@@ -41,7 +41,17 @@ class Slow(Straight):
         return (0.3, 0.0)
 """
 RUN = ["run", "small.json", "--controller", "mine.py:Straight", "--json", "--records", "out"]
-BATCH = ["batch", "small.json", "--controller", "mine.py:Straight", "--json", "--keep", "all", "--records", "out"]
+BATCH = [
+    "batch",
+    "small.json",
+    "--controller",
+    "mine.py:Straight",
+    "--json",
+    "--keep",
+    "all",
+    "--records",
+    "out",
+]
 
 
 @pytest.fixture(autouse=True)
@@ -134,7 +144,16 @@ def test_append_refuses_records_of_another_run(command, change, needle, call, pl
 
 def test_runs_of_one_instance_append_too(call, place):
     main(["instance", "small.json", "--full", "-o", "one.json"])
-    command = ["run", "one.json", "--controller", "mine.py:Straight", "--json", "--records", "out", "--repeat"]
+    command = [
+        "run",
+        "one.json",
+        "--controller",
+        "mine.py:Straight",
+        "--json",
+        "--records",
+        "out",
+        "--repeat",
+    ]
     assert call(*command, "2")[0] == 0
     assert call(*command, "3", "--append")[:2] == (0, [0])
     assert sorted(contents(place / "out")) == [f"trial-0000-000{k}.mcap" for k in range(3)]
@@ -158,7 +177,17 @@ def test_choices_that_make_no_sense_are_refused(options, needles, call, place):
 
 
 def test_a_second_run_into_one_folder_is_refused_until_the_first_has_ended(call, place):
-    command = [*COMMAND, "run", "small.json", "--controller", "mine.py:Slow", "--trials", "90", "--records", "out"]
+    command = [
+        *COMMAND,
+        "run",
+        "small.json",
+        "--controller",
+        "mine.py:Slow",
+        "--trials",
+        "90",
+        "--records",
+        "out",
+    ]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
         try:
             until = time.monotonic() + 300

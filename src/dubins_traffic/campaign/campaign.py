@@ -129,7 +129,9 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     name = os.fspath(path)
     try:
         document = tomllib.loads(read_text(name))
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
+    except ValueError as error:
         raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
     return Campaign.from_document(document, name, Path(name).parent)
 

@@ -6,7 +6,8 @@ import os
 import sys
 from io import BufferedReader
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import InputError, RecordError
+from dubins_traffic.files import is_stream, read_bytes
 from dubins_traffic.problem.configuration import Configuration, find_source
 from dubins_traffic.problem.document import instance_from_document
 from dubins_traffic.problem.files import (
@@ -17,11 +18,15 @@ from dubins_traffic.problem.files import (
     is_record,
     is_text_network,
     parse_json,
+    source_of,
 )
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import reader
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
+
+MOST_OF_STREAM = 1 << 32
+"""Most bytes of a record that is read from a pipe, 4 GiB."""
 
 
 def load(
@@ -64,17 +69,29 @@ def load_record(source: str | os.PathLike[str]) -> Record:
     RecordError
         If it can't be read or is no record.
     """
-    if os.fspath(source) == STANDARD_INPUT:
-        return reader.from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT)
-    return reader.read(os.fspath(source))
+    name = os.fspath(source)
+    if name == STANDARD_INPUT or is_stream(name):
+        try:
+            data = read_bytes(name, most=MOST_OF_STREAM, magic=MCAP_MAGIC)
+        except InputError as error:
+            raise RecordError(error.problem, file=name, expected=error.expected) from None
+        return reader.from_bytes(data, name)
+    return reader.read(name)
 
 
 def _load(
     source: str | os.PathLike[str], rnd: str | os.PathLike[str] | None, seed: int
 ) -> RoadNetwork | Configuration | Instance | Record:
+    name = os.fspath(source)
     if _holds_record(source):
         return load_record(source)
-    found = find_source(source)
+    if is_stream(name):
+        data = read_bytes(name)
+        if data.startswith(MCAP_MAGIC):
+            return reader.from_bytes(data, name)
+        found = source_of(data, name)
+    else:
+        found = find_source(source)
     if is_text_network(found.text):
         return RoadNetwork.from_text(found.text, found.name)
     document = parse_json(found.text, found.name)

@@ -91,6 +91,7 @@ def batch(
     finally:
         if done:
             show(in_order(done).sheet, json=json)
+            options.tell(*(() if records is None else (records,)))
     failed = [outcome for outcome in in_order(done).outcomes if outcome.ending.end in FAULTS]
     for outcome in failed:
         faults.tell(f"trial {outcome.instance.trial}: {outcome.ending.end}: {outcome.ending.detail}")

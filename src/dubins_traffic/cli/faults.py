@@ -21,6 +21,8 @@ FAILED: Final = 1
 WRONG_INPUT: Final = 2
 
 PROGRAM: Final = "dubins-traffic"
+COMPLETION: Final = "_DUBINS_TRAFFIC_COMPLETE"
+"""Name of the environment variable by which a shell asks for completions."""
 
 
 def conclude(error: Exception, arguments: Sequence[str]) -> int:
@@ -39,8 +41,7 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
         2 where the input is wrong, 0 where the reader of our output had enough, 1 otherwise.
     """
     if isinstance(error, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
+        return _hang_up()
     if "--debug" in arguments:
         traceback.print_exception(error)
     text, status = _verdict(error, arguments)
@@ -50,7 +51,33 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
 
 def tell(text: str) -> None:
     """Print one line about something wrong on standard error."""
-    print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+    with contextlib.suppress(BrokenPipeError):  # whoever read it has had enough
+        print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+
+
+def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:
+    """Return the exit status where something wanted the program to end, as libraries do whose output nobody reads.
+
+    Parameters
+    ----------
+    error : SystemExit
+        What was raised.
+    arguments : sequence of str
+        The command line; a request to complete one ends so by right.
+    """
+    if isinstance(error.__context__, BrokenPipeError):
+        return _hang_up()
+    if COMPLETION in os.environ or any(word.endswith("-completion") for word in arguments):
+        return OK if error.code is None else int(error.code)
+    tell(f"unexpected SystemExit: {error.code}")
+    return FAILED
+
+
+def _hang_up() -> int:
+    """Let what is still to be printed go nowhere: the reader of our output had enough, which is no error."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.__stdout__ or sys.stdout).fileno())
+    return OK
 
 
 @contextlib.contextmanager

@@ -98,6 +98,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with faults.debugging("--debug" in arguments):
             status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
+    except SystemExit as error:
+        return faults.conclude_exit(error, arguments)
     except Exception as error:
         return faults.conclude(error, arguments)
     return faults.FAILED if status == INTERRUPTED else int(status or faults.OK)

@@ -127,6 +127,7 @@ def run(
     finally:
         if results:
             show(todo.conclude(results), json=json)
+            options.tell(*(str(written) for written in (records, todo.data) if written is not None))
     failed = [result for result in results if result.ending.end in FAULTS]
     for result in failed:
         ending = result.ending

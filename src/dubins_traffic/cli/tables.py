@@ -6,6 +6,8 @@ import json as json_text
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from dubins_traffic.errors import shown
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -73,7 +75,7 @@ def score_table(sheet: ScoreSheet) -> Table:
     from rich import box
     from rich.table import Table
 
-    names = sorted({score.controller or "-" for score in sheet.trials})
+    names = sorted({_safe(score.controller or "-") for score in sheet.trials})
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left", show_edge=False)
     table.add_column("trial", footer="sum", justify="right", no_wrap=True)
     if len(names) > 1:
@@ -88,7 +90,7 @@ def score_table(sheet: ScoreSheet) -> Table:
             HYPHENATED.get(heading) or _narrow(heading), footer=footer, justify=align, no_wrap=True
         )
     for score in sheet.trials:
-        leading = [str(score.trial), *([score.controller or "-"] if len(names) > 1 else [])]
+        leading = [str(score.trial), *([_safe(score.controller or "-")] if len(names) > 1 else [])]
         table.add_row(*leading, *(_narrow(cell(score), 10) for cell in cells.values()))
     return table
 
@@ -105,7 +107,7 @@ def formula_table(sheet: ScoreSheet) -> Table:
     table.add_column("verdict", no_wrap=True)
     for score in sheet.trials:
         for found in score.formulas:
-            table.add_row(str(score.trial), Text(found.name), verdict_text(found))
+            table.add_row(str(score.trial), Text(shown(found.name)), verdict_text(found))
     return table
 
 
@@ -120,3 +122,10 @@ def _cells(scores: Sequence[Score]) -> dict[str, Callable[[Score], str]]:
 def _narrow(text: str, width: int = 0) -> str:
     """Return the words of what is wider than `width` below one another, so that a table fits 80 columns."""
     return text.replace(" ", "\n") if len(text) > width else text
+
+
+def _safe(name: str) -> str:
+    """Return somebody else's name so that it can stand in a table: neither control characters nor markup act."""
+    from rich.markup import escape
+
+    return escape(shown(name))
