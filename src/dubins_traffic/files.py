@@ -55,12 +55,23 @@ def read_bytes(path: str | Path, *, most: int = MOST_BYTES, magic: bytes = b"") 
     return data
 
 
+def is_file(path: str | Path) -> bool:
+    """Tell whether there is a file at a path, whatever the path; one that can't be one names none."""
+    with contextlib.suppress(OSError, ValueError):
+        return Path(path).is_file()
+    return False
+
+
+def exists(path: str | Path) -> bool:
+    """Tell whether there is anything at a path, whatever the path."""
+    with contextlib.suppress(OSError, ValueError):
+        return Path(path).exists()
+    return False
+
+
 def is_stream(path: str | Path) -> bool:
     """Tell whether a path is of something that can be read once only: a pipe, a device."""
-    try:
-        return Path(path).exists() and not Path(path).is_file() and not Path(path).is_dir()
-    except (OSError, ValueError):
-        return False
+    return exists(path) and not is_file(path) and not Path(path).is_dir()
 
 
 def read_text(path: str | Path) -> str:

@@ -15,6 +15,7 @@ from typing import Any, cast
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers import blame
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import is_file
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Controller
 
@@ -172,7 +173,7 @@ def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
 
 def _load_file(place: str, spec: str) -> ModuleType:
     path = Path(place).expanduser()
-    if not path.is_file():
+    if not is_file(path):
         raise _refuse(f"no such file: {place}", spec, "path/to/file.py:Class")
     path = path.resolve()
     label = f"_controller_{path.stem}_{zlib.crc32(str(path).encode()):x}"
