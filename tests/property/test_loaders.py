@@ -161,6 +161,18 @@ def loaded(found: object) -> None:
             run_trial(brief, "simple")
 
 
+def test_a_car_of_no_width_is_refused() -> None:
+    with pytest.raises(InputError, match=r"car\.w: wrong value: got 1e-300; expected a number >= 0\.001"):
+        load_config({**CONFIG, "car": {"w": 1e-300}})
+
+
+def test_no_time_to_leave_is_a_fault_of_the_problem_not_of_ours() -> None:
+    document = {**CONFIG, "rules": {"exit_time": 0.0}, "formulas": {}}
+    instance = draw(load_config(document), 1, 0)
+    with pytest.raises(InputError, match="takes too long through an intersection"):
+        run_trial(instance, "simple")
+
+
 @BOUNDED
 @given(spoilt(CONFIG))
 @example({**CONFIG, "car": {"w": 1e-300}})
