@@ -28,6 +28,8 @@ _ARGUMENTS: Final = {
 """Options of commands, and what the functions behind them call the same."""
 _LONGEST_FIRST: Final = sorted(map(re.escape, _ARGUMENTS), key=len, reverse=True)
 _OPTION: Final = re.compile(rf"(?<![\w./=-])(?:{'|'.join(_LONGEST_FIRST)})(?![\w=./-])")
+LONGEST: Final = 300
+"""Most characters of each part of a message."""
 
 
 class DubinsTrafficError(Exception):
@@ -95,7 +97,7 @@ class InputError(DubinsTrafficError):
         return self._told(str)
 
     def _told(self, say: Callable[[str], str]) -> str:
-        parts = [say(part) for part in (self.file, self.field, self.problem) if part]
+        parts = [shown(say(part), LONGEST) for part in (self.file, self.field, self.problem) if part]
         text = ": ".join(parts)
         if self.value is not _ABSENT:
             text += f": got {_short(self.value)}"
@@ -125,6 +127,10 @@ class TransportError(DubinsTrafficError):
     """A transport can't be opened: no master, port in use, no route."""
 
 
+class WorkerLostError(DubinsTrafficError):
+    """Processes that ran trials ended before these did; the other trials went on."""
+
+
 class ClusterLostError(DubinsTrafficError):
     """The cluster on which a campaign ran is gone; what had been finished is kept."""
 
@@ -149,6 +155,34 @@ def in_python(text: str) -> str:
     return _OPTION.sub(lambda found: _ARGUMENTS[found[0]], text)
 
 
+def shown(text: str, limit: int | None = None) -> str:
+    r"""Return `text` as one line that is safe to print: blanks drawn together, control characters escaped, cut.
+
+    Names of files and values of documents are other people's, and could move the cursor or name another command.
+
+    Parameters
+    ----------
+    text : str
+        What is to be shown.
+    limit : int, optional
+        Most characters; what is cut off leaves three dots.
+
+    Examples
+    --------
+    >>> print(shown("a\n  b\x1b[31mred"))
+    a b\x1b[31mred
+    """
+    if limit is not None and len(text) > 4 * limit:
+        text = text[: 4 * limit] + "..."
+    line = " ".join(text.split())
+    if not line.isprintable():
+        line = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in line)
+    return line if limit is None or len(line) <= limit else line[: max(0, limit - 3)] + "..."
+
+
 def _short(value: object, limit: int = 60) -> str:
-    text = repr(value)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        text = f"<{type(value).__name__} too long to print>"
+    return shown(text, limit)

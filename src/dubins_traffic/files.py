@@ -3,14 +3,75 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 from dubins_traffic.errors import InputError
 
 STANDARD = "-"
+MOST_BYTES = 1 << 28
+"""Most bytes of a document, 256 MiB: some hundred times the largest road network."""
+LOCK = ".lock"
+"""Name of the file that is locked where a folder can't be."""
+
+
+def read_bytes(path: str | Path, *, most: int = MOST_BYTES, magic: bytes = b"") -> bytes:
+    """Return what is in a file or a pipe, read once from its beginning; ``-`` reads standard input.
+
+    Parameters
+    ----------
+    path : str or Path
+        What to read.
+    most : int
+        Most bytes; what holds more is refused, so that nothing is read for ever.
+    magic : bytes
+        What it begins with; of anything else no more is read than these first bytes, which are returned.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is a folder, may not be read, or holds more than `most`.
+    """
+    name = str(path)
+    try:
+        with contextlib.ExitStack() as opened:
+            stream = sys.stdin.buffer if name == STANDARD else opened.enter_context(Path(path).open("rb"))
+            data = stream.read(len(magic))
+            if data == magic:
+                data += stream.read(most + 1 - len(magic))
+    except FileNotFoundError:
+        raise InputError("no such file", file=name) from None
+    except IsADirectoryError:
+        raise InputError("a folder", file=name, expected="a file") from None
+    except PermissionError:
+        raise InputError("no permission to read", file=name) from None
+    except (OSError, ValueError, MemoryError) as error:
+        raise InputError(f"can't be read ({error})", file=name) from None
+    if len(data) > most:
+        raise InputError("too large, or without an end", file=name, expected=f"at most {most >> 20} MiB")
+    return data
+
+
+def is_file(path: str | Path) -> bool:
+    """Tell whether there is a file at a path, whatever the path; one that can't be one names none."""
+    with contextlib.suppress(OSError, ValueError):
+        return Path(path).is_file()
+    return False
+
+
+def exists(path: str | Path) -> bool:
+    """Tell whether there is anything at a path, whatever the path."""
+    with contextlib.suppress(OSError, ValueError):
+        return Path(path).exists()
+    return False
+
+
+def is_stream(path: str | Path) -> bool:
+    """Tell whether a path is of something that can be read once only: a pipe, a device."""
+    return exists(path) and not is_file(path) and not Path(path).is_dir()
 
 
 def read_text(path: str | Path) -> str:
@@ -19,19 +80,13 @@ def read_text(path: str | Path) -> str:
     Raises
     ------
     InputError
-        If there is no such file, it is a folder, may not be read or is not UTF-8.
+        As `read_bytes`, or if it is not UTF-8.
     """
-    name = str(path)
-    try:
-        data = sys.stdin.buffer.read() if name == STANDARD else Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError("no such file", file=name) from None
-    except IsADirectoryError:
-        raise InputError("a folder", file=name, expected="a file") from None
-    except PermissionError:
-        raise InputError("no permission to read", file=name) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"can't be read ({error})", file=name) from None
+    return decoded(read_bytes(path), str(path))
+
+
+def decoded(data: bytes, name: str) -> str:
+    """Return the text that `data` is in UTF-8; InputError, naming the file, if it is none."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -75,6 +130,32 @@ def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool =
     finally:
         with contextlib.suppress(OSError):
             neighbour.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Generator[None]:
+    """Hold the lock of a folder; the system lets go of it when this process ends, however it ends.
+
+    The lock is on the folder itself, or where its file system has no such locks on a file `.lock` in it.
+
+    Raises
+    ------
+    InputError
+        If another process holds it, or there is no such folder.
+    """
+    with contextlib.ExitStack() as held:
+        for name, flags in ((folder, os.O_RDONLY), (folder / LOCK, os.O_RDWR | os.O_CREAT)):
+            try:
+                descriptor = os.open(name, flags, 0o644)
+                held.callback(os.close, descriptor)
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                raise InputError("in use by another process", file=str(folder)) from None
+            except OSError as error:
+                if name != folder or not folder.is_dir():
+                    raise InputError(f"can't be locked ({error.strerror})", file=str(folder)) from None
+        yield
 
 
 def _flush(path: Path) -> None:

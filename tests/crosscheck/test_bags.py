@@ -199,7 +199,7 @@ def test_a_bag_of_several_trials_becomes_as_many_records_of_whole_seconds(
     elsewhere(folder, bag, (0.0, 14.985, 14.97), (16.0, 31.04, 31.04), (32.0, 39.5, 39.5))
     assert main(["convert", str(bag), "-o", str(out)]) == 0
     paths = [out, tmp_path / "three-1.mcap", tmp_path / "three-2.mcap"]
-    assert capsys.readouterr().out.split("\n") == ["3 trials, 3 records:", *map(str, paths), ""]
+    assert capsys.readouterr().err.split("\n") == ["3 trials, 3 records:", *map(str, paths), ""]
     records = [dt.load_record(path) for path in paths]
     assert [record.instance.duration for record in records] == [15.0, 15.0, 7.5]
     assert [len(record.frames) for record in records] == [451, 451, 226]

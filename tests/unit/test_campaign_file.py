@@ -155,7 +155,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"factors": {"speed": [-1.0]}},
-        "c.toml: factors.speed[0]: wrong value: got -1.0; expected a number > 0",
+        "c.toml: factors.speed[0]: wrong value: got -1.0; expected a number >= 1e-06",
     ),
     ({"factors": {"e_agent_kinds": ["tram"]}}, "with e_agent_kinds = tram: e-agents[0].type: unknown type"),
     ({"fields": {"a..b": [1]}}, "not a path of a field: got 'a..b'"),

@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from dubins_traffic.campaign.group import Group, Outcome
 from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.controllers import blame
+from dubins_traffic.controllers.registry import made
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -21,7 +23,7 @@ from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import checked_command
-from dubins_traffic.trial.run import close
+from dubins_traffic.trial.run import close, told
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -87,15 +89,20 @@ class _Seats:
         self._interventions = [0] * len(instances)
         self._trials = np.array([instance.trial for instance in instances])
         if shared is not None:
-            shared.start_batch(self._trials.tolist(), [instance.problem for instance in instances])
+            problems = [instance.problem for instance in instances]
+            self._try(None, lambda: shared.start_batch(self._trials.tolist(), problems))
             return
         for b, instance in enumerate(instances):
-            driver = make()
-            self._drivers.append(driver)
-            self._reports.append(driver.report if isinstance(driver, Reports) else None)
-            started = perf_counter()
-            if self._try(b, lambda driver=driver, problem=instance.problem: driver.start(problem)):
-                self._begin[b] = perf_counter() - started
+            self._seat(b, make, instance.problem)
+
+    def _seat(self, b: int, make: Maker, problem: Problem) -> None:
+        """Make the controller of trial b and tell it the problem; what that raises is its fault."""
+        driver = made(make)
+        self._drivers.append(driver)
+        self._reports.append(driver.report if isinstance(driver, Reports) else None)
+        started = perf_counter()
+        if self._try(b, lambda: driver.start(problem)):
+            self._begin[b] = perf_counter() - started
 
     def ask_each(self) -> None:
         """Let each ego's own controller choose its command."""
@@ -123,10 +130,10 @@ class _Seats:
         if report is None:
             return True
         answer = self._answer
-        heard = self._try(b, report)
+        heard = self._try(b, lambda: told(report()))
         if heard:
-            told = cast("Sequence[tuple[str, str]]", self._answer)
-            self._interventions[b] += sum(kind == SHIELD for kind, _ in told)
+            pairs = cast("Sequence[tuple[str, str]]", self._answer)
+            self._interventions[b] += sum(kind == SHIELD for kind, _ in pairs)
         self._answer = answer
         return heard
 
@@ -160,10 +167,10 @@ class _Seats:
         state, labels = State(*arrays[:6], count=count), Labels(*arrays[6:])
         return BatchView(self._trials[b], group.ticks[b], state, labels, seen)
 
-    def fail(self, detail: str) -> None:
+    def fail(self, error: BaseException) -> None:
         """End all trials as a fault of their controller."""
         for b in self.group.active.tolist():
-            self.group.end(b, End.CONTROLLER_FAULT, f"{detail} at tick {int(self.group.ticks[b])}")
+            self.group.end(b, End.CONTROLLER_FAULT, blame.told(error, int(self.group.ticks[b])))
 
     def step(self, controller: str) -> Iterator[Outcome]:
         """Take all trials to their next frame; yield what came of those that have ended."""
@@ -187,13 +194,19 @@ class _Seats:
         whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
         return State(*reals, count=group.state.count[b : b + 1]), Labels(*whole)
 
-    def _try(self, b: int, call: Callable[[], object]) -> bool:
-        """Call a controller; what it raises is its fault and ends its trial."""
+    def _try(self, b: int | None, call: Callable[[], object]) -> bool:
+        """Call a controller; what it raises is its fault and ends its trial, or all if it is that of all."""
         try:
             self._answer = call()
-        except Exception as error:
-            detail = f"{type(error).__name__}: {error} at tick {int(self.group.ticks[b])}"
-            self.group.end(b, End.CONTROLLER_FAULT, detail)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            blame.show(error)
+            if b is None:
+                self.fail(error)
+            else:
+                detail = blame.told(error, int(self.group.ticks[b]))
+                self.group.end(b, End.CONTROLLER_FAULT, detail)
             return False
         return True
 
@@ -272,9 +285,12 @@ def _ask_all(seats: Sequence[_Seats], controller: BatchController) -> None:
         answer = np.asarray(controller.act_batch(whole), dtype=np.float64)
         if answer.shape != (len(whole.trial), 2):
             raise TypeError(f"act_batch returned {answer.shape}, not {(len(whole.trial), 2)}")
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        blame.show(error)
         for own in seats:
-            own.fail(f"{type(error).__name__}: {error}")
+            own.fail(error)
         return
     row = 0
     for own, view in zip(seats, views, strict=True):

@@ -16,15 +16,18 @@ from typing import TYPE_CHECKING
 from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.campaign.asked import Maker, ask, grouped
 from dubins_traffic.campaign.group import Group, Outcome
+from dubins_traffic.campaign.record_folder import check_folder, claim
+from dubins_traffic.campaign.record_folder import name as record_name
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import locked
 from dubins_traffic.problem.configuration import Configuration, load_config
-from dubins_traffic.problem.draw import draw_many
+from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.kinds import COUNTER, REMOTE
-from dubins_traffic.protocols import Controller, End
+from dubins_traffic.protocols import End
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.viewer.notebook import Sheeted
@@ -65,6 +68,8 @@ def run_batch(
     threads: int = 1,
     keep: str = "none",
     records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
     progress: Progress | None = None,
 ) -> Batch:
     """Run trials of a configuration, `batch` at a time.
@@ -94,7 +99,11 @@ def run_batch(
         more by themselves, since the same seed gives the same bytes; so a controller must do the same in the same
         trial.
     records : path
-        Folder for the records, made if missing.
+        Folder for the records, made if missing; one that holds records is refused, unless one of the following.
+    overwrite : bool
+        Whether records that the folder holds are removed before.
+    append : bool
+        Whether they stay, and are not made again; they must be of the same controller and instances.
     progress : callable, optional
         Told how many trials have ended, each time.
 
@@ -106,7 +115,7 @@ def run_batch(
     found: list[Outcome] = []
     for outcome in run_each(
         configuration, controller, trials=trials, first=first, seed=seed, batch=batch, threads=threads, keep=keep,
-        records=records,
+        records=records, overwrite=overwrite, append=append,
     ):  # fmt: skip
         found.append(outcome)
         if progress is not None:
@@ -130,8 +139,19 @@ def run_each(
     threads: int = 1,
     keep: str = "none",
     records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
 ) -> Iterator[Outcome]:
-    """Do as `run_batch`, and yield what came of each trial as it ends; nothing is kept of it here."""
+    """Run trials as `run_batch` does, and yield what came of each as it ends; nothing is kept of it here.
+
+    The parameters are those of `run_batch`, whose `progress` is not needed here. Outcomes come in the order in which
+    trials end; `in_order` makes a `Batch` of them.
+
+    Raises
+    ------
+    InputError
+        As `run_batch`, when the first outcome is asked for.
+    """
     if not isinstance(configuration, Configuration):
         configuration = load_config(configuration)
     count = configuration.number_trials if trials is None else trials
@@ -140,11 +160,26 @@ def run_each(
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = _kept(keep, count), _folder(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
-    for outcome in outcomes(instances, controller, batch=batch, threads=threads):
-        if folder is None or not kept(outcome.instance.trial - first, outcome):
-            yield outcome
-        else:
-            yield _recorded(outcome, controller, folder)
+    each = outcomes(instances, controller, batch=batch, threads=threads)
+    if folder is None:
+        yield from each
+        return
+    own = partial(draw, configuration, seed)
+    there = claim(folder, called(controller), own, overwrite=overwrite, append=append)
+    with locked(folder):
+        for outcome in each:
+            record = folder / record_name(outcome.instance.trial)
+            if not kept(outcome.instance.trial - first, outcome):
+                yield outcome
+            elif record.name in there:
+                yield replace(outcome, score=replace(outcome.score, record=str(record)))
+            else:
+                yield _recorded(outcome, controller, record)
+
+
+def called(controller: str | Maker) -> str:
+    """Return what a controller is called that is given by name, or by what makes one."""
+    return controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
 
 
 def outcomes(
@@ -155,12 +190,12 @@ def outcomes(
     The parameters are those of `run_batch`. Instances are drawn from their iterator as they are needed. Trials that
     can't be stepped with others (another simulator, formulas of the user's) run by themselves.
     """
-    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
-    make = partial(controllers.load, controller) if isinstance(controller, str) else controller
+    name = called(controller)
+    make = _maker(controller)
     make()
     source = iter(instances)
     if controller != COMPILED:
-        yield from _apart(source, make, lambda rest: ask(rest, make, name, batch))
+        yield from _apart(source, make, name, lambda rest: ask(rest, make, name, batch))
         return
     cancelled = Event()
     waiting: deque[Future[list[Outcome]]] = deque()
@@ -175,6 +210,10 @@ def outcomes(
                 yield from waiting.popleft().result()
         finally:
             cancelled.set()
+
+
+def _maker(controller: str | Maker) -> Maker:
+    return partial(controllers.load, controller) if isinstance(controller, str) else controller
 
 
 def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[list[Instance]]:
@@ -215,7 +254,10 @@ def _compiled_or_alone(instances: Sequence[Instance], cancelled: Event) -> list[
     able = [_can_share(instance) and fit(instance) for instance in instances]
     alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
     together = [own for own, shares in zip(instances, able, strict=True) if shares]
-    return [*(_alone(own, COMPILED) for own in alone), *_compiled(together, cancelled.is_set)]
+    return [
+        *(_alone(own, _maker(COMPILED), COMPILED) for own in alone),
+        *_compiled(together, cancelled.is_set),
+    ]
 
 
 def _compiled(instances: Sequence[Instance], cancelled: Callable[[], bool]) -> Iterator[Outcome]:
@@ -245,7 +287,7 @@ def _fitness() -> Callable[[Instance], bool]:
 
 
 def _apart(
-    source: Iterator[Instance], make: Maker, run: Callable[[Iterator[Instance]], Iterator[Outcome]]
+    source: Iterator[Instance], make: Maker, name: str, run: Callable[[Iterator[Instance]], Iterator[Outcome]]
 ) -> Iterator[Outcome]:
     """Run the trials that can't be stepped with others, and hand on the rest."""
     done: list[Outcome] = []
@@ -255,7 +297,7 @@ def _apart(
             if _can_share(instance):
                 yield instance
             else:
-                done.append(_alone(instance, make()))
+                done.append(_alone(instance, make, name))
 
     for outcome in run(rest()):
         while done:
@@ -287,8 +329,8 @@ def _undisturbed(instance: Instance) -> bool:
     return not noise and own.command_delay == 0 and own.command_loss == 0.0
 
 
-def _alone(instance: Instance, controller: str | Controller) -> Outcome:
-    result = run_trial(instance, controller)
+def _alone(instance: Instance, make: Maker, name: str) -> Outcome:
+    result = run_trial(instance, controllers.made(make), name=name)
     return Outcome(instance, result.ending, result.score)
 
 
@@ -323,21 +365,12 @@ def _folder(keep: str, records: str | os.PathLike[str] | None) -> Path | None:
                 expected="both, or neither",
             )
         return None
-    folder = Path(records)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"can't hold records ({error.strerror})",
-            file=str(folder),
-            expected="a folder, or a place for one",
-        ) from None
-    return folder
+    return check_folder(records)
 
 
-def _recorded(outcome: Outcome, controller: str | Maker, folder: Path) -> Outcome:
+def _recorded(outcome: Outcome, controller: str | Maker, record: Path) -> Outcome:
     """Run a trial once more for its record."""
     instance = outcome.instance
-    driver = controller if isinstance(controller, str) else controller()
-    result = run_trial(instance, driver, record=folder / f"trial-{instance.trial:04d}.mcap", overwrite=True)
+    driver = controllers.made(_maker(controller))
+    result = run_trial(instance, driver, record=record, overwrite=record.exists(), name=called(controller))
     return replace(outcome, ending=result.ending, score=result.score)

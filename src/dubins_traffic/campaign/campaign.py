@@ -18,7 +18,7 @@ from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import read_text
+from dubins_traffic.files import is_file, read_text
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import plain
@@ -129,7 +129,9 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     name = os.fspath(path)
     try:
         document = tomllib.loads(read_text(name))
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
+    except ValueError as error:
         raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
     return Campaign.from_document(document, name, Path(name).parent)
 
@@ -150,7 +152,7 @@ def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -
             return Configuration.from_document(entry.document, folder=folder)
         name = entry.file or ""
         beside = (folder or Path()) / name
-        return load_config(beside if beside.is_file() else name)
+        return load_config(beside if is_file(beside) else name)
     except InputError as error:
         problem = ": ".join(part for part in (error.file, error.field, error.problem) if part)
         raise InputError(problem, field=where, value=error.value, expected=error.expected) from None
@@ -161,7 +163,7 @@ def _place(spec: str, index: int, folder: Path | None) -> str:
     path, colon, name = spec.rpartition(":")
     if colon and path.endswith(".py"):
         beside = (folder or Path()) / Path(path).expanduser()
-        found = beside if beside.is_file() else Path(path).expanduser()
+        found = beside if is_file(beside) else Path(path).expanduser()
         spec = f"{found.resolve()}:{name}"
     try:
         controllers.load(spec)

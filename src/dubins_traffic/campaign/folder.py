@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
 import re
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
@@ -16,10 +14,9 @@ from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.records import FOLDER as RECORDS
 from dubins_traffic.campaign.records import Keep, Records, read_keep
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import replace_file
+from dubins_traffic.files import LOCK, locked, replace_file
 
 PARTS = "parts"
-LOCK = ".lock"
 _PART = re.compile(r"(\d{9})-(\d{9})\.parquet")
 
 
@@ -137,7 +134,7 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
     """
     read_keep(records or Keep.NONE)
     _make(path)
-    with _locked(path):
+    with locked(path):
         known = manifest.read(path)
         if known is None:
             _check_empty(path)
@@ -167,23 +164,6 @@ def _make(folder: Path) -> None:
         raise InputError(
             f"can't hold a campaign ({error.strerror})", file=str(folder), expected=expected
         ) from None
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Generator[None]:
-    """Hold the lock of a folder; the system lets go of it when this process ends, however it ends."""
-    try:
-        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise InputError(f"can't be written ({error.strerror})", file=str(folder)) from None
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError("in use by another process", file=str(folder)) from None
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _check_empty(folder: Path) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from dubins_traffic.campaign.many import Job
+from dubins_traffic.campaign.record_folder import check_folder, claim, name
 from dubins_traffic.campaign.single import Result
 from dubins_traffic.campaign.sources import load
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
@@ -27,11 +29,15 @@ MOST_RUNS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be run: `jobs`, in order; what they are drawn from, if from a configuration; and since when."""
+    """What is to be run: `jobs`, in order; what they are drawn from, if from a configuration; and since when.
+
+    `before` is how many trials are not run since their records are there.
+    """
 
     jobs: tuple[Job, ...]
     configuration: Configuration | None
     data: Path | None = None
+    before: int = 0
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def conclude(self, results: Iterable[Result]) -> ScoreSheet:
@@ -60,6 +66,8 @@ def plan(
     data: str | os.PathLike[str] | None = None,
     overwrite_data: bool = False,
     records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
     deadline: float | None = None,
     simulator: str | None = None,
     show: bool = False,
@@ -85,7 +93,11 @@ def plan(
         Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
     records : path, optional
         Folder for the records, made if missing: ``trial-0000.mcap`` for trial 0; with `repeat`,
-        ``trial-0000-0000.mcap`` for its first run. Records of the same names are replaced.
+        ``trial-0000-0000.mcap`` for its first run. A folder that holds records is refused, unless one of the following.
+    overwrite : bool
+        Whether records that the folder holds are removed before.
+    append : bool
+        Whether they stay, and their trials are not run again; they must be of the same controller and instances.
     deadline : float, optional
         Wall-clock seconds within which each `act` must answer.
     simulator : str, optional
@@ -106,6 +118,9 @@ def plan(
     controller = controllers.shielded(controller) if shield else controller
     controllers.load(controller)
     _check_deadline(deadline)
+    if append and data is not None:
+        expected = "one of them: trial data are of all trials of a run"
+        raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)
     if isinstance(found, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
@@ -127,13 +142,35 @@ def plan(
             "--simulator" if simulator else os.fspath(source), jobs[0].instance.simulator, show=show
         )
     target = None if data is None else check_data_file(Path(data), overwrite_data)
-    folder = None if records is None else check_folder(Path(records))
-    several = [(job, f"-{run:04d}" if repeat > 1 else "") for job in jobs for run in range(repeat)]
-    return Plan(
-        tuple(_complete(job, suffix, folder, deadline, show=show) for job, suffix in several),
-        configuration,
-        target,
-    )
+    several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
+    whole = [replace(job, deadline=deadline, show=show) for job, _ in several]
+    if records is None:
+        if overwrite or append:
+            raise InputError(
+                "are of --records", file="--overwrite, --append", expected="a folder for records"
+            )
+        return Plan(tuple(whole), configuration, target)
+    folder = check_folder(records)
+    kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)
+    left = [
+        _recorded(job, folder / name(job.trial, run)) for job, (_, run) in zip(whole, several, strict=True)
+    ]
+    left = [job for job in left if job.record is not None and job.record.name not in kept]
+    return Plan(tuple(left), configuration, target, len(whole) - len(left))
+
+
+def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:
+    """Return a function that makes the instance of a trial of the source of `jobs`."""
+
+    def make(trial: int) -> Instance:
+        first = jobs[0]
+        if first.configuration is not None:
+            return draw(first.configuration, seed, trial)
+        if first.instance is None or trial != first.trial:
+            raise InputError("no such trial", value=trial)
+        return first.instance
+
+    return make
 
 
 def _drawn(configuration: Configuration, controller: str, trials: int, seed: int) -> list[Job]:
@@ -144,18 +181,17 @@ def _drawn(configuration: Configuration, controller: str, trials: int, seed: int
     return jobs
 
 
-def _complete(job: Job, suffix: str, folder: Path | None, deadline: float | None, *, show: bool) -> Job:
-    record = None if folder is None else folder / f"trial-{job.trial:04d}{suffix}.mcap"
-    return replace(job, record=record, overwrite=True, deadline=deadline, show=show)
+def _recorded(job: Job, record: Path) -> Job:
+    return replace(job, record=record, overwrite=record.exists())
 
 
 def _refuse(source: str, options: dict[str, object]) -> None:
-    for name, value in options.items():
+    for option, value in options.items():
         if value is not None:
             raise InputError(
                 "is for configurations; this is one trial",
                 file=source,
-                field=name,
+                field=option,
                 value=value,
                 expected="a trials configuration, or none of it",
             )
@@ -190,15 +226,3 @@ def check_data_file(path: Path, overwrite: bool) -> Path:
         problem = "a folder" if path.is_dir() else "its folder does not exist"
         raise InputError(problem, file=str(path), expected="a file to write")
     return path
-
-
-def check_folder(folder: Path) -> Path:
-    """Return `folder`, made if missing; InputError if that can't be."""
-    expected = "a folder, or a place for one"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"can't hold records ({error.strerror})", file=str(folder), expected=expected
-        ) from None
-    return folder

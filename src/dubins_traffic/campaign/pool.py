@@ -102,3 +102,5 @@ def _run(chunk: Chunk) -> bytes:
         return run_part(chunk, _around, _cancelled)
     except KeyboardInterrupt:
         raise DubinsTrafficError("interrupted") from None
+    except SystemExit as error:  # handed on, it would end the campaign as if all were well
+        raise DubinsTrafficError(f"a worker was told to end (status {error.code})") from error

@@ -13,7 +13,8 @@ from time import monotonic
 import numpy as np
 
 from dubins_traffic.campaign.foreign import run_under
-from dubins_traffic.campaign.plan import check_data_file, check_folder, check_simulator
+from dubins_traffic.campaign.plan import check_data_file, check_simulator
+from dubins_traffic.campaign.record_folder import check_folder
 from dubins_traffic.campaign.remote import Session, hand_over, quiet, run_remote
 from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.campaign.sources import load
@@ -235,7 +236,7 @@ def programme(
         configuration,
         controller,
         tuple(remote),
-        None if records is None else check_folder(Path(records)),
+        None if records is None else check_folder(records),
         None if data is None else check_data_file(Path(data), overwrite_data),
         shield,
     )

@@ -20,8 +20,8 @@ MOST_TRIALS = 100_000_000
 
 Side = Annotated[int, Field(ge=1, le=limits.INTERSECTIONS)]
 Shape = Annotated[list[Side], Field(min_length=2, max_length=2)]
-Speed = Annotated[float, Field(gt=0, le=limits.SPEED)]
-YawRate = Annotated[float, Field(gt=0, le=limits.RATE)]
+Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
+YawRate = Annotated[float, Field(ge=limits.LEAST, le=limits.RATE)]
 Radius = Annotated[float, Field(ge=0, le=limits.METRES)]
 Seconds = Annotated[float, Field(gt=0, le=limits.SECONDS)]
 

@@ -129,6 +129,7 @@ def run_trial(
     link: Link | None = None,
     simulator: Simulator | None = None,
     sketch: bool = True,
+    name: str | None = None,
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -153,20 +154,16 @@ def run_trial(
         Instead of the one that the instance names; closed when the trial is over.
     sketch : bool
         Whether the result keeps a sketch of the ways of the cars, for pictures: some kilobytes for each car.
+    name : str, optional
+        What record and score call the controller; by default the name by which it was given, or that of its class.
 
     Raises
     ------
     InputError
         If the controller can't be loaded or the record can't be written.
     """
-    if link is not None and link.ego:
-        name, driver = link.transport.name, RemoteController(link)
-        if isinstance(controller, str) and controllers.is_shielded(controller):
-            name, driver = controllers.shielded(name), controllers.under_shield(driver, controller)
-    else:
-        name = controller if isinstance(controller, str) else type(controller).__name__
-        driver = controllers.load(controller) if isinstance(controller, str) else controller
-        driver = driver if link is None else LocalController(link, driver)
+    called, driver = _driver(controller, link)
+    name = called if name is None else name
     scorer, paths = Scorer(), Paths()
     writer = None
     if record is not None:
@@ -190,6 +187,18 @@ def run_trial(
         wall.write(path, measured)
     score = scorer.result(controller=name, record=path, wall=measured)
     return Result(instance, name, ending, score, measured, path, paths if sketch else None)
+
+
+def _driver(controller: str | Controller, link: Link | None) -> tuple[str, Controller]:
+    """Return what the ego's controller is called, and the controller."""
+    if link is not None and link.ego:
+        name, driver = link.transport.name, RemoteController(link)
+        if isinstance(controller, str) and controllers.is_shielded(controller):
+            return controllers.shielded(name), controllers.under_shield(driver, controller)
+        return name, driver
+    name = controller if isinstance(controller, str) else type(controller).__name__
+    driver = controllers.load(controller) if isinstance(controller, str) else controller
+    return name, driver if link is None else LocalController(link, driver)
 
 
 def _over(link: Link, measured: wall.Wall) -> wall.Wall:

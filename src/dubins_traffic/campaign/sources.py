@@ -7,6 +7,7 @@ import sys
 from io import BufferedReader
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import is_stream, read_bytes
 from dubins_traffic.problem.configuration import Configuration, find_source
 from dubins_traffic.problem.document import instance_from_document
 from dubins_traffic.problem.files import (
@@ -17,6 +18,7 @@ from dubins_traffic.problem.files import (
     is_record,
     is_text_network,
     parse_json,
+    source_of,
 )
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import reader
@@ -72,9 +74,16 @@ def load_record(source: str | os.PathLike[str]) -> Record:
 def _load(
     source: str | os.PathLike[str], rnd: str | os.PathLike[str] | None, seed: int
 ) -> RoadNetwork | Configuration | Instance | Record:
+    name = os.fspath(source)
     if _holds_record(source):
         return load_record(source)
-    found = find_source(source)
+    if is_stream(name):
+        data = read_bytes(name)
+        if data.startswith(MCAP_MAGIC):
+            return reader.from_bytes(data, name)
+        found = source_of(data, name)
+    else:
+        found = find_source(source)
     if is_text_network(found.text):
         return RoadNetwork.from_text(found.text, found.name)
     document = parse_json(found.text, found.name)

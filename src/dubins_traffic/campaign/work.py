@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -53,7 +54,8 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
     """
     if records is not None:
         records.check()
-    controllers.load(chunk.controller)
+    with contextlib.suppress(controllers.ConstructionError):  # that is the fault of a trial
+        controllers.load(chunk.controller)
     chunk = replace(chunk, configuration=_known(chunk.configuration))
     found: dict[int, rows.Row] = {}
     together = [k for k in range(chunk.count) if not _is_alone(chunk, k, records)]
@@ -103,7 +105,7 @@ def _together(chunk: Chunk, some: Sequence[int], cancelled: Event | None) -> dic
         for outcome in run_together(instances, chunk.controller, stop):
             k = outcome.instance.trial - chunk.trial
             found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
-    except Exception:  # whose fault it is shows when each is run by itself
+    except (Exception, SystemExit):  # whose fault it is shows when each is run by itself
         return {}
     return found
 
@@ -137,7 +139,7 @@ def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Event | None)
         found = rows.row(number, result.ending, result.score, result.wall.act_s)
     except DubinsTrafficError as error:
         found = rows.failure(number, rows.FAILED, str(error))
-    except Exception as error:  # one bad trial is a row, never the end of the campaign
+    except (Exception, SystemExit) as error:  # one bad trial is a row, never the end of the campaign
         found = rows.failure(number, rows.FAILED, f"{type(error).__name__}: {error}")
     if records is not None and record is not None and not records.keeps(found):
         remove_record(record)

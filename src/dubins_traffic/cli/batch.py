@@ -49,9 +49,9 @@ def batch(
             "--keep", metavar="none|all|failures|sample:K", help="Of which trials a record is kept."
         ),
     ] = "none",
-    records: Annotated[
-        str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
-    ] = None,
+    records: options.Records = None,
+    overwrite: options.Overwrite = False,
+    append: options.Append = False,
     shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
@@ -77,9 +77,11 @@ def batch(
         threads=threads,
         keep=keep,
         records=records,
+        overwrite=overwrite,
+        append=append,
     )
     try:
-        with progress(count) as tell:
+        with faults.no_silent_end(), progress(count) as tell:
             for outcome in each:
                 done.append(outcome)
                 tell(len(done), count)
@@ -89,6 +91,7 @@ def batch(
     finally:
         if done:
             show(in_order(done).sheet, json=json)
+            options.tell(*(() if records is None else (records,)))
     failed = [outcome for outcome in in_order(done).outcomes if outcome.ending.end in FAULTS]
     for outcome in failed:
         faults.tell(f"trial {outcome.instance.trial}: {outcome.ending.end}: {outcome.ending.detail}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,7 +41,7 @@ def check(
         print(json_text.dumps({"records": found}, indent=2))
     else:
         for record, scored in scores:
-            _show(record, scored)
+            _show(shown(record), scored)
     notice = assumption_notice(*ScoreSheet(tuple(scored for _, scored in scores)).assumption_broken)
     if notice:
         faults.tell(notice)
@@ -76,7 +77,7 @@ def _show(record: str, score: Score) -> None:
     else:
         _show_verdict(record, verdict, console)
     for found in score.formulas:
-        console.print(f"  {found.name}: {verdict_text(found)}", markup=False)
+        console.print(f"  {shown(found.name)}: {verdict_text(found)}", markup=False)
     if verdict is not None and verdict.violations:
         console.print(_breaches(verdict))
 

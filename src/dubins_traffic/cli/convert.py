@@ -54,27 +54,29 @@ def convert(
     from dubins_traffic.campaign.bags import write_bag
     from dubins_traffic.campaign.lcm_log import is_log, log_to_records
     from dubins_traffic.campaign.sources import load
+    from dubins_traffic.files import is_stream
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
-    if is_bag(file) or is_log(file):
+    if not is_stream(file) and (is_bag(file) or is_log(file)):
         if Path(output).suffix.lower() != ".mcap":
             raise InputError(
                 "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
             )
         records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=True)
-        if len(records) > 1:
-            options.tell("\n".join([f"{len(records)} trials, {len(records)} records:", *map(str, records)]))
+        count = [f"{len(records)} trials, {len(records)} records:"] if len(records) > 1 else []
+        options.tell(*count, *map(str, records))
         return
     found = load(file)
     suffix = Path(output).suffix.lower()
     if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
         write_sdf(found.instance if isinstance(found, Record) else found, output, Version(sdf.value))
     elif isinstance(found, Record) and suffix == ".bag":
-        options.tell(str(write_bag(found, output)))
+        options.tell(output, str(write_bag(found, output)))
+        return
     elif isinstance(found, Record):
         export(found, output)
     elif isinstance(found, RoadNetwork):
@@ -86,3 +88,4 @@ def convert(
         found.write(output)
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
+    options.tell(output)

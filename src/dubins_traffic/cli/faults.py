@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from itertools import pairwise
-from typing import Final
+from typing import Final, NoReturn
 
 import typer
 
-from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.controllers.blame import DEBUG
+from dubins_traffic.errors import DubinsTrafficError, InputError, WorkerLostError, shown
 
 OK: Final = 0
 FAILED: Final = 1
 WRONG_INPUT: Final = 2
 
 PROGRAM: Final = "dubins-traffic"
+COMPLETION: Final = "_DUBINS_TRAFFIC_COMPLETE"
+"""Name of the environment variable by which a shell asks for completions."""
 
 
 def conclude(error: Exception, arguments: Sequence[str]) -> int:
@@ -36,8 +41,7 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
         2 where the input is wrong, 0 where the reader of our output had enough, 1 otherwise.
     """
     if isinstance(error, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
+        return _hang_up()
     if "--debug" in arguments:
         traceback.print_exception(error)
     text, status = _verdict(error, arguments)
@@ -47,12 +51,73 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
 
 def tell(text: str) -> None:
     """Print one line about something wrong on standard error."""
-    print(f"{PROGRAM}: {' '.join(text.split())}", file=sys.stderr)
+    with contextlib.suppress(BrokenPipeError):  # whoever read it has had enough
+        print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+
+
+def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:
+    """Return the exit status where something wanted the program to end, as libraries do whose output nobody reads.
+
+    Parameters
+    ----------
+    error : SystemExit
+        What was raised.
+    arguments : sequence of str
+        The command line; a request to complete one ends so by right.
+    """
+    if isinstance(error.__context__, BrokenPipeError):
+        return _hang_up()
+    if COMPLETION in os.environ or any(word.endswith("-completion") for word in arguments):
+        return OK if error.code is None else int(error.code)
+    tell(f"unexpected SystemExit: {error.code}")
+    return FAILED
+
+
+def _hang_up() -> int:
+    """Let what is still to be printed go nowhere: the reader of our output had enough, which is no error."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.__stdout__ or sys.stdout).fileno())
+    return OK
+
+
+@contextlib.contextmanager
+def debugging(wanted: bool) -> Generator[None]:
+    """Let whole tracebacks of controllers be shown in the body, if `wanted`, also by processes that begin in it."""
+    if not wanted:
+        yield
+        return
+    os.environ[DEBUG] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[DEBUG]
+
+
+@contextlib.contextmanager
+def no_silent_end() -> Generator[None]:
+    """Let `os._exit` in this thread raise SystemExit: a controller that calls it ends its trial, not the program.
+
+    Elsewhere, in other threads and in processes that were forked, it does what it always does.
+    """
+    real, process, thread = os._exit, os.getpid(), threading.get_ident()
+
+    def leave(status: int) -> NoReturn:
+        if (os.getpid(), threading.get_ident()) != (process, thread):
+            real(status)
+        raise SystemExit(f"os._exit({status})")
+
+    os._exit = leave
+    try:
+        yield
+    finally:
+        os._exit = real
 
 
 def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
     if isinstance(error, InputError):
         return error.on_command_line(), WRONG_INPUT
+    if isinstance(error, WorkerLostError):
+        return str(error), FAILED
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT
     if isinstance(error, typer.TyperException):

@@ -99,8 +99,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
+        with faults.debugging("--debug" in arguments):
+            status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
+    except SystemExit as error:
+        return faults.conclude_exit(error, arguments)
     except Exception as error:
         return faults.conclude(error, arguments)
     return faults.FAILED if status == INTERRUPTED else int(status or faults.OK)

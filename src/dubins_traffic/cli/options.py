@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import InputError, shown
 
 
 def examples(*lines: str) -> str:
@@ -62,14 +62,35 @@ Shield = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 Data = Annotated[
     str | None,
-    typer.Option("-f", metavar="DATA", help="Write the trial data file of 2016; don't overwrite one."),
+    typer.Option(
+        "--trial-data",
+        "-f",
+        metavar="DATA",
+        help="Write the trial data file of 2016; one that exists is refused.",
+    ),
 ]
-DataOver = Annotated[str | None, typer.Option("-F", metavar="DATA", help="The same, overwriting one.")]
+DataOver = Annotated[
+    str | None,
+    typer.Option(
+        "--overwrite-trial-data", "-F", metavar="DATA", help="The same, overwriting one that exists."
+    ),
+]
 Network = Annotated[
     str | None, typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's.")
 ]
 Records = Annotated[
     str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
+]
+Overwrite = Annotated[
+    bool,
+    typer.Option("--overwrite", help="Remove the records that are in DIR before; else they are refused."),
+]
+Append = Annotated[
+    bool,
+    typer.Option(
+        "--append",
+        help="Leave the records in DIR that are of the same run, and run the trials that have none.",
+    ),
 ]
 Source = Annotated[
     str,
@@ -97,13 +118,14 @@ def trial_data(data: str | None, data_over: str | None) -> str | None:
 
 
 def write(text: str, output: str | None) -> None:
-    """Print `text`, or write it to the file `output`, whole or not at all."""
+    """Print `text`, or write it to the file `output`, whole or not at all, and say so."""
     if output is None or output == "-":
         sys.stdout.write(text)
         return
     from dubins_traffic.files import write_text
 
     write_text(output, text)
+    tell(output)
 
 
 def beside(file: str, suffix: str) -> str:
@@ -119,6 +141,7 @@ def beside(file: str, suffix: str) -> str:
     return str(Path(file).with_suffix(suffix))
 
 
-def tell(output: str) -> None:
-    """Say which file has been written."""
-    print(output)
+def tell(*outputs: str) -> None:
+    """Say which files have been written, a line each on standard error: standard output is for what was asked."""
+    for output in outputs:
+        print(shown(output), file=sys.stderr)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import WorkerLostError
 
 if TYPE_CHECKING:
     from dubins_traffic.campaign.single import Result
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
 EXAMPLES = options.examples(
     "run demo",
     "run demo --controller simple --trials 20 --jobs 2 --records out",
-    "run my-trials.json --controller my_controller.py:MyController -f data.json",
+    "run my-trials.json --controller my_controller.py:MyController --trial-data data.json",
+    "run demo --trials 40 --records out --append",
     "run out/trial-0003.mcap --controller simple --json",
     "run town --controller lanes --shield",
     "run demo --simulator gazebo --records out",
@@ -57,6 +59,8 @@ def run(
     data: options.Data = None,
     data_over: options.DataOver = None,
     records: options.Records = None,
+    overwrite: options.Overwrite = False,
+    append: options.Append = False,
     deadline: Annotated[
         float | None,
         typer.Option(
@@ -96,26 +100,39 @@ def run(
         data=options.trial_data(data, data_over),
         overwrite_data=data is None,
         records=records,
+        overwrite=overwrite,
+        append=append,
         deadline=deadline,
         simulator=simulator,
         show=gui,
         shield=shield,
     )
     results: list[Result] = []
+    lost: WorkerLostError | None = None
+    if todo.before:
+        faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
     try:
-        with progress(len(todo.jobs), hidden=controller == "keyboard") as tell:
+        with (
+            faults.no_silent_end(),
+            progress(len(todo.jobs), hidden=controller == "keyboard") as tell,
+        ):
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 tell(len(results), len(todo.jobs))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
         raise
+    except WorkerLostError as error:
+        lost = error
     finally:
         if results:
             show(todo.conclude(results), json=json)
+            options.tell(*(str(written) for written in (records, todo.data) if written is not None))
     failed = [result for result in results if result.ending.end in FAULTS]
     for result in failed:
         ending = result.ending
         faults.tell(f"trial {result.instance.trial}: {ending.end}: {ending.detail}")
-    if failed:
+    if lost is not None:
+        faults.tell(str(lost))
+    if failed or lost is not None:
         raise typer.Exit(faults.FAILED)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dubins_traffic.cli import faults
+from dubins_traffic.errors import shown
 from dubins_traffic.scoring.notice import assumption_notice
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
     if len(names) > 1:
         table.add_column("controller", overflow="fold")
     else:
-        table.title = f"controller [b]{names[0]}[/b]"
+        table.title = f"controller [b]{_safe(names[0])}[/b]"
     room = width - len("trial") - (1 + min(20, max(map(len, names))) if len(names) > 1 else 0)
     columns = _fitting(_needed(sheet.trials), sheet, room)
     for heading, column in columns.items():
@@ -152,7 +153,7 @@ def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
         table.add_column(_heading(heading), footer=_narrow(footer, 10), justify=align, no_wrap=True)
     for name, scores in ranked.items():
         for score in scores:
-            leading = [str(score.trial), *([name] if len(names) > 1 else [])]
+            leading = [str(score.trial), *([_safe(name)] if len(names) > 1 else [])]
             table.add_row(*leading, *(_narrow(column.cell(score), 10) for column in columns.values()))
     return table
 
@@ -169,7 +170,7 @@ def formula_table(sheet: ScoreSheet) -> Table:
     table.add_column("verdict", no_wrap=True)
     for score in sheet.trials:
         for found in score.formulas:
-            table.add_row(str(score.trial), Text(found.name), verdict_text(found))
+            table.add_row(str(score.trial), Text(shown(found.name)), verdict_text(found))
     return table
 
 
@@ -219,3 +220,10 @@ def _heading(heading: str) -> str:
 def _narrow(text: str, width: int = 0) -> str:
     """Return the words of what is wider than `width` below one another, so that a table fits 80 columns."""
     return text.replace(" ", "\n") if len(text) > width else text
+
+
+def _safe(name: str) -> str:
+    """Return somebody else's name so that it can stand in a table: neither control characters nor markup act."""
+    from rich.markup import escape
+
+    return escape(shown(name))

@@ -7,12 +7,16 @@ import importlib.util
 import re
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
+from dubins_traffic.cars.state import Observation
+from dubins_traffic.controllers import blame
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import is_file
+from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Controller
 
 _BUILT_IN = {
@@ -39,6 +43,44 @@ _OPTION = "--controller"
 _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
 
+class ConstructionError(InputError):
+    """The class of a user's controller raised when it was to be made; the cause is what it raised."""
+
+
+class Unmade:
+    """In place of a controller that could not be made: its trial ends as the fault that this was."""
+
+    def __init__(self, cause: BaseException) -> None:
+        self._cause = cause
+
+    def start(self, problem: Problem) -> None:  # noqa: ARG002  # it never comes to drive
+        """Raise what making the controller raised."""
+        raise self._cause
+
+    def act(self, observation: Observation) -> None:
+        """Give up; no trial comes as far as this."""
+
+
+def made(make: Callable[[], Controller]) -> Controller:
+    """Return the controller that `make` makes, for one trial; if that raises, one whose trial ends as its fault.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller, which is no trial's fault.
+    """
+    try:
+        return make()
+    except KeyboardInterrupt:
+        raise
+    except ConstructionError as error:
+        return Unmade(error.__cause__ or error)
+    except InputError:
+        raise
+    except BaseException as error:
+        return Unmade(error)
+
+
 def names() -> Mapping[str, str]:
     """Return the built-in controllers: name to one line of description."""
     return dict(_DESCRIPTIONS)
@@ -59,8 +101,9 @@ def load(spec: str) -> Controller:
     Raises
     ------
     InputError
-        If there is no such name, module, file or class, if the code raises while it is loaded or constructed, or
-        if the object lacks a method of `dubins_traffic.protocols.Controller`.
+        If there is no such name, module, file or class, if the code raises while it is loaded or constructed (then a
+        `ConstructionError`), or if the object lacks a method of `dubins_traffic.protocols.Controller`. Whatever it
+        raises counts, `SystemExit` too; only Ctrl-C goes through.
     """
     if is_shielded(spec):
         return under_shield(load(_SHIELD.sub("", spec)), spec)
@@ -84,9 +127,14 @@ def load(spec: str) -> Controller:
         raise _refuse(f"{name} in {place} is not a class", spec, "a class without arguments")
     try:
         made = maker()
-    except Exception as error:
-        raise _refuse(
-            f"{name} raised {_said(error)} on construction", spec, "a class without arguments"
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise ConstructionError(
+            f"{name} raised {blame.told(error)} on construction",
+            file=_OPTION,
+            value=spec,
+            expected="a class without arguments",
         ) from error
     for method in ("start", "act"):
         if not callable(getattr(made, method, None)):
@@ -125,7 +173,7 @@ def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
 
 def _load_file(place: str, spec: str) -> ModuleType:
     path = Path(place).expanduser()
-    if not path.is_file():
+    if not is_file(path):
         raise _refuse(f"no such file: {place}", spec, "path/to/file.py:Class")
     path = path.resolve()
     label = f"_controller_{path.stem}_{zlib.crc32(str(path).encode()):x}"
@@ -137,10 +185,12 @@ def _load_file(place: str, spec: str) -> ModuleType:
     _look_in(str(path.parent))
     try:
         found.loader.exec_module(module)
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         del sys.modules[label]
         raise _refuse(
-            f"{place} raised {_said(error)} while it was loaded", spec, "a file that loads"
+            f"{place} raised {blame.told(error)} while it was loaded", spec, "a file that loads"
         ) from error
     return module
 
@@ -156,11 +206,13 @@ def _load_module(place: str, spec: str) -> ModuleType:
                 f"no module {place}", spec, "module:Class that can be imported from here"
             ) from error
         raise _refuse(
-            f"{place} raised {_said(error)} while it was loaded", spec, "a module that loads"
+            f"{place} raised {blame.told(error)} while it was loaded", spec, "a module that loads"
         ) from error
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise _refuse(
-            f"{place} raised {_said(error)} while it was loaded", spec, "a module that loads"
+            f"{place} raised {blame.told(error)} while it was loaded", spec, "a module that loads"
         ) from error
 
 
@@ -177,11 +229,6 @@ def _offer(module: ModuleType) -> str:
         if isinstance(value, type) and callable(getattr(value, "act", None))
     )
     return f"one of {', '.join(found)}" if found else "a class with the methods start and act"
-
-
-def _said(error: BaseException) -> str:
-    text = str(error)
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _refuse(problem: str, spec: str, expected: str) -> InputError:

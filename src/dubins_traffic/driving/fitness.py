@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.body import Disc
@@ -67,7 +67,7 @@ def _check_times(problem: Problem) -> None:
     """Refuse a car that takes longer through a disc than E4 allows."""
     bounds, radius, reach = problem.car.bounds, problem.intersection_radius, problem.car.body.reach
     allowed = LATE * RuleParameters.from_mapping(problem.rules).exit_time
-    least = LONGEST_WAY * (radius + reach) / allowed
+    least = LONGEST_WAY * (radius + reach) / allowed if allowed > 0.0 else inf
     if bounds.speed < least:
         raise _refuse(
             "takes too long through an intersection",

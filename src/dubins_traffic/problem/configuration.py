@@ -14,6 +14,7 @@ from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import count
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import exists, is_file
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import Kind, Source, detect, parse_json, plain, read_source
@@ -177,10 +178,10 @@ def find_source(name: str | os.PathLike[str]) -> Source:
         If there is neither.
     """
     text = os.fspath(name)
-    if text in shipped_names() and not Path(text).is_file():
+    if text in shipped_names() and not is_file(text):
         item = files("dubins_traffic.problem") / "configurations" / f"{text}.json"
         return Source(text, None, item.read_text(encoding="utf-8"))
-    if text != "-" and not Path(text).exists() and not Path(text).suffix and os.sep not in text:
+    if text != "-" and not exists(text) and not Path(text).suffix and os.sep not in text:
         known = ", ".join(shipped_names())
         raise InputError(
             "no such file or shipped configuration", file=text, expected=f"a file or one of {known}"
@@ -241,8 +242,8 @@ def _network(rnd: Any, folder: Path | None) -> RoadNetwork | None:
         except InputError as error:
             raise error.within(field="rnd") from None
     beside = (folder or Path()) / rnd
-    path = beside if beside.is_file() else Path(rnd)
-    if rnd != "-" and not path.exists():
+    path = beside if is_file(beside) else Path(rnd)
+    if rnd != "-" and not exists(path):
         expected = "a file beside the configuration or in the current directory"
         raise InputError("no such file", field="rnd", value=rnd, expected=expected)
     return RoadNetwork.read(rnd if rnd == "-" else str(path))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import read_text, write_text
+from dubins_traffic.files import decoded, is_stream, read_bytes, write_text
 
 STANDARD_INPUT = "-"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -48,12 +48,26 @@ def read_source(path: str | os.PathLike[str]) -> Source:
     """
     name = os.fspath(path)
     if is_record(name):
-        raise InputError("a record", file=name, value=name, expected="a document in JSON or a road network")
-    return Source(name, None if name == STANDARD_INPUT else Path(name).parent, read_text(name))
+        raise _refuse_record(name)
+    return source_of(read_bytes(name), name)
+
+
+def source_of(data: bytes, name: str) -> Source:
+    """Return what has been read of the file called `name`; the exceptions are those of `read_source`."""
+    if data.startswith(MCAP_MAGIC):
+        raise _refuse_record(name)
+    folder = None if name == STANDARD_INPUT or is_stream(name) else Path(name).parent
+    return Source(name, folder, decoded(data, name))
+
+
+def _refuse_record(name: str) -> InputError:
+    return InputError("a record", file=name, value=name, expected="a document in JSON or a road network")
 
 
 def is_record(path: str | os.PathLike[str]) -> bool:
-    """Tell whether the file at `path` begins like a record (MCAP)."""
+    """Tell whether the file at `path` begins like a record (MCAP); nothing is read of what can be read only once."""
+    if is_stream(os.fspath(path)):
+        return False
     try:
         with Path(path).open("rb") as stream:
             return stream.read(len(MCAP_MAGIC)) == MCAP_MAGIC
@@ -169,6 +183,18 @@ def _object(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     return result
 
 
+def _checked_text(text: str, path: str) -> str:
+    """Return a text that can be written; halves of a pair of surrogates, which JSON can escape, can't."""
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        bad = text[error.start : error.end]
+        raise InputError(
+            "not a text", field=path or None, value=bad, expected="characters of Unicode"
+        ) from None
+    return text
+
+
 def _plain(value: object, path: str, depth: int) -> Any:
     if depth > _DEEPEST:
         raise InputError("nested too deep", field=path[:60], expected=f"at most {_DEEPEST} levels")
@@ -177,6 +203,7 @@ def _plain(value: object, path: str, depth: int) -> Any:
         for key, item in cast("Mapping[object, object]", value).items():
             if not isinstance(key, str):
                 raise InputError("not a key", field=path or None, value=key, expected="a text")
+            _checked_text(key, path)
             result[key] = _plain(item, f"{path}.{key}" if path else key, depth + 1)
         return result
     if isinstance(value, list | tuple):
@@ -184,6 +211,8 @@ def _plain(value: object, path: str, depth: int) -> Any:
         return [_plain(item, f"{path}[{k}]", depth + 1) for k, item in enumerate(items)]
     if isinstance(value, float) and not math.isfinite(value):
         raise InputError("not a finite number", field=path, value=value, expected="a finite number")
-    if value is None or isinstance(value, bool | int | float | str):
+    if isinstance(value, str):
+        return _checked_text(value, path)
+    if value is None or isinstance(value, bool | int | float):
         return value
     raise InputError("not a JSON value", field=path, value=value, expected="what JSON can hold")

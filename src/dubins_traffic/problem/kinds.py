@@ -16,7 +16,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, parse
 
-Speed = Annotated[float, Field(gt=0, le=limits.SPEED)]
+Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
 Seconds = Annotated[float, Field(ge=0, le=limits.SECONDS)]
 Share = Annotated[float, Field(ge=0, le=1)]

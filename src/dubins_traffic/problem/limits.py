@@ -1,12 +1,17 @@
 """Largest values that documents may ask for; beyond them a request is refused at once, before anything is built.
 
-They are far above what a trial can use and low enough that no size, tick or coordinate overflows.
+They are far above what a trial can use and low enough that no size, tick or coordinate overflows. The least values are as
+far below.
 """
 
 from __future__ import annotations
 
 METRES = 1e6
 """Largest coordinate, length, radius, metres."""
+LEAST = 1e-6
+"""Smallest length, speed and yaw rate that is not 0."""
+WIDTHS = (1e-3, 1e3)
+"""Smallest and largest nominal width of a car, metres; random networks are drawn for these."""
 SPEED = 1e3
 """Largest speed, m/s."""
 RATE = 1e5

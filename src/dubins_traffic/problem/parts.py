@@ -31,7 +31,8 @@ from dubins_traffic.problem.faults import Strict, fault
 from dubins_traffic.problem.instance import Disturbances, Laser
 from dubins_traffic.spec.parameters import RuleParameters
 
-Length = Annotated[float, Field(gt=0, le=limits.METRES)]
+Length = Annotated[float, Field(ge=limits.LEAST, le=limits.METRES)]
+Width = Annotated[float, Field(ge=limits.WIDTHS[0], le=limits.WIDTHS[1])]
 Coordinate = Annotated[float, Field(ge=-limits.METRES, le=limits.METRES)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
@@ -78,10 +79,10 @@ class BodyModel(Strict):
 class BoundsModel(Strict):
     """Bounds on commands."""
 
-    speed: Annotated[float, Field(gt=0, le=limits.SPEED)] = Field(
+    speed: Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)] = Field(
         default=_CAR.bounds.speed, description="largest speed, m/s"
     )
-    yaw_rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(
+    yaw_rate: Annotated[float, Field(ge=limits.LEAST, le=limits.RATE)] = Field(
         default=_CAR.bounds.yaw_rate, description="largest yaw rate, rad/s; times the period at most 1/2"
     )
     speed_min: Annotated[float, Field(ge=-limits.SPEED, le=limits.SPEED)] | None = Field(
@@ -106,7 +107,7 @@ class BoundsModel(Strict):
 class CarModel(Strict):
     """The car; all cars of a trial are alike."""
 
-    w: Length = Field(default=_CAR.w, description="nominal width that sets the roads (lanes 2w, roads 4w), m")
+    w: Width = Field(default=_CAR.w, description="nominal width that sets the roads (lanes 2w, roads 4w), m")
     body: BodyModel = Field(default=BodyModel(disc=DiscModel()), description="the body that collides")
     bounds: BoundsModel = Field(default=BoundsModel(), description="bounds on commands")
 

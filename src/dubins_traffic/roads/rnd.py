@@ -24,6 +24,8 @@ LARGEST_GRID = 100_000
 LENGTHS = (1e-3, 1e6)
 WORLD = 1e6
 TURNS = 1e5
+DEEPEST = 100
+"""Most levels of what stands under a key that version 0 does not know."""
 FIELDS = ("version", "length", "transform", "shape", "segments")
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -212,15 +214,32 @@ def checked_segments(value: object) -> tuple[Segment, ...]:
 
 
 def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the unknown keys, if JSON can hold them."""
+    """Return the unknown keys, if JSON can hold them in texts of Unicode, not nested too deep."""
     for key, value in extra.items():
         if not isinstance(key, str):
             raise InputError("not a key", value=key, expected="a string")
         try:
-            json.dumps(value, allow_nan=False)
+            json.dumps({key: value}, allow_nan=False, ensure_ascii=False).encode()
         except (TypeError, ValueError, RecursionError):
             raise InputError("not a JSON value", field=key, value=value) from None
+        if _is_deep(value):
+            raise InputError("nested too deep", field=key, expected=f"at most {DEEPEST} levels")
     return dict(extra)
+
+
+def _is_deep(value: object) -> bool:
+    """Whether a JSON value has more than `DEEPEST` levels."""
+    level: list[object] = [value]
+    for _ in range(DEEPEST):
+        level = [
+            item
+            for outer in level
+            if isinstance(outer, list | tuple | dict)
+            for item in (cast("dict[str, object]", outer).values() if isinstance(outer, dict) else outer)  # pyright: ignore[reportUnknownVariableType]
+        ]
+        if not level:
+            return False
+    return True
 
 
 def write_json(document: Mapping[str, Any]) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Contact
+from dubins_traffic.cars.state import EGO, Command, Contact
+from dubins_traffic.controllers.blame import said
 from dubins_traffic.errors import ControllerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import End
@@ -25,15 +27,38 @@ def checked_command(command: object, tick: int) -> tuple[float, float]:
         If it is anything else: a controller fault.
     """
     try:
-        speed, yaw = cast("tuple[float, float]", command)  # what is no pair is refused just below
-        speed, yaw = float(speed), float(yaw)
-    except (TypeError, ValueError) as error:
-        detail = f"a command is two numbers (speed, yaw rate): got {command!r:.80}"
+        speed, yaw = _pair(command)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # what is no number may do anything when it is read as one
+        detail = f"a command is two numbers (speed, yaw rate): got {said(command, 80)} at tick {tick}"
         raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
     if not (math.isfinite(speed) and math.isfinite(yaw)):
         detail = f"a command is two finite numbers: got ({speed}, {yaw}) at tick {tick}"
         raise ControllerError(End.CONTROLLER_FAULT.value, detail)
     return speed, yaw
+
+
+def _pair(command: object) -> tuple[float, float]:
+    """Return a row of two numbers as floats; raises whatever its parts raise, TypeError if it is no such row."""
+    if type(command) not in (tuple, Command) and not _is_row(command):
+        raise TypeError("not a row")
+    speed, yaw = cast("tuple[float, float]", command)
+    return _number(speed), _number(yaw)
+
+
+def _is_row(value: object) -> bool:
+    """Whether a value has an order and a length: no generator, set, mapping or text."""
+    ordered = hasattr(value, "__getitem__") and hasattr(value, "__len__")
+    return ordered and not isinstance(value, str | bytes | bytearray | Mapping)
+
+
+def _number(value: object) -> float:
+    if type(value) is float:
+        return value
+    if isinstance(value, str | bytes | bytearray) or getattr(value, "shape", ()) != ():
+        raise TypeError("not a number")
+    return float(cast("float", value))
 
 
 def agent_fault(instance: Instance, commands: Floats) -> str:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Sequence
 from time import perf_counter
 from types import FrameType
+from typing import Final, cast
 
-from dubins_traffic.errors import ControllerError, PeerError
+from dubins_traffic.controllers import blame
+from dubins_traffic.errors import ControllerError, PeerError, shown
 from dubins_traffic.protocols import Closes, Controller, End, Ending, Reports
 from dubins_traffic.record.wall import Wall, measured, summary
 from dubins_traffic.trial.trial import Trial
+
+CLOSE_RAISED: Final = "close raised"
+"""In the detail of an ending, before what a controller's `close` raised."""
 
 
 class _TooLateError(Exception):
@@ -61,7 +66,7 @@ def _drive(trial: Trial, controller: Controller, deadline: float | None, latenci
         latencies.append(elapsed)
         if report is not None:
             with _Answerable(trial):
-                for kind, detail in report():
+                for kind, detail in told(report()):
                     trial.note(kind, detail)
         if deadline is not None and elapsed > deadline:
             raise _late(trial, deadline)
@@ -74,7 +79,8 @@ def _drive(trial: Trial, controller: Controller, deadline: float | None, latenci
 class _Answerable:
     """Whatever the controller raises in the body is its fault, and becomes the named end of its trial.
 
-    A PeerError names the end by itself.
+    That includes SystemExit: a controller ends its trial, not the program. Only Ctrl-C goes through, and a PeerError
+    names the end by itself.
     """
 
     __slots__ = ("_trial",)
@@ -90,9 +96,30 @@ class _Answerable:
     ) -> None:
         if isinstance(error, _TooLateError):
             raise _late(self._trial, error.deadline) from None
-        if isinstance(error, Exception) and not isinstance(error, PeerError):
-            detail = f"{type(error).__name__}: {error} at tick {self._trial.tick}"
+        if error is not None and not isinstance(error, KeyboardInterrupt | PeerError):
+            blame.show(error)
+            detail = blame.told(error, self._trial.tick)
             raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
+
+
+def told(reports: Iterable[object]) -> list[tuple[str, str]]:
+    """Return what a controller reports, pairs of kind and detail, as lines that a record can hold.
+
+    Raises
+    ------
+    TypeError
+        If it is anything else.
+    """
+    found: list[tuple[str, str]] = []
+    for entry in reports:
+        pair = tuple(cast("Sequence[object]", entry)) if isinstance(entry, tuple | list) else ()
+        if len(pair) != 2 or not all(isinstance(part, str) for part in pair):
+            raise TypeError(
+                f"a report is pairs of texts (kind, detail): got {blame.said(cast(object, entry), 80)}"
+            )
+        kind, detail = map(str, pair)
+        found.append((shown(kind), shown(detail)))
+    return found
 
 
 def _late(trial: Trial, deadline: float) -> ControllerError:
@@ -123,7 +150,10 @@ def close(controller: Controller, ending: Ending) -> Ending:
     if isinstance(controller, Closes):
         try:
             controller.close()
-        except Exception as error:  # the trial is over and judged; its detail says what closing did
-            detail = f"{ending.detail}; close raised {type(error).__name__}: {error}".lstrip("; ")
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # the trial is over and judged; its detail says what closing did
+            blame.show(error)
+            detail = f"{ending.detail}; {CLOSE_RAISED} {blame.told(error)}".lstrip("; ")
             return Ending(ending.end, ending.ticks, detail)
     return ending

@@ -118,8 +118,7 @@ def _overview(comparison: Comparison) -> str:
     at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
     ruled = ["controller", "judged", "clean", "counted rounds", *plots.VERDICTS]
     return (
-        f'<div class="figures wide">{figures}</div>{note}'
-        f"{_table(ruled, judged)}{_table(at_fault, collided)}"
+        f'<div class="figures wide">{figures}</div>{note}{_table(ruled, judged)}{_table(at_fault, collided)}'
     )
 
 
