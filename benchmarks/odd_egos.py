@@ -94,7 +94,9 @@ def trial(number: int, seconds: float = DURATION) -> Oddity:
     score = run_trial(own, KINDS[kind](number)).score
     verdict = score.verdict
     assert verdict is not None
-    traffic = sorted({agent.kind for agent in own.e_agents} | ({"obstacles"} if own.problem.obstacles else set()))
+    traffic = sorted(
+        {agent.kind for agent in own.e_agents} | ({"obstacles"} if own.problem.obstacles else set())
+    )
     return Oddity(
         number,
         NAMES[kind],
@@ -102,7 +104,9 @@ def trial(number: int, seconds: float = DURATION) -> Oddity:
         str(score.end),
         tuple(one.rule for one in verdict.violations if one.car == "ego"),
         tuple(
-            f"{one.rule} {one.car} {one.since:.2f}-{one.time:.2f}" for one in verdict.violations if one.car != "ego"
+            f"{one.rule} {one.car} {one.since:.2f}-{one.time:.2f}"
+            for one in verdict.violations
+            if one.car != "ego"
         ),
         score.driven.distance_m,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.lane_graph import FAR, aim_for, place_of, spread
 from dubins_traffic.driving.law_tables import (
     BLOCKS,
@@ -34,6 +35,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.passing import is_barred
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.roads.lookup import lane_end
@@ -45,6 +47,8 @@ BACK = 30.0
 """What turning round at a crossing counts, metres (for a nemesis STEP); in a bend, where others may come, it is a
 last resort."""
 UNREACHABLE = 1e6
+BARRED = 1e7
+"""What a lane counts in which an obstacle can't be passed, metres."""
 STEP = 3.0
 """What a lane counts in choosing between exits, metres."""
 BLOCK_TIME = 9.0
@@ -54,7 +58,7 @@ BLOCK_TIME = 9.0
 @jit
 def take_lane(
     b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
     """Note that car n is on `lane` now, choose the lane after it and the car's mood."""
     ints = drivers.ints[b, n]
@@ -87,7 +91,7 @@ def take_lane(
     ):
         floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
     ints[MOOD] = mood
-    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
     ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, desk)
 
 
@@ -114,8 +118,9 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, desk: Desk) ->
 
 @jit
 def price_exits(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
-) -> None:
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> None:  # fmt: skip
     """Fill `desk.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
@@ -143,6 +148,10 @@ def price_exits(
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
+        if obstacles.off[b] != obstacles.off[b + 1] and is_barred(
+            roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], drivers.build[b]
+        ):
+            cost += BARRED
         desk.cost[k] = cost
 
 

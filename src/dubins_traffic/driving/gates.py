@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.exits import cheapest, price_exits, ticks_of
 from dubins_traffic.driving.law_tables import (
+    BACKS_UP,
     CROSSING,
+    DEGREE,
     DISC,
     FORFEIT,
     HALF_WIDTH,
@@ -35,7 +38,7 @@ from dubins_traffic.driving.law_tables import (
 from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE, way_to_go
 from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import CLEAR, FIRST, FORFEITED, LEFT, STANDS, STOPPED
 
@@ -60,7 +63,7 @@ GOES_NOW = STOPPED | FIRST | CLEAR
 @jit_inline
 def mind_gate(
     b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: Way,
-    near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
+    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> float:  # fmt: skip
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
     net = drivers.net[b]
@@ -76,16 +79,20 @@ def mind_gate(
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
     if drivers.way[b, n, CROSSING] != 0.0:
-        free = its_turn and may_go(b, n, tick, state, labels, roads, drivers, desk)
+        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, desk)
         free = free or ints[MOOD] & ROLLING != 0
     else:
         inside = 0
+        held = False
         for k in range(near):
             j = desk.near[k]
             if labels.crosses[b, j] == v:
                 inside += shares_way(b, j, way, roads.degree[row], state, build)
-        free = (roads.degree[row] == 2 or inside == 0) and has_room(
-            b, n, ints[NEXT], inside, state, labels, roads, drivers, desk
+                held = held or (j == EGO and n != EGO)
+        free = (
+            not held
+            and (roads.degree[row] == 2 or inside == 0)
+            and has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, desk)
         )
     if bits & LEFT != 0 and ints[MOOD] & LEFT_SIDE == 0:
         free = False
@@ -128,8 +135,9 @@ def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) 
 
 @jit
 def may_go(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
-) -> bool:
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> bool:  # fmt: skip
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
     ints = drivers.ints[b, n]
     build = drivers.build[b]
@@ -144,7 +152,7 @@ def may_go(
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
-    if has_room(b, n, ints[NEXT], 0, state, labels, roads, drivers, desk):
+    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
         return True
     waited = ints[OWED] - ticks_of(CHOOSY, build)
     if waited < 0 or waited % 8 != 0:
@@ -152,7 +160,7 @@ def may_go(
     net = drivers.net[b]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
-    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
     allowed = 0
     wanted = 0.0
     for k in range(roads.degree[row]):
@@ -161,7 +169,9 @@ def may_go(
     budget = BUDGET * ints[OWED] * build[PERIOD]
     for k in range(roads.degree[row]):
         cheap = ints[KIND] != ROUND or desk.cost[k] - wanted < budget
-        if cheap and has_room(b, n, int(roads.arms[row, k]), 0, state, labels, roads, drivers, desk):
+        if cheap and has_room(
+            b, n, int(roads.arms[row, k]), 0, state, labels, roads, obstacles, drivers, desk
+        ):
             allowed |= 1 << k
     out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
     if out >= 0:
@@ -182,52 +192,92 @@ def is_due(turn: int, bits: Any, build: Any) -> bool:
 
 @jit
 def has_room(
-    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    desk: Desk,
+    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> bool:  # fmt: skip
     """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
 
     `inside` cars are still in the disc and will be before it.
+    """
+    return room_in(b, n, out, inside, state, labels, roads, obstacles, drivers, desk) >= 0.0
+
+
+@jit
+def room_in(
+    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+) -> float:  # fmt: skip
+    """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres; negative: not out of it.
+
+    All that are in the lane drive on until they stand close behind one another: behind what stands there now, behind
+    an obstacle or before the next disc. Of the ego nobody knows whether it drives on; at a crossing, where who finds one
+    exit barred has to take another in time, it may back up as well. `inside` cars are still in the disc and will be
+    before this one.
     """
     net = drivers.net[b]
     build = drivers.build[b]
     edge = build[DISC] + build[REACH] + MARGIN
     mouth = sqrt(max(edge * edge - build[MIDDLE] * build[MIDDLE], 0.0))
     pitch = 2.0 * build[REACH] + QUEUE_GAP
-    last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
+    start = lane_start(roads, net, out)
+    crossing = roads.degree[roads.vert_off[net] + start] >= build[DEGREE]
     tx, ty = lane_direction(roads, net, out)
-    last -= pitch * inside
-    j = desk.head[out >> 1]
-    while j >= 0:
-        if j != n:
+    last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
+    last = min(last, before_obstacles(b, out, roads, obstacles, drivers))
+    wall = INFINITE
+    for look in range(2):
+        j = desk.head[out >> 1]
+        while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-            there = aside < build[HALF_WIDTH] + build[ROUNDING] + 0.05
-            if there and along > build[DISC] and labels.crosses[b, j] != lane_start(roads, net, out):
+            there = aside < build[HALF_WIDTH] + build[ROUNDING] + 0.05 and along > build[DISC]
+            if j != n and there and labels.crosses[b, j] != start:
+                if look == 1:
+                    last -= pitch if along < wall else 0.0
+                    j = desk.link[j]
+                    continue
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
                 slow = abs(state.speed[b, j]) < BRISK or heading < 0.5
                 if slow and along < mouth + pitch:
-                    return False
-                if labels.bits[b, j] & STANDS != 0 or heading < 0.0:
-                    last = min(last, along)
-                last -= pitch
-        j = desk.link[j]
-    return last >= mouth
+                    return -1.0
+                if labels.bits[b, j] & STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
+                    back = build[BACKS_UP] if j == EGO and n != EGO and crossing else 0.0
+                    wall = min(wall, along)
+                    last = min(last, along - back - pitch)
+            j = desk.link[j]
+    return last - pitch * inside - mouth
+
+
+@jit
+def before_obstacles(
+    b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> float:
+    """Return how far along a lane a car can drive in its middle before an obstacle is in its way, metres."""
+    build = drivers.build[b]
+    free = INFINITE
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        along, aside = lane_coordinates(roads, drivers.net[b], lane, row[0], row[1])
+        wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
+        if abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]:
+            free = min(free, along - row[7] - build[REACH] - QUEUE_GAP)
+    return free
 
 
 @jit
 def turn_elsewhere(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
-    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
     allowed = 0
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
-        if out != ints[NEXT] and has_room(b, n, int(out), 0, state, labels, roads, drivers, desk):
+        if out != ints[NEXT] and has_room(b, n, int(out), 0, state, labels, roads, obstacles, drivers, desk):
             allowed |= 1 << k
     out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
     if out >= 0:

@@ -46,7 +46,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, watch
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
     QUEUE_GAP,
@@ -194,7 +194,9 @@ def drive(
     stop_coasting(drivers.way[b, n])
     if ints[KIND] == NEMESIS:
         watch_ego(b, n, labels, drivers)
-    way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, drivers, desk)
+    way = keep_place(
+        b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, obstacles, drivers, desk
+    )
     part, key, left, px, py = on_way(way, x, y)
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
@@ -213,7 +215,9 @@ def drive(
     )
     rides = ints[MOOD] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
     speed = cruise(rides or floats[ASIDE] != 0.0, labels.crosses[b, n] >= 0, build, floats)
-    speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
+    speed = mind_gate(
+        b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, obstacles, drivers, desk
+    )
     kept = 0.0
     if who != -1:
         speed, kept = follow(
@@ -224,7 +228,7 @@ def drive(
         b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
     )
     if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
-        turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
+        turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
     if put_off(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, desk):
         return
@@ -253,7 +257,7 @@ def follow(
     build = drivers.build[b]
     ints = drivers.ints[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
-    behind = who >= 0 and labels.lane[b, who] == ints[LANE] and kept > QUEUE_GAP
+    behind = (who < -1 or (who >= 0 and labels.lane[b, who] == ints[LANE])) and kept > QUEUE_GAP
     if behind and is_pressed(b, n, near, state, labels, roads, drivers, desk):
         kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
@@ -301,6 +305,8 @@ def pass_what_stands(
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
     bits = np.int64(labels.bits[b, n])
+    if outside and (bits & BLOCKED != 0 or floats[ASIDE] != 0.0):
+        watch(b, n, who, state, ints, floats, ints[LANE], desk)
     offset = 2.0 * build[MIDDLE] if ints[MOOD] & LEFT_SIDE != 0 and outside else 0.0
     stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
     ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
@@ -343,7 +349,7 @@ def waited_long(ints: Any, bits: Any, build: Any) -> bool:
 @jit_inline
 def keep_place(
     b: int, n: int, tick: int, x: float, y: float, c: float, s: float, state: State, labels: Labels,
-    roads: RoadTable, drivers: Drivers, desk: Desk,
+    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> Way:  # fmt: skip
     """Keep LANE and NEXT in step with where the car is; return its way."""
     net = drivers.net[b]
@@ -352,14 +358,14 @@ def keep_place(
     seen = labels.lane[b, n]
     if ints[LANE] < 0:
         lane = seen if seen >= 0 else lane_at(roads, net, x, y, c, s)
-        take_lane(b, n, tick, lane, state, labels, roads, drivers, desk)
+        take_lane(b, n, tick, lane, state, labels, roads, obstacles, drivers, desk)
     elif seen >= 0 and seen != ints[LANE]:
-        take_lane(b, n, tick, seen, state, labels, roads, drivers, desk)
+        take_lane(b, n, tick, seen, state, labels, roads, obstacles, drivers, desk)
     way = way_of(b, n, roads, drivers)
     if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * build[DISC]:
         part, _, _, _, _ = on_way(way, x, y)
         if part == AFTER:
-            take_lane(b, n, tick, ints[NEXT], state, labels, roads, drivers, desk)
+            take_lane(b, n, tick, ints[NEXT], state, labels, roads, obstacles, drivers, desk)
             way = way_of(b, n, roads, drivers)
     return way
 

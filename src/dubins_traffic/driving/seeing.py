@@ -233,7 +233,7 @@ def wanted_gap(
     if labels.bits[b, n] & LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
-        return standing
+        return QUEUE_GAP if labels.crosses[b, n] >= 0 else standing
     if ints[MOOD] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
