@@ -12,6 +12,7 @@ from dubins_traffic.driving.law_tables import (
     FIRST,
     GOAL,
     HOLD,
+    KEPT_OUT,
     KIND,
     LANE,
     LAST,
@@ -68,6 +69,7 @@ def take_lane(
     before = ints[LANE]
     ints[LANE] = lane
     ints[TURN] = 0
+    ints[KEPT_OUT] = 0
     if ints[KIND] == LOOP:
         following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
         if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
@@ -148,11 +150,23 @@ def price_exits(
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
-        if obstacles.off[b] != obstacles.off[b + 1] and is_barred(
-            roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], drivers.build[b]
-        ):
+        if obstacles.off[b] != obstacles.off[b + 1] and leads_nowhere(b, out, roads, obstacles, drivers):
             cost += BARRED
         desk.cost[k] = cost
+
+
+@jit
+def leads_nowhere(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+    """Tell whether an obstacle can't be passed in a lane, or in none of those that it leads to."""
+    net, build = drivers.net[b], drivers.build[b]
+    first, last = obstacles.off[b], obstacles.off[b + 1]
+    if is_barred(roads, net, lane, obstacles, first, last, build):
+        return True
+    row = roads.vert_off[net] + lane_end(roads, net, lane)
+    for k in range(roads.degree[row]):
+        if not is_barred(roads, net, int(roads.arms[row, k]), obstacles, first, last, build):
+            return False
+    return True
 
 
 @jit

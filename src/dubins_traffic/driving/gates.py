@@ -9,12 +9,13 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.exits import cheapest, price_exits, ticks_of
+from dubins_traffic.driving.exits import BARRED, cheapest, price_exits, ticks_of
 from dubins_traffic.driving.law_tables import (
     BACKS_UP,
     CROSSING,
     DEGREE,
     DISC,
+    EXIT_GAP,
     FORFEIT,
     HALF_WIDTH,
     KIND,
@@ -53,6 +54,9 @@ BUDGET = 4.0
 DUTY = 0.8
 """An e-agent that has lost its place once enters after this share of the time in which it would lose it again, though
 there is room nowhere: else it breaks E3."""
+PATIENT = 0.5
+"""An e-agent that has stood for this share of the time that E5 allows before a bend or dead end enters as soon as an exit
+is free, though those in it may stop."""
 LINGER = 0.8
 """For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
 TRAIL = 3.5
@@ -155,29 +159,70 @@ def may_go(
     if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
         return True
     waited = ints[OWED] - ticks_of(CHOOSY, build)
-    if waited < 0 or waited % 8 != 0:
-        return due
+    if not due and (waited < 0 or waited % 8 != 0):
+        return False
+    budget = BUDGET * ints[OWED] * build[PERIOD] if ints[KIND] == ROUND else INFINITE
+    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, desk):
+        return True
+    if due:
+        take_widest(b, n, state, labels, roads, obstacles, drivers, desk)
+    return due
+
+
+@jit
+def take_another(
+    b: int, n: int, tick: int, budget: float, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+) -> bool:  # fmt: skip
+    """Choose the best exit in which there is room; tell whether there is one.
+
+    An exit that counts more than the present one by `budget` metres does not come into question, and neither does one
+    in which an obstacle can't be passed, unless all are such.
+    """
     net = drivers.net[b]
+    ints = drivers.ints[b, n]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
     price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-    allowed = 0
     wanted = 0.0
+    least = INFINITE
     for k in range(roads.degree[row]):
+        least = min(least, desk.cost[k])
         if roads.arms[row, k] == ints[NEXT]:
             wanted = desk.cost[k]
-    budget = BUDGET * ints[OWED] * build[PERIOD]
+    allowed = 0
     for k in range(roads.degree[row]):
-        cheap = ints[KIND] != ROUND or desk.cost[k] - wanted < budget
-        if cheap and has_room(
-            b, n, int(roads.arms[row, k]), 0, state, labels, roads, obstacles, drivers, desk
+        out = int(roads.arms[row, k])
+        cheap = desk.cost[k] - wanted < budget and (desk.cost[k] < BARRED or least >= BARRED)
+        if (
+            cheap
+            and out != ints[NEXT]
+            and has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, desk)
         ):
             allowed |= 1 << k
-    out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
-    if out >= 0:
-        ints[NEXT] = out
-        return True
-    return due
+    best = cheapest(v, roads.vert_off[net], allowed, roads, desk)
+    if best >= 0:
+        ints[NEXT] = best
+    return best >= 0
+
+
+@jit
+def take_widest(
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> None:  # fmt: skip
+    """Choose the exit in which there is most room, though it is not enough; `desk.cost` has what they count."""
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    row = roads.vert_off[net] + lane_end(roads, net, ints[LANE])
+    most = -INFINITE
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        room = room_in(b, n, out, 0, state, labels, roads, obstacles, drivers, desk)
+        room -= INFINITE * 0.5 if desk.cost[k] >= BARRED else 0.0
+        if room > most:
+            most = room
+            ints[NEXT] = out
 
 
 @jit_inline
@@ -248,6 +293,21 @@ def room_in(
 
 
 @jit
+def is_free(b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, desk: Desk) -> bool:
+    """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
+    build = drivers.build[b]
+    j = desk.head[out >> 1]
+    while j >= 0:
+        along, aside = lane_coordinates(
+            roads, drivers.net[b], out, float(state.x[b, j]), float(state.y[b, j])
+        )
+        if j != n and aside <= 0.0 and along <= build[DISC] + build[EXIT_GAP]:
+            return False
+        j = desk.link[j]
+    return True
+
+
+@jit
 def before_obstacles(
     b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
 ) -> float:
@@ -269,17 +329,5 @@ def turn_elsewhere(
     drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
-    net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    v = lane_end(roads, net, ints[LANE])
-    row = roads.vert_off[net] + v
-    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-    allowed = 0
-    for k in range(roads.degree[row]):
-        out = roads.arms[row, k]
-        if out != ints[NEXT] and has_room(b, n, int(out), 0, state, labels, roads, obstacles, drivers, desk):
-            allowed |= 1 << k
-    out = cheapest(v, roads.vert_off[net], allowed, roads, desk)
-    if out >= 0:
-        ints[NEXT] = out
-        ints[WAITED] = 0
+    if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, desk):
+        drivers.ints[b, n, WAITED] = 0

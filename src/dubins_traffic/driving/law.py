@@ -17,7 +17,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.coasting import coast, cruise, drive_on, keeps_to_road, stop_coasting
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
-from dubins_traffic.driving.gates import TRAIL, mind_gate, turn_elsewhere
+from dubins_traffic.driving.gates import TRAIL, has_room, mind_gate, turn_elsewhere
 from dubins_traffic.driving.kept_ways import way_of
 from dubins_traffic.driving.lane_graph import lane_at
 from dubins_traffic.driving.late import catch_up, put_off
@@ -40,6 +40,7 @@ from dubins_traffic.driving.law_tables import (
     REACH,
     ROUND,
     TAILGATING,
+    TURN,
     UNSURE,
     UNTIL,
     WAITED,
@@ -61,7 +62,7 @@ from dubins_traffic.driving.steering import move
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import BLOCKED, LEFT
 
@@ -220,15 +221,13 @@ def drive(
     )
     kept = 0.0
     if who != -1:
-        speed, kept = follow(
-            b, n, speed, gap, who, rides, part, way, near, state, labels, roads, drivers, desk
-        )
+        speed, kept = follow(b, n, speed, gap, who, rides, part, way, state, labels, roads, drivers, desk)
     speed = dawdle(b, n, speed, near, state, labels, roads, drivers, desk)
     speed, offset = pass_what_stands(
         b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
     )
-    if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
-        turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+    if ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
+        find_way_out(b, n, tick, part, state, labels, roads, obstacles, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
     if put_off(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, desk):
         return
@@ -242,6 +241,24 @@ def drive(
     commands[b, n, 1] = yaw_rate
 
 
+@jit
+def find_way_out(
+    b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> None:  # fmt: skip
+    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
+    ints = drivers.ints[b, n]
+    build = drivers.build[b]
+    crossing = drivers.way[b, n, CROSSING] != 0.0
+    if not crossing and (part == BEFORE or ints[WAITED] <= ticks_of(STUCK, build)):
+        return
+    if crossing and tick % 4 != 0:
+        return
+    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
+        return
+    turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+
+
 @jit_inline
 def just_drives(ints: Any, floats: Any) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
@@ -250,16 +267,17 @@ def just_drives(ints: Any, floats: Any) -> bool:
 
 @jit_inline
 def follow(
-    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: Way, near: int,
+    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: Way,
     state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (speed, gap to keep) of a car that has `who` ahead."""
     build = drivers.build[b]
     ints = drivers.ints[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
-    behind = (who < -1 or (who >= 0 and labels.lane[b, who] == ints[LANE])) and kept > QUEUE_GAP
-    if behind and is_pressed(b, n, near, state, labels, roads, drivers, desk):
-        kept = QUEUE_GAP
+    if kept > QUEUE_GAP and not rides and who != -1:
+        turn = part == BEFORE and ints[TURN] > 0
+        if turn or is_pressed(b, n, state, labels, roads, drivers, desk):
+            kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
     return min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead), kept
 
@@ -322,21 +340,35 @@ def pass_what_stands(
     return speed, offset
 
 
-@jit_inline
+@jit
 def is_pressed(
-    b: int, n: int, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
 ) -> bool:  # fmt: skip
-    """Tell whether a car close behind is still in the disc at the beginning of the lane, and needs room to leave it."""
-    v = lane_start(roads, drivers.net[b], drivers.ints[b, n, LANE])
-    far = 2.0 * drivers.build[b, REACH] + PRESSED
+    """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
+
+    It, or the cars between, are close behind one another already.
+    """
+    net, build, lane = drivers.net[b], drivers.build[b], drivers.ints[b, n, LANE]
+    v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:
         return False
-    for k in range(near):
-        j = desk.near[k]
-        dx = state.x[b, j] - state.x[b, n]
-        dy = state.y[b, j] - state.y[b, n]
-        if labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
-            return True
+    own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
+    far = 2.0 * build[REACH] + PRESSED
+    j = desk.head[lane >> 1]
+    while j >= 0:
+        along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
+        if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
+            far += 2.0 * build[REACH] + QUEUE_GAP
+        j = desk.link[j]
+    row = roads.vert_off[net] + v
+    for k in range(roads.degree[row]):
+        j = desk.head[roads.arms[row, k] >> 1]
+        while j >= 0:
+            dx = state.x[b, j] - state.x[b, n]
+            dy = state.y[b, j] - state.y[b, n]
+            if j != n and labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
+                return True
+            j = desk.link[j]
     return False
 
 
