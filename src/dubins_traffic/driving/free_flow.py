@@ -3,7 +3,8 @@
 A point that meets nobody drives, at the car's top speed, along lanes: from the ego's start, on the lane that its
 heading tells, to the nearest goal on the round, and then the round for ever. The round is the shortest closed route
 through all goals (`driving.tours.find_round`); every lane counts the full length of its segment, turning costs nothing,
-and it turns round at dead ends only.
+and it turns round at dead ends only. The round of a single goal goes to the nearest other intersection and back, since
+that makes a visit.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.state import Pose
-from dubins_traffic.driving.tours import LaneGraph, find_round, lane_graph
+from dubins_traffic.driving.tours import LaneGraph, free_round, lane_graph
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -64,17 +65,20 @@ def free_flow(instance: Instance) -> FreeFlow:
     """Return the free flow of an instance."""
     problem = instance.problem
     graph = lane_graph(problem.network)
-    tour = find_round(graph, problem.goal_vertices)
+    tour = free_round(graph, problem.goal_vertices)
     speed = problem.car.bounds.speed
     if tour is None:
         return FreeFlow(speed, inf, ())
     goals = set(problem.goal_vertices)
     lane, to_go = _start_lane(problem, instance.starts[0], graph)
     best, place = inf, 0
-    for k in dict.fromkeys(tour.arrivals[:8]):
-        far = graph.distances(tour.lanes[k])[lane]
-        if far < best:
-            best, place = far, k
+    if len(goals) == 1:
+        best, place = min(graph.distances(into)[lane] for into in graph.into[min(goals)]), tour.arrivals[0]
+    else:
+        for k in dict.fromkeys(tour.arrivals[:8]):
+            far = graph.distances(tour.lanes[k])[lane]
+            if far < best:
+                best, place = far, k
     far = to_go + best
     arrivals = [(far, graph.end[tour.lanes[place]])]
     for k in range(1, len(tour.lanes)):

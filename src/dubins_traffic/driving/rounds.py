@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dubins_traffic.driving.tours import find_round, lane_graph
+from dubins_traffic.driving.tours import find_round, free_round, lane_graph
 from dubins_traffic.kernels.arrays import Floats, Ints
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def round_time(problem: Problem) -> float:
     """Return the seconds of a round through all goals in free flow (`driving.free_flow`); inf if there is none."""
-    found = find_round(lane_graph(problem.network), problem.goal_vertices)
+    found = free_round(lane_graph(problem.network), problem.goal_vertices)
     return inf if found is None else found.length / problem.car.bounds.speed
 
 

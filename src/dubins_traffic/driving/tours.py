@@ -163,6 +163,19 @@ def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     return graph.rounds[distinct]
 
 
+def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
+    """Return the round of free flow through `goals`: of a single one to the nearest other intersection and back.
+
+    Only another disc makes the next visit of a goal one (RULES, rule 1), and turning round in a disc is free. Through
+    several goals it is what `find_round` finds.
+    """
+    distinct = tuple(dict.fromkeys(goals))
+    if len(distinct) != 1:
+        return find_round(graph, goals)
+    back = min(graph.into[distinct[0]], key=lambda lane: (graph.length[lane], lane), default=-1)
+    return None if back < 0 else Round((back ^ 1, back), (1,), 2.0 * graph.length[back])
+
+
 def _shortest(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
     own = room(len(goals), graph.count)
     lanes, length = shortest_round(np.array(goals, dtype=np.int64), graph.tables, own)

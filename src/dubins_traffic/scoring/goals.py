@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 
@@ -20,8 +20,9 @@ class GoalDiscs:
     def __init__(self, instance: Instance) -> None:
         problem = instance.problem
         self.goals = tuple(dict.fromkeys(problem.goals))
-        vertices = [problem.network.vertex(goal) for goal in self.goals]
-        self._centres: Floats = np.asarray(problem.network.points)[vertices].reshape(-1, 2)
+        self._network = problem.network
+        self.vertices = [problem.network.vertex(goal) for goal in self.goals]
+        self._centres: Floats = np.asarray(problem.network.points)[self.vertices].reshape(-1, 2)
         self._radius = problem.intersection_radius
 
     def inside(self, frames: Frames) -> Mask:
@@ -29,6 +30,13 @@ class GoalDiscs:
         x = frames.x[:, EGO, None] - self._centres[:, 0]
         y = frames.y[:, EGO, None] - self._centres[:, 1]
         return np.sqrt(x * x + y * y) < self._radius
+
+    def at(self, frames: Frames) -> Ints:
+        """Return the intersection whose disc holds the ego's centre at each frame, goal or not, (F,); -1: none."""
+        places = np.column_stack([frames.x[:, EGO], frames.y[:, EGO]])
+        nearest = self._network.nearest_intersection(places)[0]
+        x, y = (places - self._network.points[nearest]).T
+        return np.where(x * x + y * y < self._radius * self._radius, nearest, -1)
 
 
 class Rounds:
@@ -68,9 +76,10 @@ class Visits:
 
 
 class Visiting:
-    """Visits: entries of the ego's centre into a goal's disc, a start inside included (RULES, *Verdicts*).
+    """Visits: entries of the ego's centre into a goal's disc, a start inside included (RULES, rule 1).
 
-    A round is complete when every goal has been visited since the last round; without goals there are none.
+    Between two visits of a goal its centre has been in the disc of another intersection. A round is complete when every
+    goal has been visited since the last round; without goals there are none.
     """
 
     def begin(self, instance: Instance) -> None:
@@ -79,11 +88,13 @@ class Visiting:
         count = len(self._discs.goals)
         self._rounds = Rounds(count)
         self._inside = np.zeros(count, dtype=bool)
+        self._elsewhere = np.full(count, -1, dtype=np.int64)
         self._visits = np.zeros(count, dtype=np.int64)
         self._last = np.zeros(count, dtype=np.int64)
         self._gap = np.zeros(count, dtype=np.int64)
         self._end = 0
         self._rate = instance.problem.rate
+        self._last_frame = -1
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
@@ -93,12 +104,37 @@ class Visiting:
         entered = inside & ~np.vstack([self._inside, inside[:-1]])
         self._inside = inside[-1]
         self._end = frames.first + len(frames) - 1
+        at = self._discs.at(frames)
+        for goal, vertex in enumerate(self._discs.vertices):
+            elsewhere = frames.first + np.flatnonzero((at >= 0) & (at != vertex))
+            for row in np.flatnonzero(entered[:, goal]).tolist():
+                entered[row, goal] = self._visit(goal, frames.first + row, elsewhere)
+            if len(elsewhere):
+                self._elsewhere[goal] = elsewhere[-1]
         self._rounds.add(entered)
-        for at, goal in np.argwhere(entered):
-            tick = frames.first + at
-            self._visits[goal] += 1
-            self._gap[goal] = max(self._gap[goal], tick - self._last[goal])
-            self._last[goal] = tick
+        self._last_frame = frames.first + len(frames) - 1
+
+    def _visit(self, goal: int, tick: int, elsewhere: Ints) -> bool:
+        """Count the entry of a goal's disc in frame `tick`, if it is a visit; return whether it is.
+
+        `elsewhere` are the frames of this block in which the ego is in another disc, in order.
+        """
+        before = int(np.searchsorted(elsewhere, tick, side="right"))
+        last = elsewhere[before - 1] if before else self._elsewhere[goal]
+        if self._visits[goal] and last <= self._last[goal]:
+            return False
+        self._visits[goal] += 1
+        self._gap[goal] = max(self._gap[goal], tick - self._last[goal])
+        self._last[goal] = tick
+        return True
+
+    @property
+    def now(self) -> list[bool]:
+        """Of which goals a visit began in the last frame."""
+        return [
+            bool(count) and last == self._last_frame
+            for count, last in zip(self._visits, self._last, strict=True)
+        ]
 
     def end(self, ending: Ending) -> None:
         """Nothing is left to do."""

@@ -24,15 +24,16 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 (
-    NET, GOALS, STANDING, OFF_ROAD, DEPARTURES, COLLIDED, OFF_SINCE, OFF_TICKS, SAMPLED, ROUNDS, SEALED, AGAIN,
-) = range(12)  # fmt: skip
-INTS = 12
+    NET, GOALS, STANDING, OFF_ROAD, DEPARTURES, COLLIDED, OFF_SINCE, OFF_TICKS, SAMPLED, ROUNDS, SEALED, AGAIN, LAST_AT,
+) = range(13)  # fmt: skip
+INTS = 13
 """Columns of `Tally.ints`.
 
 NET: the trial's network. GOALS: how many goals it has. STANDING, OFF_ROAD, DEPARTURES: ticks and frames that
 `scoring.driving` counts. COLLIDED, OFF_SINCE (-1: on the road), OFF_TICKS, SAMPLED: what `scoring.icra2016` counts, its
 rounds last. ROUNDS: by visits. SEALED: 1 once the ego has broken a rule, from when on `Tally.sensed` stays as it is.
-AGAIN: the next tick in which the ego may come to a goal, be in one, or leave the road of 2016.
+AGAIN: the next tick in which the ego may come to a goal, be in one, or leave the road of 2016. LAST_AT: the
+intersection whose disc has held the ego since the last visit, the latest; -1: none.
 """
 
 DISTANCE, CLEARANCE, STILL, RADIUS, SIGHT2 = range(5)
@@ -40,10 +41,11 @@ FLOATS = 5
 """Columns of `Tally.floats`: metres driven, smallest gap so far; how far a car that stands moves in a tick at most, the
 goals' radius, the square of the sensing radius."""
 
-VERTEX, SAMPLE_DONE, VISIT_DONE, INSIDE, VISITS, LAST_VISIT, GAP = range(7)
-GOAL_INTS = 7
+VERTEX, SAMPLE_DONE, VISIT_DONE, INSIDE, VISITS, LAST_VISIT, GAP, FRESH = range(8)
+GOAL_INTS = 8
 """Columns of `Tally.goal`: the goal's vertex, whether it is done in the present round of samples, and of visits,
-whether the ego is inside its disc, visits, tick of the last one (0 before the first), longest gap between them."""
+whether the ego is inside its disc, visits, tick of the last one (0 before the first), longest gap between them, and
+whether coming into its disc is a visit: there was none yet, or the ego has been in another disc since."""
 
 
 ROUNDING = 1e-6
@@ -79,7 +81,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     trials = len(instances)
     ints = np.zeros((trials, INTS), dtype=np.int64)
     floats = np.zeros((trials, FLOATS))
-    ints[:, OFF_SINCE] = -1
+    ints[:, [OFF_SINCE, LAST_AT]] = -1
     ints[:, NET] = nets
     floats[:, CLEARANCE] = np.inf
     counts = np.zeros((trials, cars), dtype=np.int64)
@@ -99,6 +101,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     last = ints[:, GOALS].cumsum()
     goal = np.zeros((last[-1], GOAL_INTS), dtype=np.int64)
     goal[:, VERTEX] = list(chain.from_iterable(goals))
+    goal[:, FRESH] = 1
     sensed = np.full((trials, cars), -1, dtype=np.int64)
     frames = 1 + max(max(1, instance.ticks) for instance in instances)
     return Tally(
@@ -141,6 +144,9 @@ def count_frame(
     _look_at_cars(b, tick, state, cars, tally)
     if obstacles.off[b] != obstacles.off[b + 1]:
         _look_at_obstacles(b, state, cars, obstacles, floats)
+    at = labels.at[b, EGO]
+    if at >= 0 and at != ints[LAST_AT]:
+        _freshen(b, at, tally)
     if tick >= ints[AGAIN]:
         spare = _count_goals(b, tick, x, y, roads, tally)
         spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
@@ -285,6 +291,15 @@ def _overlap(
 
 
 @jit_inline
+def _freshen(b: int, at: int, tally: Tally) -> None:
+    """Note that the ego is in the disc of `at`: coming into that of any other goal will be a visit."""
+    tally.ints[b, LAST_AT] = at
+    for g in range(tally.goal_off[b], tally.goal_off[b] + tally.ints[b, GOALS]):
+        if tally.goal[g, VERTEX] != at:
+            tally.goal[g, FRESH] = 1
+
+
+@jit_inline
 def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally: Tally) -> float:
     """Count samples inside the goals' discs, visits, and rounds of both.
 
@@ -307,7 +322,9 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
         if inside > 0:
             some = True
             goal[SAMPLE_DONE] = 1
-            if goal[INSIDE] == 0:
+            if goal[INSIDE] == 0 and goal[FRESH] != 0:
+                goal[FRESH] = 0
+                ints[LAST_AT] = -1
                 goal[VISIT_DONE] = 1
                 goal[VISITS] += 1
                 goal[GAP] = max(goal[GAP], tick - goal[LAST_VISIT])

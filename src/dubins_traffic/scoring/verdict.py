@@ -16,10 +16,10 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.formulas import Status
-from dubins_traffic.scoring.goals import GoalDiscs, Visiting, Visits
+from dubins_traffic.scoring.goals import Visiting, Visits
 from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.spec.exceptions import Exceptions
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.parameters import EDITION, RuleParameters
 from dubins_traffic.spec.tables import ticks
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ class Verdict:
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
         return {
+            "edition": EDITION,
             "verdict": self.verdict.value,
             "clean": self.clean,
             "excuse": None if self.excuse is None else self.excuse.to_json(),
@@ -192,8 +193,6 @@ class Judging:
         self._collisions.begin(instance)
         self._margins = Margins()
         self._margins.begin(instance)
-        self._goals = GoalDiscs(instance)
-        self._at_goal = np.zeros(len(self._goals.goals), dtype=bool)
 
     def frames(self, frames: Frames) -> None:
         """Judge a block of frames."""
@@ -208,7 +207,6 @@ class Judging:
             dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
             radius = self._instance.problem.sensing_radius
             self._sensed.append(dx * dx + dy * dy <= radius * radius)
-            self._at_goal = self._goals.inside(frames)[-1]
 
     def end(self, ending: Ending) -> None:
         """Nothing is left to do."""
@@ -223,7 +221,7 @@ class Judging:
             self._breaches,
             self._collisions.result(),
             self._visiting.result(),
-            self._at_goal.tolist(),
+            self._visiting.now,
             self._was_sensed,
             self._referee.running[0],
             self._margins.result(),
@@ -241,7 +239,7 @@ def reach_verdict(
     breaches: Sequence[Breach],
     collisions: tuple[Collision, ...],
     visits: Visits,
-    at_goal: Sequence[bool],
+    visited_now: Sequence[bool],
     was_sensed: Callable[[int, int, int], bool],
     running: Running,
     margins: dict[str, float | None],
@@ -256,8 +254,8 @@ def reach_verdict(
         All that was broken, in order.
     collisions, visits
         The ego's.
-    at_goal
-        For each goal, once, whether the ego is inside its disc in the last frame.
+    visited_now
+        For each goal, once, whether a visit of the ego's begins in the last frame.
     was_sensed
         Asked for (car, first, last): whether the car was within the sensing radius at a frame from first to last.
     running
@@ -293,7 +291,7 @@ def reach_verdict(
         visits.rounds,
         gap,
         limit if math.isfinite(limit) else None,
-        _formulas(rules, rate, breaches, visits, at_goal, running),
+        _formulas(rules, rate, breaches, visits, visited_now, running),
         margins,
     )
 
@@ -315,7 +313,7 @@ def _formulas(
     rate: float,
     breaches: Sequence[Breach],
     visits: Visits,
-    at_goal: Sequence[bool],
+    visited_now: Sequence[bool],
     running: Running,
 ) -> dict[str, Status]:
     found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
@@ -323,7 +321,7 @@ def _formulas(
         found[rule] = PENDING
     for rule in {breach.rule for breach in breaches if breach.car == EGO}.intersection(EGO_RULES):
         found[rule] = BROKEN
-    for goal, there in zip(visits.goals, at_goal, strict=True):
+    for goal, there in zip(visits.goals, visited_now, strict=True):
         x, y = goal.goal
         found[f"1.goal {x} {y}"] = HELD if there else PENDING
     pending = {assumption_of(rule) for rule in running.others}

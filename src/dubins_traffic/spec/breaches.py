@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
 from dubins_traffic.spec.docket import (
     AT_SINCE,
@@ -32,26 +32,17 @@ from dubins_traffic.spec.docket import (
     ROAD,
     SINCE_TICK,
     STOP,
-    STOPPED_SINCE,
     TICKETS,
     UNBLOCKED_SINCE,
 )
 from dubins_traffic.spec.propositions import (
     AHEAD,
     CLEAR,
-    EXCUSED,
     FIRST,
     LEFT,
-    ON_ROAD,
     OVERTAKING,
-    STANDS,
-    STOPPED,
 )
-from dubins_traffic.spec.tables import (
-    FORFEITS,
-    PROGRESS,
-    TICKET,
-)
+from dubins_traffic.spec.tables import FORFEITS, TICKET, WAIT_SINCE
 
 EGO: int = 0
 GOES = FIRST | CLEAR
@@ -133,9 +124,9 @@ def judge_entry(
 
 
 @jit_inline
-def judge_road(b: int, tick: int, bits: Any, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
-    """Rule 1: the ego stays on the road from its first frame there."""
-    if bits & ON_ROAD != 0:
+def judge_road(b: int, tick: int, on: bool, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
+    """Rule 1: the ego stays on the road from its first frame there; `on` tells whether it is there."""
+    if on:
         clock[OFF_ROAD] = -1
     elif clock[OFF_ROAD] == -1:
         clock[OFF_ROAD] = tick
@@ -157,23 +148,10 @@ def judge_queue(
     filled: Ints,
 ) -> None:
     """E3, of a car that has stopped at v: who is first at a clear crossing enters in time, and takes few tickets."""
-    run(True, tick, clock, STOPPED_SINCE)
     if run(bits & GOES == GOES, tick, clock, FIRST_SINCE) == whole[ENTER_TICKS]:
         add(b, ENTER, n, tick, clock[FIRST_SINCE], v, lane, row, filled)
     if mark[FORFEITS] == whole[MOST_TICKETS] + 1 and mark[TICKET] == tick:
-        add(b, TICKETS, n, tick, clock[STOPPED_SINCE], v, lane, row, filled)
-
-
-@jit_inner
-def has_way(n: int, cars: int, reach: float, lanes: Ints, flags: Bits, measure: Floats) -> bool:
-    """E5: tell whether nobody stands or waits within `reach` ahead of car n in its lane."""
-    own = measure[n, PROGRESS]
-    for k in range(cars):
-        if lanes[k] == lanes[n] and flags[k] & (STANDS | EXCUSED | STOPPED) != 0:
-            ahead = measure[k, PROGRESS] - own
-            if 0.0 < ahead <= reach:
-                return False
-    return True
+        add(b, TICKETS, n, tick, mark[WAIT_SINCE], v, lane, row, filled)
 
 
 @jit_inline

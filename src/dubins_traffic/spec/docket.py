@@ -44,25 +44,29 @@ MOST_TICKETS: Final = 3
 EXIT_TICKS: Final = 4
 REST_TICKS: Final = 5
 GOAL_TICKS: Final = 6
-WHOLES: Final = 7
+SHARED_TICKS: Final = 7
+WHOLES: Final = 8
 
 EXIT2: Final = 0
 WAY: Final = 1
 EXIT_GAP: Final = 2
 LANE_MIDDLE: Final = 3
-NEAR2: Final = 4
+GOAL_GAP: Final = 4
 LONE: Final = 5
 REALS: Final = 6
 
 OFF_ROAD: Final = 0
 LEFT_SINCE: Final = 1
 UNBLOCKED_SINCE: Final = 2
-STOPPED_SINCE: Final = 3
-FIRST_SINCE: Final = 4
-EXIT_SINCE: Final = 5
+FIRST_SINCE: Final = 3
+EXIT_SINCE: Final = 4
+EXIT_PAUSED: Final = 5
 REST_SINCE: Final = 6
 AT_SINCE: Final = 7
-CLOCKS: Final = 8
+IN_SINCE: Final = 8
+CAME_BY: Final = 9
+EXIT_COUNTS: Final = 10
+CLOCKS: Final = 11
 
 NEVER: Final = -2
 """In `OFF_ROAD`: the car has never been on the road."""
@@ -92,10 +96,11 @@ class Terms(NamedTuple):
     Attributes
     ----------
     real : (B, REALS) float64
-        Squared distance of a body, without its rounding, from a vertex up to which it is in the way of those who
-        leave (`EXIT2`), and of its centre (`NEAR2`); distance to others from which on a car in a disc has none of them
-        in its way (`LONE`); E5's way ahead (`WAY`); E4's free length of an exit
-        (`EXIT_GAP`); distance of the right lane's middle from the centre line (`LANE_MIDDLE`). Metres.
+        Squared distance of a centre from a vertex up to which it is in the way of those who leave (`EXIT2`); distance
+        of others from a vertex from which on none of them meets the disc or is in anybody's way out of it (`LONE`);
+        E5's way ahead (`WAY`); E4's free length of an exit (`EXIT_GAP`); E6's distance of the ego from an exit
+        (`GOAL_GAP`); distance of the right lane's middle from the centre line (`LANE_MIDDLE`). Metres, eased by GRAIN
+        for the car that would be in breach.
     whole : (B, WHOLES) int64
         Whether the trial is judged at all, and the durations of the rules in ticks; E3's most new tickets.
     goal_off : (B + 1,) int64
@@ -121,10 +126,15 @@ class Docket(NamedTuple):
         Tick in which each car has to be looked at though its labels stay as they are and nobody comes near.
     clock : (B, N, CLOCKS) int64
         First tick of the present run of: off the road (ego; `NEVER` before it has been on one), left, left and not
-        overtaking, stopped, first at a clear crossing, in a disc with a free exit, standing with a free way, where it
-        is: at a vertex or none; -1 where there is no run.
+        overtaking, first at a clear crossing, in a disc with a free exit, lingering with a free way, where it
+        is: at a vertex or none, in the disc that its body meets; -1 where there is no run. `EXIT_PAUSED`: how many
+        ticks of a run in a disc with a free exit do not count; `EXIT_COUNTS`: the run's first tick while they do, else
+        -1; `CAME_BY`: the lane by which it came into the disc
+        that its body meets, -1 if it started there.
     goal_clock : (G,) int64
         First tick of the present run of a goal being taken; -1 while it is free.
+    goal_paused : (G,) int64
+        How many ticks of that run do not count.
     goal_due : (B,) int64
         Tick in which the goals have to be looked at though no car comes or goes.
     look : (N,) int64
@@ -139,6 +149,7 @@ class Docket(NamedTuple):
     due: Ints
     clock: Ints
     goal_clock: Ints
+    goal_paused: Ints
     goal_due: Ints
     look: Ints
     row: Ints
@@ -157,6 +168,7 @@ class Docket(NamedTuple):
             np.zeros((trials, cars), dtype=np.int64),
             clock,
             np.full(goals, -1, dtype=np.int64),
+            np.zeros(goals, dtype=np.int64),
             np.zeros(trials, dtype=np.int64),
             np.zeros(cars, dtype=np.int64),
             np.zeros((room, COLUMNS), dtype=np.int64),
@@ -190,13 +202,12 @@ def pack_terms(
     real = np.zeros((len(parameters), REALS))
     whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
     for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
-        reach = radius + own.exit_gap + float(cars.rounding[b])
-        far = float(cars.reach[b] - cars.rounding[b])
-        real[b, EXIT2] = reach * reach
-        real[b, NEAR2] = (reach + far) * (reach + far)
-        real[b, LONE] = radius + float(cars.reach[b]) + reach + far + GRAIN
-        real[b, WAY] = own.way_distance
-        real[b, EXIT_GAP] = own.exit_gap
+        far = radius + own.exit_gap + GRAIN
+        real[b, EXIT2] = far * far
+        real[b, LONE] = far + 2.0 * float(cars.reach[b])
+        real[b, WAY] = own.way_distance + GRAIN
+        real[b, EXIT_GAP] = own.exit_gap + GRAIN
+        real[b, GOAL_GAP] = own.goal_gap + GRAIN
         real[b, LANE_MIDDLE] = cars.w[b]
         whole[b, JUDGED] = judged[b]
         whole[b, RETURN_TICKS] = ticks(own.left_time, rate)
@@ -205,4 +216,5 @@ def pack_terms(
         whole[b, EXIT_TICKS] = ticks(own.exit_time, rate)
         whole[b, REST_TICKS] = ticks(own.rest_time, rate)
         whole[b, GOAL_TICKS] = ticks(own.goal_time, rate)
+        whole[b, SHARED_TICKS] = ticks(own.shared_time, rate)
     return real, whole

@@ -1,31 +1,54 @@
-"""Whether a car in a disc may leave it (RULES, *phi_env*, E4)."""
+"""Whether a car in a disc may leave it (RULES, *phi_env*, E4): the lanes out of it, and what takes them."""
 
 from __future__ import annotations
 
 from math import sqrt
 
 from dubins_traffic.cars.near import Spacing, list_near, ticks_within
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction
+from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import obstacle_narrows
-from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, LANE_MIDDLE, LONE, NEAR2, Terms
+from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, GOAL_GAP, LANE_MIDDLE, LONE, Terms
 from dubins_traffic.spec.obstacles import ObstacleLanes
-from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
+    CROSSING_DEGREE,
     FREE_NEEDED,
     GRAIN,
-    HALF_LENGTH,
-    HALF_WIDTH,
     LANE_WIDTH,
-    LEFT_SET,
     NET,
     RADIUS,
-    ROUNDING,
     RuleTable,
 )
+
+
+@jit_inline
+def way_back(b: int, v: int, came: int, t: RoadTable, rules: RuleTable) -> int:
+    """Return the segment that is no exit of v for a car that came by the lane `came` (-1: none): at bends only."""
+    degree = t.degree[t.vert_off[rules.whole[b, NET]] + v]
+    return came // 2 if came >= 0 and 2 <= degree < rules.whole[b, CROSSING_DEGREE] else -1
+
+
+@jit_inline
+def stands_in_exit(
+    b: int, k: int, lane: int, along: float, lateral: float, away2: float, rules: RuleTable, terms: Terms,
+    labels: Labels,
+) -> bool:  # fmt: skip
+    """Tell whether the centre of car k, at (along, lateral) of the lane `lane` out of a disc, is in it and near by.
+
+    `away2` is its squared distance from the intersection; it is outside the disc.
+    """
+    inside = -rules.real[b, LANE_WIDTH] - GRAIN <= lateral <= GRAIN
+    return inside and along > 0.0 and labels.segment[b, k] == lane // 2 and away2 <= terms.real[b, EXIT2]
+
+
+@jit_inline
+def to_mouth(b: int, along: float, lateral: float, rules: RuleTable, terms: Terms) -> float:
+    """Return how far (along, lateral) of a lane out of a disc is from where the lane leaves the disc, metres."""
+    far, aside = along - rules.real[b, RADIUS], lateral + terms.real[b, LANE_MIDDLE]
+    return sqrt(far * far + aside * aside)
 
 
 @jit_inner
@@ -33,6 +56,7 @@ def find_exit(
     b: int,
     n: int,
     v: int,
+    back: int,
     crowd: Ints,
     count: int,
     state: State,
@@ -42,42 +66,41 @@ def find_exit(
     terms: Terms,
     labels: Labels,
 ) -> bool:
-    """Do what `look_for_exit` does, by a look at each lane and each of the first `count` cars of `crowd`."""
+    """Tell whether some lane out of v, but for that on segment `back`, is free for car n.
+
+    All that may be near are among the first `count` cars of `crowd`.
+    """
     real = rules.real[b]
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v
     vx, vy = t.vert[row, 0], t.vert[row, 1]
-    mouth, middle = real[RADIUS], terms.real[b, LANE_MIDDLE]
     taken = 0
     for i in range(count):
         k = crowd[i]
-        x, y, c, s = state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k]
-        near2 = distance2_to_body(vx, vy, x, y, c, s, real[HALF_LENGTH], real[HALF_WIDTH])
-        if k == n or near2 > terms.real[b, EXIT2]:
+        x, y = state.x[b, k], state.y[b, k]
+        away2 = (x - vx) * (x - vx) + (y - vy) * (y - vy)
+        if k == n or away2 > terms.real[b, EXIT2]:
             continue
         for arm in range(t.degree[row]):
             lane = t.arms[row, arm]
             along, lateral = lane_coordinates(t, net, lane, x, y)
-            in_the_way = False
             if labels.at[b, k] == v:
                 own, own_lateral = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
-                far2 = (along - mouth) * (along - mouth) + (lateral + middle) * (lateral + middle)
-                own2 = (own - mouth) * (own - mouth) + (own_lateral + middle) * (own_lateral + middle)
-                in_the_way = far2 < own2
-            elif labels.segment[b, k] == lane // 2:
-                tx, ty = lane_direction(t, net, lane)
-                half = half_extent(tx, ty, c, s, real[HALF_LENGTH], real[HALF_WIDTH], real[ROUNDING])
-                in_the_way = lateral - half < -real[LEFT_SET]
+                own_way = to_mouth(b, own, own_lateral, rules, terms)
+                in_the_way = to_mouth(b, along, lateral, rules, terms) < own_way + GRAIN
+            else:
+                in_the_way = stands_in_exit(b, k, lane, along, lateral, away2, rules, terms, labels)
             if in_the_way:
                 taken |= 1 << arm
     for arm in range(t.degree[row]):
-        if taken & (1 << arm) != 0:
-            continue
         lane: int = t.arms[row, arm]
+        if taken & (1 << arm) != 0 or lane // 2 == back:
+            continue
         length = t.seg[t.seg_off[net] + lane // 2, 4]
+        mouth = real[RADIUS]
         far = mouth + terms.real[b, EXIT_GAP]
         if obstacles.base[b] < 0 or not obstacle_narrows(
-            obstacles, b, lane, length, mouth, far, real[LANE_WIDTH], real[FREE_NEEDED]
+            obstacles, b, lane, length, mouth, far, real[LANE_WIDTH], real[FREE_NEEDED] + GRAIN
         ):
             return True
     return False
@@ -89,6 +112,7 @@ def look_for_exit(
     n: int,
     tick: int,
     v: int,
+    back: int,
     spacing: Spacing,
     state: State,
     t: RoadTable,
@@ -99,13 +123,13 @@ def look_for_exit(
 ) -> tuple[bool, int]:
     """E4: tell whether car n, whose body meets the disc of v, may leave by some lane, and when to ask again.
 
-    Who is near with his centre outside the disc is in the way to one lane at most. Where fewer are near than there are
-    lanes, an exit is free until another one can have come near, or into the disc.
+    That on segment `back` is no exit. Who is near with his centre outside the disc is in the way to one lane at most.
+    Where fewer are near than there are lanes, an exit is free until another one can have come near, or into the disc.
     """
     row = t.vert_off[rules.whole[b, NET]] + v
     vx, vy = t.vert[row, 0], t.vert[row, 1]
-    far2, lone = terms.real[b, NEAR2], terms.real[b, LONE]
-    near = 0
+    far2, lone = terms.real[b, EXIT2], terms.real[b, LONE]
+    near = 0 if back < 0 else 1
     nearest2 = beyond2 = lone * lone
     count = list_near(state, b, tick, float(vx), float(vy), lone, spacing)
     for i in range(count):
@@ -122,4 +146,29 @@ def look_for_exit(
     if near < t.degree[row] and obstacles.base[b] < 0:
         spare = min(sqrt(nearest2) - rules.real[b, RADIUS], sqrt(beyond2) - sqrt(far2)) - GRAIN
         return True, tick + ticks_within(spare, spacing, b)
-    return find_exit(b, n, v, spacing.near, count, state, t, obstacles, rules, terms, labels), tick + 1
+    return find_exit(b, n, v, back, spacing.near, count, state, t, obstacles, rules, terms, labels), tick + 1
+
+
+@jit_inner
+def ego_at_exit(
+    b: int, v: int, back: int, state: State, t: RoadTable, rules: RuleTable, terms: Terms, labels: Labels
+) -> bool:
+    """E6: tell whether the ego is near an exit of v, of which that on segment `back` is none.
+
+    It is near if its centre is near to where the lane leaves the disc, or takes the lane as E4 says.
+    """
+    net: int = rules.whole[b, NET]
+    row = t.vert_off[net] + v
+    x, y = state.x[b, EGO], state.y[b, EGO]
+    dx, dy = x - t.vert[row, 0], y - t.vert[row, 1]
+    for arm in range(t.degree[row]):
+        lane: int = t.arms[row, arm]
+        if lane // 2 == back:
+            continue
+        along, lateral = lane_coordinates(t, net, lane, x, y)
+        takes = labels.at[b, EGO] != v and stands_in_exit(
+            b, EGO, lane, along, lateral, dx * dx + dy * dy, rules, terms, labels
+        )
+        if takes or to_mouth(b, along, lateral, rules, terms) <= terms.real[b, GOAL_GAP]:
+            return True
+    return False

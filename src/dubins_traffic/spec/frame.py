@@ -31,6 +31,7 @@ from dubins_traffic.spec.propositions import (
     FORFEITED,
     IN_CROSSING,
     LEFT,
+    LINGERS,
     OVERTAKING,
     STANDS,
     STILL,
@@ -69,15 +70,18 @@ from dubins_traffic.spec.tables import (
     REACH,
     ROUNDING,
     SEGMENT,
+    STOP2,
     STOP_MOVE2,
     STOP_TICKS,
     TICKET,
+    WAIT_SINCE,
     ZONE,
     Memory,
     RuleTable,
 )
 
-BESIDE = STILL | LEFT | OVERTAKING
+LONG = STILL | LINGERS
+BESIDE = LONG | LEFT | OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
 # Where each table begins and ends among the arrays of a call.
@@ -148,7 +152,7 @@ def label_trial(
         some |= _stop(b, n, tick, state, roads, rules, labels, memory)
     if some & STOPPED != 0:
         _queue_up(b, tick, cars, roads, rules, labels, memory)
-    elif some & STILL != 0:
+    elif some & LONG != 0:
         for n in range(cars):
             _say_stands(b, n, labels)
     if some & BESIDE != 0 or obstacles.base[b] >= 0:
@@ -217,10 +221,13 @@ def _stop(
     if memory.head[b, v, CROSSERS] == own:
         bits |= CLEAR
     outside = gap2 >= real[b, CROSS2]
+    if not outside:
+        mark[b, n, WAIT_SINCE] = -1
     if not outside or gap2 > real[b, QUEUE2]:
         bits &= ~STOPPED
-    if outside and gap2 <= real[b, APPROACH2] and foremost(rules, memory, b, n, lane):
-        bits |= APPROACH
+    if outside and gap2 <= real[b, STOP2] and foremost(rules, memory, b, n, lane):
+        if gap2 <= real[b, APPROACH2]:
+            bits |= APPROACH
         if mark[b, n, APPROACH_SINCE] < 0:
             mark[b, n, APPROACH_SINCE] = tick
         ago = rules.whole[b, STOP_TICKS]
@@ -230,8 +237,10 @@ def _stop(
             if moved <= real[b, STOP_MOVE2]:
                 bits |= STOPPED
                 mark[b, n, TICKET] = tick
-                mark[b, n, FORFEITS] = 0
+                mark[b, n, FORFEITS] = 0 if mark[b, n, WAIT_SINCE] < 0 else mark[b, n, FORFEITS] + 1
                 mark[b, n, FIRST_SINCE] = -1
+                if mark[b, n, WAIT_SINCE] < 0:
+                    mark[b, n, WAIT_SINCE] = tick
     else:
         mark[b, n, APPROACH_SINCE] = -1
     if bits & STOPPED != 0:
@@ -295,7 +304,7 @@ def _stand(b: int, n: int, rules: RuleTable, labels: Labels, memory: Memory) -> 
 @jit
 def _say_stands(b: int, n: int, labels: Labels) -> None:
     bits = np.int64(labels.bits[b, n])
-    if bits & (STILL | EXCUSED) == STILL:
+    if bits & EXCUSED == 0 and bits & LONG != 0:
         labels.bits[b, n] = bits | STANDS
 
 

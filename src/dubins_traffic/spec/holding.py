@@ -23,6 +23,7 @@ from dubins_traffic.spec.propositions import (
     CLEAR,
     IN_CROSSING,
     LEFT,
+    LINGERS,
     ON_ROAD,
     OVERTAKING,
     STILL,
@@ -31,7 +32,6 @@ from dubins_traffic.spec.propositions import (
 from dubins_traffic.spec.tables import (
     ALONG_HIGH,
     ALONG_LOW,
-    APPROACH2,
     ASIDE_HIGH,
     ASIDE_LOW,
     AWAY2,
@@ -55,7 +55,11 @@ from dubins_traffic.spec.tables import (
     HOLDS,
     LATERAL,
     LEFT_SET,
+    LINGER_GROWTH,
+    LINGER_TICKS,
+    LINGERS_FROM,
     NET,
+    NEVER_AGAIN,
     NOW,
     PATCH_HIGH_X,
     PATCH_HIGH_Y,
@@ -71,13 +75,16 @@ from dubins_traffic.spec.tables import (
     SIGN,
     STAND_MOVE2,
     STAND_TICKS,
+    STOP2,
     THEN_X,
     THEN_Y,
     TOP,
     TOP_SO_FAR,
+    TOP_THEN,
     TURN_BACK,
     VERTEX_X,
     VERTEX_Y,
+    WAS_LINGERING,
     WAS_STILL,
     WAY_SO_FAR,
     ZONE,
@@ -103,11 +110,15 @@ def place(n: int) -> int:
 
 @jit_inline
 def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
-    """Note where the cars of trial b are; find who holds on to its labels where no roads fork, and who was still."""
+    """Note where the cars of trial b are; find who holds on to its labels where no roads fork, and who was still.
+
+    Of those who hold on it is found who lingers, too.
+    """
     _bring(b, tick, state, rules, memory)
     real = rules.real[b]
     back = real[TURN_BACK]
     still2 = real[STAND_MOVE2] if tick >= rules.whole[b, STAND_TICKS] else -1.0
+    grown, now = real[LINGER_GROWTH], float(tick)
     calm = memory.calm[b]
     for first in range(0, state.count[b], BLOCK):
         begin = first * CALM
@@ -135,27 +146,33 @@ def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Me
             ry = y - calm[k + BLOCK * THEN_Y]
             calm[k + BLOCK * AWAY2] = away2
             calm[k + BLOCK * WAY_SO_FAR] = progress
-            calm[k + BLOCK * TOP_SO_FAR] = max(top, progress)
+            top = max(top, progress)
+            calm[k + BLOCK * TOP_SO_FAR] = top
+            little = (now >= calm[k + BLOCK * LINGERS_FROM]) & (top - calm[k + BLOCK * TOP_THEN] < grown)
+            calm[k + BLOCK * WAS_LINGERING] = 1.0 if little else 0.0
             sure = (abs(x - calm[k + BLOCK * FORK_X]) < half) & (abs(y - calm[k + BLOCK * FORK_Y]) < half)
             holds = 1.0 if sure else IF_NEAREST
             calm[k + BLOCK * HOLDS] = holds if inside else 0.0
             calm[k + BLOCK * WAS_STILL] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
+    _keep_growth(b, tick, rules, memory)
 
 
 @jit_inline
 def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
-    """Put where the cars are, and where they were `stand_time` ago, beside what is kept of them."""
+    """Put where the cars are, and where they and their greatest progress were some time ago, beside what is kept."""
     depth, places = memory.trail.shape[1], memory.trail.shape[3]
     now = tick % depth
     then = (now + depth - rules.whole[b, STAND_TICKS]) % depth
     memory.head[b, 0, NOW] = now
     calm = memory.calm[b]
     x, y, present, past = state.x[b], state.y[b], memory.trail[b, now], memory.trail[b, then]
+    grown = memory.growth[b, growth_row(b, tick, rules)]
     if places % TOGETHER == 0:
         for n in range(0, places, TOGETHER):
             k = place(n)
             _copy(past[0], n, calm, k + BLOCK * THEN_X)
             _copy(past[1], n, calm, k + BLOCK * THEN_Y)
+            _copy(grown, n, calm, k + BLOCK * TOP_THEN)
             _copy(x, n, calm, k + BLOCK * HERE_X)
             _copy(y, n, calm, k + BLOCK * HERE_Y)
             _copy(x, n, present[0], n)
@@ -165,8 +182,28 @@ def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) ->
         k = place(n)
         calm[k + BLOCK * THEN_X] = past[0, n]
         calm[k + BLOCK * THEN_Y] = past[1, n]
+        calm[k + BLOCK * TOP_THEN] = grown[n]
         calm[k + BLOCK * HERE_X] = present[0, n] = x[n]
         calm[k + BLOCK * HERE_Y] = present[1, n] = y[n]
+
+
+@jit_inline
+def growth_row(b: int, tick: int, rules: RuleTable) -> int:
+    """Return the row of `Memory.growth` that holds what was `linger_time` ago, until it holds what is now."""
+    return tick % max(rules.whole[b, LINGER_TICKS], 1)
+
+
+@jit_inline
+def _keep_growth(b: int, tick: int, rules: RuleTable, memory: Memory) -> None:
+    """Keep the greatest progress of all cars in `Memory.growth`; `note_growth` mends it for those who don't hold on."""
+    calm, grown = memory.calm[b], memory.growth[b, growth_row(b, tick, rules)]
+    places = grown.shape[0]
+    if places % TOGETHER == 0:
+        for n in range(0, places, TOGETHER):
+            _copy(calm, place(n) + BLOCK * TOP_SO_FAR, grown, n)
+        return
+    for n in range(places):
+        grown[n] = calm[place(n) + BLOCK * TOP_SO_FAR]
 
 
 @jit_inline
@@ -180,6 +217,29 @@ def _copy(source: Floats, n: int, target: Floats, k: int) -> None:
 def still(b: int, n: int, memory: Memory) -> int:
     """Return STILL if car n is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
     return STILL if memory.calm[b, place(n) + BLOCK * WAS_STILL] != 0.0 else 0
+
+
+@jit_inline
+def lingers(b: int, n: int, memory: Memory) -> int:
+    """Return LINGERS if car n lingers, else 0; after `look_who_holds`, or `note_growth` for who doesn't hold on."""
+    return LINGERS if memory.calm[b, place(n) + BLOCK * WAS_LINGERING] != 0.0 else 0
+
+
+@jit_inline
+def note_growth(
+    b: int, n: int, tick: int, lane: int, fresh: bool, top: float, rules: RuleTable, memory: Memory
+) -> None:
+    """Find whether a car lingers that has been located in `lane` (-1: none), which was set in this frame if `fresh`."""
+    calm = memory.calm[b]
+    k = place(n)
+    if lane < 0:
+        calm[k + BLOCK * LINGERS_FROM] = NEVER_AGAIN
+    elif fresh:
+        calm[k + BLOCK * LINGERS_FROM] = float(tick + rules.whole[b, LINGER_TICKS])
+    long = tick >= calm[k + BLOCK * LINGERS_FROM]
+    little = top - calm[k + BLOCK * TOP_THEN] < rules.real[b, LINGER_GROWTH]
+    calm[k + BLOCK * WAS_LINGERING] = 1.0 if long and little else 0.0
+    memory.growth[b, growth_row(b, tick, rules), n] = top
 
 
 @jit_inline
@@ -204,7 +264,7 @@ def holds_on(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, mem
     measure[PROGRESS] = calm[k + BLOCK * WAY_SO_FAR]
     if memory.mark[b, n, ZONE] != 0:
         measure[GAP2] = calm[k + BLOCK * AWAY2]
-    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(b, n, memory)
+    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(b, n, memory) | lingers(b, n, memory)
     return True
 
 
@@ -251,7 +311,7 @@ def _keep_ring(k: int, away2: float, real: Floats, calm: Floats) -> None:
     """Keep between which squared distances of its vertex a car is at `away2`: of its discs, and who approaches it."""
     low = -1.0
     high = FARTHEST * FARTHEST
-    outer2 = max(real[APPROACH2], real[QUEUE2])
+    outer2 = max(real[STOP2], real[QUEUE2])
     for edge2 in (real[RADIUS] * real[RADIUS], real[CROSS2], outer2):
         if edge2 <= away2:
             low = max(low, edge2)

@@ -19,7 +19,10 @@ from dubins_traffic.spec.docket import (
     AT_TICK,
     AT_VERTEX,
     COLLISION,
+    EXIT_COUNTS,
+    EXIT_PAUSED,
     EXIT_SINCE,
+    EXIT_TICKS,
     FAULT,
     FIRST_SINCE,
     LEFT_SINCE,
@@ -34,13 +37,14 @@ from dubins_traffic.spec.docket import (
     Terms,
     pack_terms,
 )
+from dubins_traffic.spec.duties import find_ways
 from dubins_traffic.spec.fault import with_fault
 from dubins_traffic.spec.judge_kernel import judge_frame, judge_frames
 from dubins_traffic.spec.judged import Judged, Posed, kinds_of
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.parameters import RuleParameters
 
-_PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_SINCE), ("E5", REST_SINCE))
+_PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_COUNTS), ("E5", REST_SINCE))
 _CLOCKS = [clock for _, clock in _PENDING]
 _ROOMY = 64
 """For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
@@ -177,10 +181,40 @@ class Referee:
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:
-        """Which e-agents meet, with their bodies, a disc out of which some exit is free (E4), (B, N)."""
-        return self._docket.clock[:, :, EXIT_SINCE] >= 0
+        """Which e-agents meet, with their bodies, a disc out of which some exit is free, and their time counts (E4).
+
+        Of shape (B, N).
+        """
+        return self._docket.clock[:, :, EXIT_COUNTS] >= 0
+
+    @property
+    def stays(self) -> npt.NDArray[np.bool_]:
+        """Which e-agents have been in a disc with a free exit for longer than they may (E4), (B, N)."""
+        clock = self._docket.clock
+        long = self._tick - clock[:, :, EXIT_SINCE] - clock[:, :, EXIT_PAUSED]
+        return (clock[:, :, EXIT_SINCE] >= 0) & (long >= self._terms.whole[:, EXIT_TICKS, None])
+
+    def ways(self, state: State) -> npt.NDArray[np.bool_]:
+        """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, of these poses."""
+        found = np.zeros(state.x.shape, dtype=np.bool_)
+        own = self._labeller
+        find_ways(
+            self._tick,
+            self._spacing,
+            state,
+            self._roads,
+            self._obstacles,
+            self._rules,
+            self._terms,
+            own.labels,
+            own.memory,
+            self._docket,
+            found,
+        )
+        return found
 
     def _judge(self, tick: int, state: State) -> None:
+        self._tick = tick
         own = self._labeller
         tables = (
             self._roads,

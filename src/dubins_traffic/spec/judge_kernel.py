@@ -10,60 +10,47 @@ from dubins_traffic.cars.near import Spacing, list_near
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
-from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.roads.lookup import distance2, lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.breaches import (
     EGO,
-    add,
-    at_goal,
-    has_way,
     judge_entry,
     judge_lane,
-    judge_queue,
     judge_road,
-    run,
-    when_due,
 )
 from dubins_traffic.spec.docket import (
     AT,
     AT_SINCE,
     BITS,
+    CAME_BY,
     CROSSES,
-    ENTER_TICKS,
-    EXIT,
-    EXIT_SINCE,
-    EXIT_TICKS,
-    FIRST_SINCE,
-    GOAL,
-    GOAL_TICKS,
+    IN_SINCE,
     JUDGED,
     LANE,
     LEFT_SINCE,
     LONE,
     NEVER_DUE,
-    REST,
-    REST_SINCE,
-    REST_TICKS,
-    RETURN_TICKS,
-    STOPPED_SINCE,
+    OFF_ROAD,
     UNBLOCKED_SINCE,
-    WAY,
     Docket,
     Terms,
 )
-from dubins_traffic.spec.exits import look_for_exit
+from dubins_traffic.spec.duties import judge_agent, judge_goals
 from dubins_traffic.spec.frame import label_tables
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.propositions import (
-    BLOCKED,
     ENTERED,
     IN_CROSSING,
     LEFT,
-    STANDS,
+    ON_ROAD,
     STOPPED,
 )
 from dubins_traffic.spec.tables import (
+    GRAIN,
+    LEFT_RELEASE,
+    LEFT_SET,
     NET,
+    REACH,
     TICKET,
     Memory,
     RuleTable,
@@ -137,12 +124,20 @@ def judge_trial(
     arrived = tick == docket.goal_due[b]
     for i in range(count):
         n = docket.look[i]
-        arrived |= docket.past[b, n, AT] != labels.at[b, n]
+        own = docket.past[b, n]
+        arrived |= own[AT] != labels.at[b, n]
+        if own[CROSSES] != labels.crosses[b, n]:
+            docket.clock[b, n, IN_SINCE] = tick
+            docket.clock[b, n, CAME_BY] = own[LANE]
+    for i in range(count):
+        n = docket.look[i]
         _judge_car(
             b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, docket
         )  # fmt: skip
     if arrived:
-        _judge_goals(b, tick, cars, terms, labels, docket)
+        judge_goals(
+            b, tick, cars, spacing, state, roads, obstacles, rules, terms, labels, docket
+        )  # fmt: skip
     for i in range(count):
         n = docket.look[i]
         own = docket.past[b, n]
@@ -156,9 +151,11 @@ def judge_trial(
 def _list_due(b: int, tick: int, cars: int, labels: Labels, memory: Memory, docket: Docket) -> int:
     """List the cars of which something may begin, end or be due in this frame in `docket.look`; return how many.
 
-    These are cars whose labels are not those of the frame before, who have got a ticket, or whose time has come.
+    These are cars whose labels are not those of the frame before, who have got a ticket, or whose time has come; and
+    all in discs, if the ego's body comes into one or leaves it.
     """
     past, due, look = docket.past[b], docket.due[b], docket.look
+    joins = labels.crosses[b, EGO] != past[EGO, CROSSES]
     count = 0
     for n in range(cars):
         own = past[n]
@@ -166,7 +163,8 @@ def _list_due(b: int, tick: int, cars: int, labels: Labels, memory: Memory, dock
         other |= (labels.crosses[b, n] ^ own[CROSSES]) | (labels.at[b, n] ^ own[AT])
         ticket = memory.mark[b, n, TICKET] == tick
         look[count] = n
-        count += 1 if (other != 0) | ticket | (tick >= due[n]) else 0
+        joined = joins & (labels.crosses[b, n] >= 0)
+        count += 1 if (other != 0) | ticket | (tick >= due[n]) | joined else 0
     return count
 
 
@@ -192,7 +190,8 @@ def _judge_car(
     bits = np.int64(labels.bits[b, n])
     lane = labels.lane[b, n]
     v = labels.crosses[b, n]
-    if bits & LEFT != 0:
+    due = tick + 1 if bits & LEFT != 0 else NEVER_DUE
+    if _surely_left(b, bits, memory.measure[b, n, REACH], clock[LEFT_SINCE] >= 0, rules):
         judge_lane(b, n, tick, bits, lane, whole, clock, docket.row, docket.filled)
     else:
         clock[LEFT_SINCE] = -1
@@ -202,11 +201,13 @@ def _judge_car(
         if own[BITS] & STOPPED != 0:
             stopped = lane_end(roads, rules.whole[b, NET], own[LANE]) == v
         _judge_entry(b, n, tick, v, stopped, spacing, state, roads, rules, terms, docket)
-    due = when_due(tick, clock, LEFT_SINCE, whole[RETURN_TICKS])
     if n == EGO:
-        judge_road(b, tick, bits, lane, clock, docket.row, docket.filled)
+        on = bits & ON_ROAD != 0
+        if not on and clock[OFF_ROAD] == -1 and _by_the_road(b, state, roads, rules, labels):
+            on, due = True, tick + 1
+        judge_road(b, tick, on, lane, clock, docket.row, docket.filled)
     else:
-        again = _judge_agent(
+        again = judge_agent(
             b, n, tick, bits, lane, v, spacing, state, roads, obstacles, rules, terms, labels, memory,
             docket,
         )  # fmt: skip
@@ -214,6 +215,22 @@ def _judge_car(
         if own[AT] != labels.at[b, n]:
             clock[AT_SINCE] = tick
     docket.due[b, n] = due
+
+
+@jit_inline
+def _surely_left(b: int, bits: Any, reach: float, was: bool, rules: RuleTable) -> bool:
+    """Tell whether a car is left, and was or not before, by limits that are eased for it."""
+    limit = rules.real[b, LEFT_RELEASE] if was else rules.real[b, LEFT_SET]
+    return bits & LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
+
+
+@jit
+def _by_the_road(b: int, state: State, roads: RoadTable, rules: RuleTable, labels: Labels) -> bool:
+    """Tell whether the ego is off the road by no more than rounding can be."""
+    net: int = rules.whole[b, NET]
+    far = roads.half_width[net] + GRAIN
+    x, y = float(state.x[b, EGO]), float(state.y[b, EGO])
+    return distance2(roads, net, int(labels.segment[b, EGO]), x, y) <= far * far
 
 
 @jit
@@ -226,91 +243,6 @@ def _judge_entry(
     far = terms.real[b, LONE] + 2.0 * spacing.drift[b]
     count = list_near(state, b, tick, float(roads.vert[row, 0]), float(roads.vert[row, 1]), far, spacing)
     judge_entry(b, n, tick, v, stopped, spacing.near, count, docket.past[b], docket.row, docket.filled)
-
-
-@jit_inline
-def _judge_goals(b: int, tick: int, cars: int, terms: Terms, labels: Labels, docket: Docket) -> None:
-    """E6: no goal is taken for too long; find when one will be, if no car comes or goes."""
-    ago = terms.whole[b, GOAL_TICKS]
-    due = NEVER_DUE
-    for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
-        who = at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
-        if run(who >= 0, tick, docket.goal_clock, g) == ago:
-            add(b, GOAL, who, tick, docket.goal_clock[g], terms.goal[g], -1, docket.row, docket.filled)
-        due = min(due, when_due(tick, docket.goal_clock, g, ago))
-    docket.goal_due[b] = due
-
-
-@jit_inline
-def _judge_exit(
-    b: int,
-    n: int,
-    tick: int,
-    lane: int,
-    v: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: Terms,
-    labels: Labels,
-    docket: Docket,
-) -> int:
-    """E4, of an e-agent whose body meets the disc of v; return when to ask again, if its labels stay as they are."""
-    clock, ago = docket.clock[b, n], terms.whole[b, EXIT_TICKS]
-    free, again = look_for_exit(b, n, tick, v, spacing, state, roads, obstacles, rules, terms, labels)
-    if run(free, tick, clock, EXIT_SINCE) == ago:
-        add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, docket.row, docket.filled)
-    return min(again, when_due(tick, clock, EXIT_SINCE, ago))
-
-
-@jit_inline
-def _judge_agent(
-    b: int,
-    n: int,
-    tick: int,
-    bits: Any,
-    lane: int,
-    v: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: Terms,
-    labels: Labels,
-    memory: Memory,
-    docket: Docket,
-) -> int:
-    """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1).
-
-    Returns the next tick in which more may be due, if its labels stay as they are.
-    """
-    whole, row, filled, clock = terms.whole[b], docket.row, docket.filled, docket.clock[b, n]
-    if bits & STOPPED != 0:
-        ahead = lane_end(roads, rules.whole[b, NET], lane)
-        judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
-    else:
-        clock[STOPPED_SINCE] = -1
-        clock[FIRST_SINCE] = -1
-    if docket.past[b, n, CROSSES] != v or v < 0:
-        clock[EXIT_SINCE] = -1
-    due = when_due(tick, clock, FIRST_SINCE, whole[ENTER_TICKS])
-    if v >= 0:
-        again = _judge_exit(
-            b, n, tick, lane, v, spacing, state, roads, obstacles, rules, terms, labels, docket
-        )  # fmt: skip
-        due = min(due, again)
-    free = lane >= 0 and bits & (STANDS | BLOCKED | STOPPED) == STANDS
-    if free:
-        due = tick + 1
-        free = has_way(
-            n, state.count[b], terms.real[b, WAY], labels.lane[b], labels.bits[b], memory.measure[b]
-        )
-    if run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
-        add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
-    return due
 
 
 @jit

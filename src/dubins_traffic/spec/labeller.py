@@ -22,6 +22,7 @@ from dubins_traffic.spec.tables import (
     FORFEITS,
     JUDGED3,
     LATERAL,
+    LINGER_TICKS,
     NET,
     PROGRESS,
     RANK,
@@ -91,7 +92,8 @@ class Labeller:
     def begin(self, trials: int, cars: int) -> None:
         """Forget everything: labels and memory are as before the first frame of `trials` x `cars` cars."""
         depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
-        self.memory = Memory.empty(trials, cars, depth, self._heads)
+        linger = max(1, int(self._rules.whole[:, LINGER_TICKS].max()))
+        self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
         self.labels = Labels.zeros(trials, cars)
         self._arrays = (*self._roads, *self._obstacles, *self._rules, *self.labels, *self.memory)
         self._state = None

@@ -22,7 +22,7 @@ from dubins_traffic.roads.lookup import (
     vertex_distance2,
 )
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.holding import FARTHEST, KEPT, hold, still, trust_fork
+from dubins_traffic.spec.holding import FARTHEST, KEPT, hold, lingers, note_growth, still, trust_fork
 from dubins_traffic.spec.lane_state import lane_state
 from dubins_traffic.spec.propositions import (
     AHEAD,
@@ -37,7 +37,6 @@ from dubins_traffic.spec.propositions import (
 )
 from dubins_traffic.spec.shape import distance2_to_body, half_extent
 from dubins_traffic.spec.tables import (
-    APPROACH2,
     APPROACH_SINCE,
     CROSS2,
     CROSSERS,
@@ -62,8 +61,10 @@ from dubins_traffic.spec.tables import (
     RADIUS,
     REACH,
     ROUNDING,
+    STOP2,
     TOP,
     TURN_BACK,
+    WAIT_SINCE,
     ZONE,
     Memory,
     RuleTable,
@@ -76,7 +77,7 @@ RULE3 = STOPPED | CLEAR | AHEAD
 def locate(
     b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
 ) -> bool:
-    """Find segment, disc and lane state of a car, and whether it was still; enter it in the lists.
+    """Find segment, disc and lane state of a car, whether it was still and lingers; enter it in the lists.
 
     Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them. Tells whether the car
     crosses another vertex than before, or one or none for the first time.
@@ -122,13 +123,15 @@ def locate(
     if lane != lane_before:
         bits &= ~STOPPED
         memory.mark[b, n, APPROACH_SINCE] = -1
+        memory.mark[b, n, WAIT_SINCE] = -1
         _change_lists(b, n, lane_before, lane, memory)
     stirs = _change_crossing(b, int(labels.crosses[b, n]), crosses, memory)
     labels.segment[b, n] = segment
     labels.at[b, n] = at
     labels.crosses[b, n] = crosses
     labels.lane[b, n] = lane
-    labels.bits[b, n] = bits | still(b, n, memory)
+    note_growth(b, n, tick, lane, lane != lane_before, top, rules, memory)
+    labels.bits[b, n] = bits | still(b, n, memory) | lingers(b, n, memory)
 
     measure = memory.measure[b, n]
     measure[TOP] = top
@@ -192,7 +195,7 @@ def _reach(
             gap2 = vertex_distance2(t, net, end, x, y)
             if not round_body:
                 gap2 = distance2_to_vertex(t, net, end, x, y, c, s, half_length, half_width)
-            outer2 = max(real[APPROACH2], real[QUEUE2])
+            outer2 = max(real[STOP2], real[QUEUE2])
             if end != v:
                 spare = max(sqrt(gap2) - sqrt(outer2), 0.0)
             zone = 1 if real[CROSS2] <= gap2 <= outer2 else 0

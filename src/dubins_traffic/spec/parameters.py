@@ -10,6 +10,9 @@ from typing import Any
 
 from dubins_traffic.errors import InputError
 
+EDITION = 2
+"""The edition of the rules of the road that this package judges. Edition 1 had no `lingers`, and other E3 to E6."""
+
 
 @dataclass(frozen=True, slots=True)
 class RuleParameters:
@@ -20,9 +23,11 @@ class RuleParameters:
     Raises
     ------
     InputError
-        If a value is not a finite number >= 0, or not whole where a count is asked.
+        If a value is not a finite number >= 0, or not whole where a count is asked; or if the edition is another one.
     """
 
+    edition: int = EDITION
+    """The edition of the rules that the others are parameters of."""
     crossing_degree: int = 3
     """Least degree of a vertex that is a crossing."""
     segment_slack: float = 0.5
@@ -48,7 +53,11 @@ class RuleParameters:
     forfeit_time: float = 3.0
     """Who is first at a clear crossing this long and does not enter gets a new ticket."""
     stand_time: float = 1.0
-    """stands: still for this time."""
+    """stands: still for this time, or lingers."""
+    linger_distance: float = 0.5
+    """lingers: the largest progress since the lane state was set has grown by less than this ..."""
+    linger_time: float = 10.0
+    """... in this last time."""
     excuse_distance: float = 1.0
     """A car this close behind one excused by the queue is excused as well."""
     blocked_ahead: float = 1.5
@@ -64,17 +73,21 @@ class RuleParameters:
     enter_time: float = 10.0
     """E3: who is first at a clear crossing enters within this time."""
     tickets: int = 1
-    """E3: most new tickets in one wait."""
+    """E3: most new tickets in one wait, from the first stop in a lane state to the disc or the lane state's end."""
     exit_gap: float = 0.8
-    """E4: an exit is free if nobody is within this distance in the lane."""
+    """E4: an exit is free if no centre is in its lane within this distance of the disc."""
     exit_time: float = 5.0
     """E4: a disc with a free exit is left within this time."""
+    shared_time: float = 60.0
+    """E4: so long the time does not count in which the ego is in the disc since the same tick as the car."""
     way_distance: float = 1.5
-    """E5: the way is free if nothing that stands is within this distance."""
+    """E5: the way is free if nothing that stands, lingers or queues is within this distance, and no full bend."""
     rest_time: float = 60.0
-    """E5: with a free way nobody stands longer than this."""
+    """E5: with a free way nobody lingers longer than this."""
     goal_time: float = 60.0
     """E6: every goal is free again within this time."""
+    goal_gap: float = 0.8
+    """E6: the time does not count in which the ego is this near to an exit of the goal and no exit is free."""
     exceptions: int = 0
     """Most breaches of E1 per car within exception_time."""
     exception_time: float = 60.0
@@ -92,6 +105,13 @@ class RuleParameters:
     assume_e6: int = 1
 
     def __post_init__(self) -> None:
+        if type(self.edition) is not int or self.edition != EDITION:
+            raise InputError(
+                "another edition of the rules of the road",
+                field="edition",
+                value=self.edition,
+                expected=f"{EDITION}, the one that is judged here, or left out",
+            )
         for field in fields(self):
             _check(field.name, getattr(self, field.name), whole=isinstance(field.default, int))
             if field.name.startswith("assume_") and getattr(self, field.name) > 1:

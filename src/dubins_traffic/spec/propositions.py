@@ -12,7 +12,7 @@ ON_ROAD: Final = 1
 STILL: Final = 2
 """still(stand_time): the centre lies near where it was that long ago."""
 STANDS: Final = 4
-"""Still, and not excused by a queue."""
+"""Still or lingers, and not excused by a queue."""
 LEFT: Final = 8
 """The body reaches over the centre line (with hysteresis)."""
 OVERTAKING: Final = 16
@@ -34,13 +34,16 @@ BREACH3: Final = 2048
 FIRST: Final = 4096
 """Stopped, and nobody is before this car in the order of the crossing."""
 FORFEITED: Final = 8192
-"""Stopped, and has got a new ticket in this wait."""
+"""Stopped, and has got a new ticket in this wait: by a forfeit, or by stopping again."""
 EXCUSED: Final = 16384
 """Waits at a crossing without a forfeit, or close behind a car of its lane that is excused."""
 TURNED: Final = 32768
 """The lane state flipped in this frame: the car has turned round outside the discs."""
 ENTERED: Final = 65536
 """The body meets a disc that it did not meet in the frame before (never in frame 0)."""
+
+LINGERS: Final = 131072
+"""The largest progress since the lane state was set has grown by less than `linger_distance` in `linger_time`."""
 
 NAMES: Final = {
     "on_road": ON_ROAD,
@@ -60,6 +63,7 @@ NAMES: Final = {
     "excused": EXCUSED,
     "turned": TURNED,
     "entered": ENTERED,
+    "lingers": LINGERS,
 }
 """The flags by name, lowest first."""
 

@@ -32,7 +32,9 @@ EXCUSE: Final = 14
 BLOCKED_AHEAD: Final = 15
 OVERTAKING_BEHIND: Final = 16
 OVERTAKING_AHEAD: Final = 17
-REALS: Final = 18
+STOP2: Final = 18
+LINGER_GROWTH: Final = 19
+REALS: Final = 20
 
 NET: Final = 0
 STOP_TICKS: Final = 1
@@ -41,7 +43,8 @@ GROUP_TICKS: Final = 3
 FORFEIT_TICKS: Final = 4
 CROSSING_DEGREE: Final = 5
 JUDGED3: Final = 6
-WHOLES: Final = 7
+LINGER_TICKS: Final = 7
+WHOLES: Final = 8
 
 TOP: Final = 0
 PROGRESS: Final = 1
@@ -56,7 +59,8 @@ FORFEITS: Final = 2
 FIRST_SINCE: Final = 3
 RANK: Final = 4
 ZONE: Final = 5
-MARKS: Final = 6
+WAIT_SINCE: Final = 6
+MARKS: Final = 7
 
 NEXT_IN_LANE: Final = 0
 NEXT_ON_SEGMENT: Final = 1
@@ -85,17 +89,20 @@ CALM_LOW_X, CALM_HIGH_X, CALM_LOW_Y, CALM_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, 
 FROM_X, FROM_Y, AXIS_X, AXIS_Y, BASE, SIGN, TOP_SO_FAR, FORK_X, FORK_Y, FORK_SURE = range(8, 18)
 ASIDE_LOW, ASIDE_HIGH, ALONG_LOW, ALONG_HIGH = range(18, 22)
 HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(22, 30)
-CALM: Final = 30
+TOP_THEN, LINGERS_FROM, WAS_LINGERING = range(30, 33)
+CALM: Final = 33
 
 GRAIN = 1e-9
-"""Added to the distances of `still`, metres: cars often go exactly that far, and rounding must not decide."""
+"""Metres by which limits that a judgement compares are eased for the car that would be in breach (RULES, *Ground*)."""
+NEVER_AGAIN = 1e300
+"""A tick, or a distance, that is never reached."""
 
 
 class RuleTable(NamedTuple):
     """The rules of each trial: `real` (B, REALS) float64 and `whole` (B, WHOLES) int64, columns as named above.
 
-    `CROSS2`, `APPROACH2` and `QUEUE2` are squared distances of the body, without its rounding, from a vertex:
-    nearer it meets the disc, and up to there it approaches or keeps its place.
+    `CROSS2`, `APPROACH2`, `STOP2` and `QUEUE2` are squared distances of the body, without its rounding, from a vertex:
+    nearer it meets the disc, and up to there it approaches, may stop, or keeps its place.
     """
 
     real: Floats
@@ -116,7 +123,8 @@ class Memory(NamedTuple):
         First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
         in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
         (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none;
-        whether it is where cars approach and queue (`ZONE`, else 0).
+        whether it is where cars approach and queue (`ZONE`, else 0); tick of the first stop in this wait
+        (`WAIT_SINCE`, -1: none).
     patch : (B, N, PATCH) float64
         A rectangle about the place where the centre was last looked up, in which nearest segment (-1: one of those
         that meet in the nearest vertex) and vertex (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty
@@ -129,9 +137,12 @@ class Memory(NamedTuple):
         which metres to the left of that axis, and along it, it is on the road and not left as it is now. Where the
         nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y. Of this
         frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
-        whether it holds on to its labels, and whether it was still.
+        whether it holds on to its labels, and whether it was still. The greatest progress `linger_time` ago
+        (`TOP_THEN`), the tick from which on that says whether the car lingers (`LINGERS_FROM`), and whether it does.
     trail : (B, M, 2, N) float64
         Positions at the last M ticks, tick k in row k mod M.
+    growth : (B, L, N) float64
+        `TOP` at the last ticks, as many as `linger_time` has in the trial: tick k in row k mod that number.
     link : (B, N, LINKS) int64
         The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
         are to be looked at in this frame, in order (`DUE`). All but the lists of the lanes is scratch.
@@ -145,12 +156,16 @@ class Memory(NamedTuple):
     patch: Floats
     calm: Floats
     trail: Floats
+    growth: Floats
     link: Ints
     head: Ints
 
     @staticmethod
-    def empty(trials: int, cars: int, depth: int, heads: int) -> Memory:
-        """Return the memory of `trials` x `cars` cars before their first frame."""
+    def empty(trials: int, cars: int, depth: int, heads: int, linger: int) -> Memory:
+        """Return the memory of `trials` x `cars` cars before their first frame.
+
+        `depth` and `linger` are the rows of `trail` and `growth`, `heads` those of `head`.
+        """
         mark = np.full((trials, cars, MARKS), -1, dtype=np.int64)
         mark[:, :, FORFEITS] = 0
         head = np.full((trials, heads, HEADS), -1, dtype=np.int64)
@@ -161,6 +176,7 @@ class Memory(NamedTuple):
             np.zeros((trials, cars, PATCH)),
             np.zeros((trials, -(-cars // BLOCK) * BLOCK * CALM)),
             np.zeros((trials, depth, 2, cars)),
+            np.zeros((trials, linger, cars)),
             np.full((trials, cars, LINKS), -1, dtype=np.int64),
             head,
         )
@@ -193,9 +209,10 @@ def pack_rules(
         width = 2.0 * (float(cars.half_width[b]) + rounding)
         cross = radius + rounding
         approach = cross + own.approach_distance
-        queue = cross + own.queue_distance
+        queue = cross + own.queue_distance + GRAIN
         stop = own.still_speed * own.stop_time + GRAIN
-        stand = own.still_speed * own.stand_time + GRAIN
+        stand = own.still_speed * own.stand_time
+        linger = ticks(own.linger_time, rate)
         real[b, RADIUS] = radius
         real[b, HALF_LENGTH] = cars.half_length[b]
         real[b, HALF_WIDTH] = cars.half_width[b]
@@ -207,6 +224,7 @@ def pack_rules(
         real[b, LEFT_RELEASE] = own.left_release
         real[b, CROSS2] = cross * cross
         real[b, APPROACH2] = approach * approach
+        real[b, STOP2] = (approach + GRAIN) * (approach + GRAIN)
         real[b, QUEUE2] = queue * queue
         real[b, STOP_MOVE2] = stop * stop
         real[b, STAND_MOVE2] = stand * stand
@@ -214,9 +232,11 @@ def pack_rules(
         real[b, BLOCKED_AHEAD] = own.blocked_ahead
         real[b, OVERTAKING_BEHIND] = own.overtaking_behind
         real[b, OVERTAKING_AHEAD] = own.overtaking_ahead
+        real[b, LINGER_GROWTH] = own.linger_distance if linger > 0 else NEVER_AGAIN * own.linger_distance
         whole[b, STOP_TICKS] = ticks(own.stop_time, rate)
         whole[b, STAND_TICKS] = ticks(own.stand_time, rate)
         whole[b, GROUP_TICKS] = ticks(own.group_time, rate)
         whole[b, FORFEIT_TICKS] = ticks(own.forfeit_time, rate)
         whole[b, CROSSING_DEGREE] = own.crossing_degree
+        whole[b, LINGER_TICKS] = linger
     return RuleTable(real, whole)

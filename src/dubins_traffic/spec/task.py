@@ -4,6 +4,8 @@ i stands for the name of a car, x and y for a lattice point. All mean what RULES
 
 ====================================  =============================================================================
 ``i_t_x_y``                           at: the centre is in the disc, as the labels of 2016 say it
+``visit_i_x_y``                       a visit begins: the centre comes into the disc, for the first time or from
+                                      another one
 ``free_x_y``                          no e-agent is at the goal
 ``collision_i``                       i has touched a car or an obstacle since the frame before
 ``on_road_i`` ``left_i``              as in RULES
@@ -13,8 +15,9 @@ i stands for the name of a car, x and y for a lattice point. All mean what RULES
 ``ahead_i_x_y``                       i has stopped there, and somebody is before it in the order
 ``first_i_x_y``                       i has stopped there, and nobody is before it in the order
 ``renewed_i``                         i gets one more new ticket in one wait than E3 allows
-``exit_i``                            the body meets a disc out of which some exit is free (E4)
-``stands_i`` ``way_i``                i stands; i is in a lane with a free way ahead (E5)
+``exit_i``                            the body meets a disc out of which some exit is free, and the time counts (E4)
+``stays_i``                           it has done so for longer than it may, times that do not count left out (E4)
+``lingers_i`` ``way_i``               i lingers; i is in a lane with a free way ahead (E5)
 ``excess_i``                          i has broken E1 more often than the exceptions allow (only if there are any)
 ====================================  =============================================================================
 
@@ -89,9 +92,10 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
         If a car has a name that propositions can't carry.
     """
     ego, *others = names
-    visits = [always(eventually(prop(_on(f"{ego}_t", goal)))) for goal in dict.fromkeys(problem.goals)]
+    goals = tuple(dict.fromkeys(problem.goals))
     if not problem.rules:
-        return _specification((), visits, ego)
+        return _specification((), [always(eventually(prop(_on(f"{ego}_t", goal)))) for goal in goals], ego)
+    visits = [always(eventually(prop(_on(f"visit_{ego}", goal)))) for goal in goals]
     rules = RuleParameters.from_mapping(problem.rules)
     crossings = [
         point
@@ -107,7 +111,7 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
     ]
     assumptions = [formula for name in others for formula in _assumed(name, crossings, rules)]
     if rules.assume_e6:
-        assumptions += [always(eventually(prop(_on("free", goal)))) for goal in dict.fromkeys(problem.goals)]
+        assumptions += [always(eventually(prop(_on("free", goal)))) for goal in goals]
     return _specification(assumptions, guarantees, ego)
 
 
@@ -144,8 +148,9 @@ def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> li
         found.append(always(negation(prop(f"renewed_{name}"))))
     if rules.assume_e4:
         found.append(_no_longer(prop(f"exit_{name}"), rules.exit_time))
+        found.append(always(negation(prop(f"stays_{name}"))))
     if rules.assume_e5:
-        found.append(_no_longer(conj(prop(f"stands_{name}"), prop(f"way_{name}")), rules.rest_time))
+        found.append(_no_longer(conj(prop(f"lingers_{name}"), prop(f"way_{name}")), rules.rest_time))
     return found
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.spec.exceptions import Exceptions
 from dubins_traffic.spec.judge import Arraigned, Breach, Referee
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.propositions import BLOCKED, ENTERED, EXCUSED, NAMES, STANDS, STOPPED
+from dubins_traffic.spec.propositions import ENTERED, NAMES
 from dubins_traffic.spec.vocabulary import (
     AT,
     FREE,
@@ -22,6 +22,7 @@ from dubins_traffic.spec.vocabulary import (
     OF_INTERSECTION,
     OF_JUDGED,
     SEGMENT,
+    VISIT,
     Proposition,
     Vocabulary,
 )
@@ -42,17 +43,18 @@ class Named(Arraigned, Protocol):
 
 
 class _Scene(NamedTuple):
-    """What is known of a block of frames, (F, N) each; `bits` as in `Labels`, `progress` in metres."""
+    """What is known of a block of frames, (F, N) each; `bits` as in `Labels`."""
 
     at: Ints
     crosses: Ints
     segment: Ints
     lane: Ints
     bits: Ints
-    progress: Floats
     touches: Mask
     guilty: Mask
     may_leave: Mask
+    stays: Mask
+    ways: Mask
     renewed: Mask
     excess: Mask
 
@@ -70,10 +72,11 @@ class _Scene(NamedTuple):
             segment=numbers(),
             lane=numbers(),
             bits=numbers(),
-            progress=np.zeros((frames, cars)),
             touches=masks(),
             guilty=masks(),
             may_leave=masks(),
+            stays=masks(),
+            ways=masks(),
             renewed=masks(),
             excess=masks(),
         )
@@ -105,6 +108,8 @@ class Valuation:
         self._labeller = Labeller([instance])
         judged = any(proposition.word in OF_JUDGED for proposition in self._wanted)
         self._referee = Referee([instance], self._labeller) if judged else None
+        self._asks_for_ways = any(proposition.word == "way" for proposition in self._wanted)
+        self._visits = {own: _Visits(own.place) for own in self._wanted if own.word == VISIT}
         self._exceptions = Exceptions(self._rules, problem.rate)
         network = problem.network
         self._ends = np.array([network.lane_ends(lane)[1] for lane in range(network.lanes)] + [-1])
@@ -151,7 +156,6 @@ class Valuation:
         labels: Labels = self._labeller.labels
         for name in ("at", "crosses", "segment", "lane", "bits"):
             getattr(scene, name)[row] = getattr(labels, name)[0]
-        scene.progress[row] = self._labeller.progress[0]
         for contact in contacts:
             for car, guilty in zip((contact.car, contact.other), contact.at_fault, strict=True):
                 if car >= 0:
@@ -164,6 +168,9 @@ class Valuation:
         else:
             breaches = self._referee.update(tick, self._state, [contacts])[0]
         scene.may_leave[row] = self._referee.may_leave[0]
+        scene.stays[row] = self._referee.stays[0]
+        if self._asks_for_ways:
+            scene.ways[row] = self._referee.ways(self._state)[0]
         over = self._labeller.forfeits[0] == self._rules.tickets + 1
         scene.renewed[row] = over & (self._labeller.tickets[0] == tick)
         for breach in breaches:
@@ -180,15 +187,15 @@ class Valuation:
             flag = scene.bits[:, car] & NAMES[word] != 0
             return flag if place < 0 else flag & (self._ends[scene.lane[:, car]] == place)
         masks = {"collision": scene.touches, "at_fault": scene.guilty, "exit": scene.may_leave}
-        masks |= {"renewed": scene.renewed, "excess": scene.excess}
+        masks |= {"stays": scene.stays, "way": scene.ways, "renewed": scene.renewed, "excess": scene.excess}
         if word in masks:
             return masks[word][:, car]
-        if word == "way":
-            return self._way(scene, car)
         return {AT: scene.at, SEGMENT: scene.segment, LANE: scene.lane}[word][:, car] == place
 
     def _of_intersection(self, scene: _Scene, wanted: Proposition) -> Mask:
         word, car, place = wanted
+        if word == VISIT:
+            return self._visits[wanted].values(scene.at[:, car])
         if place < 0:
             return scene.bits[:, car] & NAMES[word] != 0
         crosses = scene.crosses == place
@@ -198,14 +205,30 @@ class Valuation:
             return crosses[:, car] & (scene.bits[:, car] & ENTERED != 0)
         return crosses[:, car]
 
-    def _way(self, scene: _Scene, car: int) -> Mask:
-        """Return in which frames a car is in a lane with a free way ahead (E5)."""
-        lane = scene.lane[:, [car]]
-        ahead = scene.progress - scene.progress[:, [car]]
-        waits = scene.bits & (STANDS | EXCUSED | STOPPED) != 0
-        taken = waits & (scene.lane == lane) & (ahead > 0.0) & (ahead <= self._rules.way_distance)
-        own = scene.bits[:, car] & (BLOCKED | STOPPED) == 0
-        return (lane[:, 0] >= 0) & own & ~taken.any(axis=1)
+
+class _Visits:
+    """Finds the frames in which a car's visits of an intersection begin, block by block (RULES, rule 1).
+
+    Parameters
+    ----------
+    place : int
+        Number of the intersection.
+    """
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+        self._inside = False
+        self._fresh = True
+
+    def values(self, at: Ints) -> Mask:
+        """Return in which frames of the next block one begins; `at` (F,) are the discs that hold the centre."""
+        found = np.zeros(len(at), dtype=np.bool_)
+        for row, v in enumerate(at.tolist()):
+            inside = v == self._place
+            found[row] = inside and not self._inside and self._fresh
+            self._fresh = (self._fresh and not inside) or (v >= 0 and not inside)
+            self._inside = inside
+        return found
 
 
 def _of_e1(breach: Breach) -> bool:

@@ -12,10 +12,11 @@ i stands for the name of a car, x and y for a lattice point. Beside those of the
 ``lane_i_x0_y0_x1_y1``        the lane state: on that segment, in that direction
 ``i_s_x0_y0_x1_y1``           the nearest segment, as the labels of 2016 say it
 ``free_x_y``                  no e-agent is at the intersection, goal or not
+``visit_i_x_y``               a visit begins: the centre comes into the disc, for the first time or from another one
 ============================  ======================================================================================
 
-``exit``, ``way``, ``renewed`` and ``excess`` are there if the problem asks for the rules; all but ``way`` only of
-e-agents.
+``exit``, ``stays``, ``way``, ``renewed`` and ``excess`` are there if the problem asks for the rules; all but ``way``
+only of e-agents.
 """
 
 from __future__ import annotations
@@ -32,14 +33,15 @@ from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.propositions import NAMES
 
 OF_CAR: Final = (*NAMES, "collision", "at_fault")
-OF_JUDGED: Final = ("way", "exit", "renewed", "excess")
+OF_JUDGED: Final = ("way", "exit", "stays", "renewed", "excess")
 """There are these only where the rules are judged."""
-OF_INTERSECTION: Final = ("cross", "enter", "clear")
+OF_INTERSECTION: Final = ("cross", "enter", "clear", "visit")
 OF_CROSSING: Final = ("approach", "stopped", "ahead", "first", "forfeited")
 AT: Final = "at"
 SEGMENT: Final = "segment"
 LANE: Final = "lane"
 FREE: Final = "free"
+VISIT: Final = "visit"
 
 _MOST_CARS: Final = 20
 """How many cars are looked through for a name like an unknown one."""
