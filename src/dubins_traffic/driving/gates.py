@@ -36,7 +36,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE, way_to_go
+from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP, SIDE, way_to_go
 from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
@@ -51,6 +51,8 @@ CHOOSY = 1.0
 """Seconds for which a car whose turn it is waits for room in the lane it wants."""
 BUDGET = 4.0
 """Metres of detour that a car on its round accepts for each second it has waited for room."""
+SOON = 0.5
+"""Who is this near to a bend comes into it before one who turns round there, metres."""
 DUTY = 0.8
 """An e-agent that has lost its place once enters after this share of the time in which it would lose it again, though
 there is room nowhere: else it breaks E3."""
@@ -91,8 +93,11 @@ def mind_gate(
         for k in range(near):
             j = desk.near[k]
             if labels.crosses[b, j] == v:
-                inside += shares_way(b, j, way, roads.degree[row], state, build)
-                held = held or (j == EGO and n != EGO)
+                inside += 1 if turns_round(ints) else shares_way(b, j, way, roads.degree[row], state, build)
+                held = held or (j == EGO and n != EGO) or (j != EGO and turns_round(drivers.ints[b, j]))
+            elif turns_round(ints):
+                held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
+        held = held or (turns_round(ints) and inside > 0)
         free = (
             not held
             and (roads.degree[row] == 2 or inside == 0)
@@ -135,6 +140,27 @@ def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) 
         return 1
     _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
     return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+
+
+@jit_inline
+def turns_round(ints: Any) -> bool:
+    """Tell whether a car that the law drives is about to turn round at the end of its lane, or does it."""
+    return ints[NEXT] >= 0 and ints[NEXT] == ints[LANE] ^ 1
+
+
+@jit_inline
+def comes_first(
+    b: int, n: int, j: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers
+) -> bool:
+    """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
+    lane, net = labels.lane[b, j], drivers.net[b]
+    if lane < 0 or lane == drivers.ints[b, n, LANE] or lane_end(roads, net, int(lane)) != v:
+        return False
+    row = roads.vert_off[net] + v
+    dx = state.x[b, j] - roads.vert[row, 0]
+    dy = state.y[b, j] - roads.vert[row, 1]
+    near = drivers.build[b, DISC] + drivers.build[b, REACH] + SOON
+    return dx * dx + dy * dy < near * near and (j < n or not turns_round(drivers.ints[b, j]))
 
 
 @jit
@@ -317,7 +343,7 @@ def before_obstacles(
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         along, aside = lane_coordinates(roads, drivers.net[b], lane, row[0], row[1])
-        wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
+        wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW + row[7]
         if abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]:
             free = min(free, along - row[7] - build[REACH] - QUEUE_GAP)
     return free

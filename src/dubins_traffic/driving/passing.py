@@ -35,7 +35,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import SIDE
+from dubins_traffic.driving.seeing import NARROW
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -125,10 +125,16 @@ def find_way_past(
     floats = drivers.floats[b, n]
     reach = build[REACH]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, offset, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
     line = stop_line(build)
     until = end + SLIP + 2.0 * build[HALF_LENGTH]
+    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
+    if end >= own and low >= EDGE - build[MIDDLE]:
+        floats[ASIDE] = min(low, -LINE)
+        floats[UNTIL] = until
+        drivers.ints[b, n, WAITED] = 0
+        return
     back = until + BACK
     if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
@@ -201,10 +207,14 @@ def ego_is_beside(
 def extent(
     b: int, n: int, way: Way, own: float, state: State, labels: Labels, obstacles: ObstacleTable, build: Any,
     lane: int, desk: Desk,
-) -> tuple[float, float]:  # fmt: skip
-    """Return (end, left): where what stands ahead in the lane ends, and how far left of its middle it reaches."""
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
+
+    Both are metres left of the middle of the lane; on the right nobody passes a car.
+    """
     end = own - 1.0
     offset = -1.0
+    low = INFINITE
     reach = build[REACH]
     before = end - 1.0
     while end > before:
@@ -217,6 +227,7 @@ def extent(
             if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < build[MIDDLE]:
                 end = max(end, key)
                 offset = max(offset, left + half_width(b, j, way, state, build))
+                low = -INFINITE
             j = desk.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
             row = obstacles.part[p]
@@ -225,7 +236,8 @@ def extent(
             if own < key <= horizon + row[7] and abs(left) - row[7] < build[MIDDLE]:
                 end = max(end, key + row[7] - reach)
                 offset = max(offset, left + row[7])
-    return end, offset
+                low = min(low, left - row[7])
+    return end, offset, low
 
 
 @jit
@@ -240,9 +252,12 @@ def is_barred(
     wide = build[HALF_WIDTH] + build[ROUNDING]
     done = 0.0
     for _ in range(last - first):
-        begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, build)
+        begin, end, offset, low = next_narrow(roads, net, lane, done, obstacles, first, last, build)
         if begin >= length:
             return False
+        done = end + 1e-6
+        if low - wide - BESIDE >= EDGE - build[MIDDLE]:
+            continue
         own = begin - build[REACH] - SLIP
         back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
         offset += BERTH + wide
@@ -257,7 +272,6 @@ def is_barred(
             beside = abs(left + build[MIDDLE] - offset) < wide + BESIDE + obstacles.part[p, 7]
             if own - far < along < back + far and left + build[MIDDLE] > 0.0 and beside:
                 return True
-        done = end + 1e-6
     return False
 
 
@@ -271,14 +285,14 @@ def next_narrow(
     first: int,
     last: int,
     build: Any,
-) -> tuple[float, float, float]:
-    """Return (begin, end, left) of the next obstacles in the way in a lane, none of which begins before `done`.
+) -> tuple[float, float, float, float]:
+    """Return (begin, end, left, right) of the next obstacles in the way in a lane, none of which begins before `done`.
 
-    Obstacles that are too near to one another for a car to return in between are passed as one; `left` is how far left
-    of the middle of the lane they reach. Without any, they begin at infinity.
+    Obstacles that are too near to one another for a car to return in between are passed as one; they reach
+    from `right` to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
     """
     begin = INFINITE
-    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
+    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
     for p in range(first, last):
         along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
         size = obstacles.part[p, 7]
@@ -286,6 +300,7 @@ def next_narrow(
             begin = min(begin, along - size)
     end = begin
     offset = -1.0
+    low = INFINITE
     found = begin != INFINITE
     while found:
         found = False
@@ -298,7 +313,8 @@ def next_narrow(
                 found = True
             if in_way:
                 offset = max(offset, left + build[MIDDLE] + size)
-    return begin, end, offset
+                low = min(low, left + build[MIDDLE] - size)
+    return begin, end, offset, low
 
 
 @jit
