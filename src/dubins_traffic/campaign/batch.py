@@ -13,7 +13,6 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.campaign.asked import Maker, ask, grouped
 from dubins_traffic.campaign.group import Group, Outcome
 from dubins_traffic.campaign.single import run_trial
@@ -23,7 +22,7 @@ from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
-from dubins_traffic.problem.kinds import COUNTER, REMOTE
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.scoring.verdict import Ruling

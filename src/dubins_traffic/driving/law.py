@@ -27,6 +27,7 @@ from dubins_traffic.driving.law_tables import (
     ASIDE,
     CROSSING,
     CROWDED,
+    DEPARTS,
     DISC,
     HOLD,
     KIND,
@@ -64,7 +65,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import BLOCKED, LEFT
+from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, STOPPED
 
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
@@ -139,11 +140,23 @@ def decide_trial(
             count_visit(b, n, labels, drivers)
         if kind == ABSENT:
             continue
-        if company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, desk):
+        if parks(b, n, tick, labels, drivers):
+            commands[b, n, 0] = 0.0
+            commands[b, n, 1] = 0.0
+        elif company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, desk):
             drive(b, n, tick, company, sight2, state, labels, roads, obstacles, drivers, desk, commands)
     catch_up(b, state, drivers, desk, commands)
     if desk.listed[0] != NOBODY:
         unlist_cars(b, state, labels, desk)
+
+
+@jit_inline
+def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
+    """Tell whether a car still stands where it has started: it may, unless it would keep others from a crossing."""
+    if tick * drivers.build[b, PERIOD] >= drivers.floats[b, n, DEPARTS]:
+        return False
+    bits = np.int64(labels.bits[b, n])
+    return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
 
 
 @jit_inline

@@ -31,14 +31,17 @@ something has been in its way; MOOD: which rules it breaks on this lane; WATCHED
 not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter.
 """
 
-SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y = range(12)
-FLOATS = 12
+SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y, DEPARTS = (
+    range(13)
+)
+FLOATS = 13
 """Columns of `Drivers.floats`.
 
 SPEED: how fast the car drives, m/s. ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS: on which share of its lanes it breaks a
 rule. PARK_TIME: for how long it parks at most, s. It remembers ASIDE: how far left of its way it passes what stands,
 metres, 0 if it passes nothing; UNTIL: metres before the end of the lane (negative) at which it returns; HOLD: for how
 long it will still stand in the disc ahead, s; WATCH_X, WATCH_Y: where that stands which it may pass.
+DEPARTS: seconds from the beginning for which it parks.
 """
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
