@@ -35,7 +35,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import NARROW
+from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -256,6 +256,8 @@ def is_barred(
         if begin >= length:
             return False
         done = end + 1e-6
+        if begin - build[REACH] - QUEUE_GAP < build[DISC] + build[REACH] + EDGE:
+            return True
         if low - wide - BESIDE >= EDGE - build[MIDDLE]:
             continue
         own = begin - build[REACH] - SLIP
