@@ -19,7 +19,6 @@ from dubins_traffic.agents.tables import (
     GAP,
     GOAL_X,
     INTS,
-    KEEP_RULES,
     KIND,
     KINDS,
     LANE,
@@ -45,7 +44,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import COUNTER, REMOTE, parameters_of
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
 from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 

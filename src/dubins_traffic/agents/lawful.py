@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
     BLOCKS,
+    DEPARTS,
     FIRST,
     GOES,
     KIND,
@@ -37,7 +37,7 @@ from dubins_traffic.driving.law_tables import (
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import parameters_of
+from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
@@ -170,6 +170,7 @@ def _describe(kind: str, given: Mapping[str, Any], fastest: float, ints: Ints, f
     ints[KIND] = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
     if kind == "lawful":
         shares = ("rolls", "left", "blocks", "tailgates", "parks", "parks_for")
+        floats[DEPARTS] = given["departs_after"]
         floats[[ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME]] = [given[name] for name in shares]
 
 

@@ -15,8 +15,6 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 
 WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
 KINDS = {"wander": WANDER, "loop": LOOP, "follow": FOLLOW, "parked": PARKED, "scripted": SCRIPTED}
-KEEP_RULES = frozenset({"lawful", "nemesis"})
-"""Kinds of e-agents that `agents.lawful` drives."""
 NOBODY = -1
 
 KIND, BEGIN, FIRST, LAST, REPEAT, PATIENCE, TRAIL, LANE, LEG, PLACE, SINCE = range(11)

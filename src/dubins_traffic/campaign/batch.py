@@ -13,7 +13,6 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.campaign.asked import Maker, ask, grouped
 from dubins_traffic.campaign.group import Group, Outcome
 from dubins_traffic.campaign.record_folder import check_folder, claim
@@ -26,7 +25,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.problem.kinds import COUNTER, REMOTE
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.scoring.verdict import Ruling

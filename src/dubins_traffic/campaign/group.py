@@ -10,7 +10,6 @@ import numpy as np
 
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
 from dubins_traffic.agents.lawful import pack_drivers
-from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.agents.tables import workspace as agent_workspace
 from dubins_traffic.campaign.batch_kernel import (
     COLLIDED,
@@ -37,7 +36,7 @@ from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
 from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
 from dubins_traffic.driving.rounds import stages
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.scoring.margins_kernel import margin_table

@@ -5,18 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.lane_graph import FAR, aim_for, place_of, spread
 from dubins_traffic.driving.law_tables import (
     BLOCKS,
+    DISC,
     FIRST,
     GOAL,
+    HALF_WIDTH,
     HOLD,
+    KEPT_OUT,
     KIND,
     LANE,
     LAST,
     LEFT_SIDE,
     LEFTS,
     LOOP,
+    MIDDLE,
     MOOD,
     NEMESIS,
     NEXT,
@@ -28,12 +33,16 @@ from dubins_traffic.driving.law_tables import (
     ROLLING,
     ROLLS,
     ROUND,
+    ROUNDING,
     TAILGATES,
     TAILGATING,
     TURN,
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.passing import is_barred
+from dubins_traffic.driving.seeing import NARROW
+from dubins_traffic.driving.turn_arcs import on_way, way_between
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.roads.lookup import lane_end
@@ -45,6 +54,8 @@ BACK = 30.0
 """What turning round at a crossing counts, metres (for a nemesis STEP); in a bend, where others may come, it is a
 last resort."""
 UNREACHABLE = 1e6
+BARRED = 1e7
+"""What a lane counts in which an obstacle can't be passed, metres."""
 STEP = 3.0
 """What a lane counts in choosing between exits, metres."""
 BLOCK_TIME = 9.0
@@ -54,7 +65,7 @@ BLOCK_TIME = 9.0
 @jit
 def take_lane(
     b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
     """Note that car n is on `lane` now, choose the lane after it and the car's mood."""
     ints = drivers.ints[b, n]
@@ -64,6 +75,7 @@ def take_lane(
     before = ints[LANE]
     ints[LANE] = lane
     ints[TURN] = 0
+    ints[KEPT_OUT] = 0
     if ints[KIND] == LOOP:
         following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
         if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
@@ -87,7 +99,7 @@ def take_lane(
     ):
         floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
     ints[MOOD] = mood
-    price_exits(b, n, tick, state, labels, roads, drivers, desk)
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
     ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, desk)
 
 
@@ -114,8 +126,9 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, desk: Desk) ->
 
 @jit
 def price_exits(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
-) -> None:
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> None:  # fmt: skip
     """Fill `desk.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
@@ -143,7 +156,42 @@ def price_exits(
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
+        if obstacles.off[b] != obstacles.off[b + 1] and (
+            is_shut(b, lane, int(out), roads, obstacles, drivers)
+            or leads_nowhere(b, int(out), roads, obstacles, drivers)
+        ):
+            cost += BARRED
         desk.cost[k] = cost
+
+
+@jit
+def leads_nowhere(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+    """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
+    row = roads.vert_off[drivers.net[b]] + lane_end(roads, drivers.net[b], lane)
+    shut = 0
+    for k in range(roads.degree[row]):
+        shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), roads, obstacles, drivers) else 0
+    return shut == roads.degree[row]
+
+
+@jit
+def is_shut(
+    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> bool:
+    """Tell whether an obstacle is in the way from a lane to the lane `out`, or can't be passed in that."""
+    net, build = drivers.net[b], drivers.build[b]
+    if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
+        return True
+    way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
+    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        dx, dy = row[0] - way.x, row[1] - way.y
+        far = build[DISC] + row[7]
+        _, _, left, _, _ = on_way(way, row[0], row[1])
+        if dx * dx + dy * dy < far * far and abs(left) < wide + row[7]:
+            return True
+    return False
 
 
 @jit

@@ -17,7 +17,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.coasting import coast, cruise, drive_on, keeps_to_road, stop_coasting
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
-from dubins_traffic.driving.gates import TRAIL, mind_gate, turn_elsewhere
+from dubins_traffic.driving.gates import TRAIL, has_room, mind_gate, turn_elsewhere
 from dubins_traffic.driving.kept_ways import way_of
 from dubins_traffic.driving.lane_graph import lane_at
 from dubins_traffic.driving.late import catch_up, put_off
@@ -27,6 +27,7 @@ from dubins_traffic.driving.law_tables import (
     ASIDE,
     CROSSING,
     CROWDED,
+    DEPARTS,
     DISC,
     HOLD,
     KIND,
@@ -40,13 +41,14 @@ from dubins_traffic.driving.law_tables import (
     REACH,
     ROUND,
     TAILGATING,
+    TURN,
     UNSURE,
     UNTIL,
     WAITED,
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, watch
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
     QUEUE_GAP,
@@ -61,9 +63,9 @@ from dubins_traffic.driving.steering import move
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import BLOCKED, LEFT
+from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, STOPPED
 
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
@@ -138,11 +140,23 @@ def decide_trial(
             count_visit(b, n, labels, drivers)
         if kind == ABSENT:
             continue
-        if company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, desk):
+        if parks(b, n, tick, labels, drivers):
+            commands[b, n, 0] = 0.0
+            commands[b, n, 1] = 0.0
+        elif company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, desk):
             drive(b, n, tick, company, sight2, state, labels, roads, obstacles, drivers, desk, commands)
     catch_up(b, state, drivers, desk, commands)
     if desk.listed[0] != NOBODY:
         unlist_cars(b, state, labels, desk)
+
+
+@jit_inline
+def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
+    """Tell whether a car still stands where it has started: it may, unless it would keep others from a crossing."""
+    if tick * drivers.build[b, PERIOD] >= drivers.floats[b, n, DEPARTS]:
+        return False
+    bits = np.int64(labels.bits[b, n])
+    return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
 
 
 @jit_inline
@@ -194,7 +208,9 @@ def drive(
     stop_coasting(drivers.way[b, n])
     if ints[KIND] == NEMESIS:
         watch_ego(b, n, labels, drivers)
-    way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, drivers, desk)
+    way = keep_place(
+        b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, obstacles, drivers, desk
+    )
     part, key, left, px, py = on_way(way, x, y)
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
@@ -213,18 +229,18 @@ def drive(
     )
     rides = ints[MOOD] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
     speed = cruise(rides or floats[ASIDE] != 0.0, labels.crosses[b, n] >= 0, build, floats)
-    speed = mind_gate(b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, drivers, desk)
+    speed = mind_gate(
+        b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, obstacles, drivers, desk
+    )
     kept = 0.0
     if who != -1:
-        speed, kept = follow(
-            b, n, speed, gap, who, rides, part, way, near, state, labels, roads, drivers, desk
-        )
+        speed, kept = follow(b, n, speed, gap, who, rides, part, way, state, labels, roads, drivers, desk)
     speed = dawdle(b, n, speed, near, state, labels, roads, drivers, desk)
     speed, offset = pass_what_stands(
         b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
     )
-    if part != BEFORE and ints[WAITED] > 0 and ints[KIND] != ROUND and ints[WAITED] > ticks_of(STUCK, build):
-        turn_elsewhere(b, n, tick, state, labels, roads, drivers, desk)
+    if ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
+        find_way_out(b, n, tick, part, state, labels, roads, obstacles, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
     if put_off(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, desk):
         return
@@ -238,6 +254,24 @@ def drive(
     commands[b, n, 1] = yaw_rate
 
 
+@jit
+def find_way_out(
+    b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, desk: Desk,
+) -> None:  # fmt: skip
+    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
+    ints = drivers.ints[b, n]
+    build = drivers.build[b]
+    crossing = drivers.way[b, n, CROSSING] != 0.0
+    if not crossing and (part == BEFORE or ints[WAITED] <= ticks_of(STUCK, build)):
+        return
+    if crossing and tick % 4 != 0:
+        return
+    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
+        return
+    turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+
+
 @jit_inline
 def just_drives(ints: Any, floats: Any) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
@@ -246,16 +280,17 @@ def just_drives(ints: Any, floats: Any) -> bool:
 
 @jit_inline
 def follow(
-    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: Way, near: int,
+    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: Way,
     state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (speed, gap to keep) of a car that has `who` ahead."""
     build = drivers.build[b]
     ints = drivers.ints[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
-    behind = who >= 0 and labels.lane[b, who] == ints[LANE] and kept > QUEUE_GAP
-    if behind and is_pressed(b, n, near, state, labels, roads, drivers, desk):
-        kept = QUEUE_GAP
+    if kept > QUEUE_GAP and not rides and who != -1:
+        turn = part == BEFORE and ints[TURN] > 0
+        if turn or is_pressed(b, n, state, labels, roads, drivers, desk):
+            kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
     return min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead), kept
 
@@ -301,6 +336,8 @@ def pass_what_stands(
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
     bits = np.int64(labels.bits[b, n])
+    if outside and (bits & BLOCKED != 0 or floats[ASIDE] != 0.0):
+        watch(b, n, who, state, ints, floats, ints[LANE], desk)
     offset = 2.0 * build[MIDDLE] if ints[MOOD] & LEFT_SIDE != 0 and outside else 0.0
     stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
     ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
@@ -316,21 +353,35 @@ def pass_what_stands(
     return speed, offset
 
 
-@jit_inline
+@jit
 def is_pressed(
-    b: int, n: int, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
 ) -> bool:  # fmt: skip
-    """Tell whether a car close behind is still in the disc at the beginning of the lane, and needs room to leave it."""
-    v = lane_start(roads, drivers.net[b], drivers.ints[b, n, LANE])
-    far = 2.0 * drivers.build[b, REACH] + PRESSED
+    """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
+
+    It, or the cars between, are close behind one another already.
+    """
+    net, build, lane = drivers.net[b], drivers.build[b], drivers.ints[b, n, LANE]
+    v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:
         return False
-    for k in range(near):
-        j = desk.near[k]
-        dx = state.x[b, j] - state.x[b, n]
-        dy = state.y[b, j] - state.y[b, n]
-        if labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
-            return True
+    own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
+    far = 2.0 * build[REACH] + PRESSED
+    j = desk.head[lane >> 1]
+    while j >= 0:
+        along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
+        if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
+            far += 2.0 * build[REACH] + QUEUE_GAP
+        j = desk.link[j]
+    row = roads.vert_off[net] + v
+    for k in range(roads.degree[row]):
+        j = desk.head[roads.arms[row, k] >> 1]
+        while j >= 0:
+            dx = state.x[b, j] - state.x[b, n]
+            dy = state.y[b, j] - state.y[b, n]
+            if j != n and labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
+                return True
+            j = desk.link[j]
     return False
 
 
@@ -343,7 +394,7 @@ def waited_long(ints: Any, bits: Any, build: Any) -> bool:
 @jit_inline
 def keep_place(
     b: int, n: int, tick: int, x: float, y: float, c: float, s: float, state: State, labels: Labels,
-    roads: RoadTable, drivers: Drivers, desk: Desk,
+    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
 ) -> Way:  # fmt: skip
     """Keep LANE and NEXT in step with where the car is; return its way."""
     net = drivers.net[b]
@@ -352,14 +403,14 @@ def keep_place(
     seen = labels.lane[b, n]
     if ints[LANE] < 0:
         lane = seen if seen >= 0 else lane_at(roads, net, x, y, c, s)
-        take_lane(b, n, tick, lane, state, labels, roads, drivers, desk)
+        take_lane(b, n, tick, lane, state, labels, roads, obstacles, drivers, desk)
     elif seen >= 0 and seen != ints[LANE]:
-        take_lane(b, n, tick, seen, state, labels, roads, drivers, desk)
+        take_lane(b, n, tick, seen, state, labels, roads, obstacles, drivers, desk)
     way = way_of(b, n, roads, drivers)
     if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * build[DISC]:
         part, _, _, _, _ = on_way(way, x, y)
         if part == AFTER:
-            take_lane(b, n, tick, ints[NEXT], state, labels, roads, drivers, desk)
+            take_lane(b, n, tick, ints[NEXT], state, labels, roads, obstacles, drivers, desk)
             way = way_of(b, n, roads, drivers)
     return way
 

@@ -19,35 +19,42 @@ if TYPE_CHECKING:
 ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
 
-KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, MOOD = range(11)
-INTS = 11
+KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, MOOD, WATCHED, KEPT_OUT = range(13)
+INTS = 13
 """Columns of `Drivers.ints`.
 
 KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, LAST: its rows of `stage` are FIRST to
 LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the row of `stage` it is at, -1: none; GOAL:
 the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
 which it has been its turn to enter the crossing ahead; OWED: the same, over all of this wait; WAITED: ticks for which
-something has been in its way; MOOD: which rules it breaks on this lane.
+something has been in its way; MOOD: which rules it breaks on this lane; WATCHED: ticks for which what it may pass has
+not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter.
 """
 
-SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD = range(10)
-FLOATS = 10
+SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y, DEPARTS = (
+    range(13)
+)
+FLOATS = 13
 """Columns of `Drivers.floats`.
 
 SPEED: how fast the car drives, m/s. ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS: on which share of its lanes it breaks a
 rule. PARK_TIME: for how long it parks at most, s. It remembers ASIDE: how far left of its way it passes what stands,
 metres, 0 if it passes nothing; UNTIL: metres before the end of the lane (negative) at which it returns; HOLD: for how
-long it will still stand in the disc ahead, s.
+long it will still stand in the disc ahead, s; WATCH_X, WATCH_Y: where that stands which it may pass.
+DEPARTS: seconds from the beginning for which it parks.
 """
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
 DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
-BUILD = 19
+STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME = range(19, 23)
+BUILD = 23
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
 crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
 place; least speed in a disc, m/s; how far left of the centre line a body may reach, how far behind and ahead what
-stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, s.
+stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, and after
+how long a car that does not move stands, s; how far anybody may back up, and how far from the disc who stands in a lane
+leaves it free (E4), metres; for how long an e-agent may stand with a free way (E5), s.
 """
 
 IN, OUT, CROSSING, LENGTH = range(4)
@@ -188,5 +195,9 @@ def _build_of(problems: Sequence[Problem]) -> Floats:
         np.array([own.overtaking_ahead for own in rules]),
         np.array([own.blocked_gap for own in rules]) + 2.0 * (cars.half_width + cars.rounding),
         np.array([own.left_time for own in rules]),
+        np.array([own.stand_time for own in rules]),
+        np.array([own.turn_back for own in rules]),
+        np.array([own.exit_gap for own in rules]),
+        np.array([own.rest_time for own in rules]),
     )
     return np.stack([column.astype(np.float64) for column in columns], axis=1)

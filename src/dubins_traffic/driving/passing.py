@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.law_tables import (
     ASIDE,
+    BACKS_UP,
     BEHIND,
     DISC,
     FASTEST,
@@ -24,16 +25,21 @@ from dubins_traffic.driving.law_tables import (
     REACH,
     ROUNDING,
     SLOWEST,
+    STAND_TIME,
     TIGHTEST,
     UNTIL,
     WAITED,
+    WATCH_X,
+    WATCH_Y,
+    WATCHED,
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
-from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import narrows
 from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, OVERTAKING, STANDS, STOPPED
@@ -59,8 +65,12 @@ SLOW = 0.05
 """A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
 LINE, SURE = 0.002, 0.03
 """What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
+FOLLOWED = 1.5
+"""Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
 OVERTAKEN = 2.0
 """Who comes from behind on the left within this is let past first, metres."""
+NARROWS = 1.5
+"""What stands so near behind what is passed is passed with it, metres."""
 EDGE = 0.05
 """What the centre keeps from the edge of the road, metres."""
 
@@ -115,10 +125,16 @@ def find_way_past(
     floats = drivers.floats[b, n]
     reach = build[REACH]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, offset, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
     line = stop_line(build)
     until = end + SLIP + 2.0 * build[HALF_LENGTH]
+    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
+    if end >= own and low >= EDGE - build[MIDDLE]:
+        floats[ASIDE] = min(low, -LINE)
+        floats[UNTIL] = until
+        drivers.ints[b, n, WAITED] = 0
+        return
     back = until + BACK
     if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
@@ -129,6 +145,8 @@ def find_way_past(
     if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, build):
         return
     if stands_beside(b, own, back, offset, way, obstacles, build):
+        return
+    if n != EGO and ego_is_beside(b, own, back, way, state, labels, drivers.ints[b, n, LANE], build):
         return
     time = (back - own) / (0.8 * build[FASTEST]) + TURNING
     if time > build[LEFT_TIME]:
@@ -173,19 +191,35 @@ def find_way_past(
     drivers.ints[b, n, WAITED] = 0
 
 
+@jit_inline
+def ego_is_beside(
+    b: int, own: float, back: float, way: Way, state: State, labels: Labels, lane: int, build: Any
+) -> bool:
+    """Tell whether the ego is in the lane where a car would pass: it might keep beside, or stop where that returns."""
+    if labels.segment[b, EGO] != lane >> 1:
+        return False
+    key = along(way, state.x[b, EGO], state.y[b, EGO])
+    left = aside(way, state.x[b, EGO], state.y[b, EGO])
+    return left < build[MIDDLE] and own - FOLLOWED < key < back + build[BACKS_UP] + 2.0 * build[REACH] + BERTH
+
+
 @jit
 def extent(
     b: int, n: int, way: Way, own: float, state: State, labels: Labels, obstacles: ObstacleTable, build: Any,
     lane: int, desk: Desk,
-) -> tuple[float, float]:  # fmt: skip
-    """Return (end, left): where what stands ahead in the lane ends, and how far left of its middle it reaches."""
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
+
+    Both are metres left of the middle of the lane; on the right nobody passes a car.
+    """
     end = own - 1.0
     offset = -1.0
+    low = INFINITE
     reach = build[REACH]
     before = end - 1.0
     while end > before:
         before = end
-        horizon = max(own, end) + 1.5
+        horizon = max(own, end) + NARROWS
         j = desk.head[lane >> 1]
         while j >= 0:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
@@ -193,6 +227,7 @@ def extent(
             if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < build[MIDDLE]:
                 end = max(end, key)
                 offset = max(offset, left + half_width(b, j, way, state, build))
+                low = -INFINITE
             j = desk.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
             row = obstacles.part[p]
@@ -201,7 +236,87 @@ def extent(
             if own < key <= horizon + row[7] and abs(left) - row[7] < build[MIDDLE]:
                 end = max(end, key + row[7] - reach)
                 offset = max(offset, left + row[7])
-    return end, offset
+                low = min(low, left - row[7])
+    return end, offset, low
+
+
+@jit
+def is_barred(
+    roads: RoadTable, net: int, lane: int, obstacles: ObstacleTable, first: int, last: int, build: Any
+) -> bool:
+    """Tell whether one of the obstacle parts `first` to `last` - 1 is in the way in a lane and can't be passed there.
+
+    What `find_way_past` asks of cars that stand or come is left out: these go.
+    """
+    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
+    wide = build[HALF_WIDTH] + build[ROUNDING]
+    done = 0.0
+    for _ in range(last - first):
+        begin, end, offset, low = next_narrow(roads, net, lane, done, obstacles, first, last, build)
+        if begin >= length:
+            return False
+        done = end + 1e-6
+        if begin - build[REACH] - QUEUE_GAP < build[DISC] + build[REACH] + EDGE:
+            return True
+        if low - wide - BESIDE >= EDGE - build[MIDDLE]:
+            continue
+        own = begin - build[REACH] - SLIP
+        back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
+        offset += BERTH + wide
+        aside = offset > 3.0 * build[MIDDLE] - EDGE
+        if aside or back > length + stop_line(build) or own < build[DISC] + build[REACH] + EDGE:
+            return True
+        if (back - own) / (0.8 * build[FASTEST]) + TURNING > build[LEFT_TIME]:
+            return True
+        for p in range(first, last):
+            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
+            far = build[REACH] + obstacles.part[p, 7]
+            beside = abs(left + build[MIDDLE] - offset) < wide + BESIDE + obstacles.part[p, 7]
+            if own - far < along < back + far and left + build[MIDDLE] > 0.0 and beside:
+                return True
+    return False
+
+
+@jit
+def next_narrow(
+    roads: RoadTable,
+    net: int,
+    lane: int,
+    done: float,
+    obstacles: ObstacleTable,
+    first: int,
+    last: int,
+    build: Any,
+) -> tuple[float, float, float, float]:
+    """Return (begin, end, left, right) of the next obstacles in the way in a lane, none of which begins before `done`.
+
+    Obstacles that are too near to one another for a car to return in between are passed as one; they reach
+    from `right` to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
+    """
+    begin = INFINITE
+    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
+    for p in range(first, last):
+        along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
+        size = obstacles.part[p, 7]
+        if abs(left + build[MIDDLE]) < wide + size and along - size >= done:
+            begin = min(begin, along - size)
+    end = begin
+    offset = -1.0
+    low = INFINITE
+    found = begin != INFINITE
+    while found:
+        found = False
+        for p in range(first, last):
+            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
+            size = obstacles.part[p, 7]
+            in_way = abs(left + build[MIDDLE]) < wide + size and begin <= along - size <= end + NARROWS
+            if in_way and along + size > end:
+                end = along + size
+                found = True
+            if in_way:
+                offset = max(offset, left + build[MIDDLE] + size)
+                low = min(low, left + build[MIDDLE] - size)
+    return begin, end, offset, low
 
 
 @jit
@@ -305,6 +420,22 @@ def stays_right(
     return surely_stands(b, n, own, way, state, labels, drivers, desk)
 
 
+@jit_inline
+def watch(
+    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, desk: Desk
+) -> None:  # fmt: skip
+    """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
+    j = desk.head[lane >> 1]
+    while j >= 0:
+        if j != n and state.x[b, j] == floats[WATCH_X] and state.y[b, j] == floats[WATCH_Y]:
+            ints[WATCHED] += 1
+            return
+        j = desk.link[j]
+    ints[WATCHED] = 0
+    if who >= 0:
+        floats[WATCH_X], floats[WATCH_Y] = state.x[b, who], state.y[b, who]
+
+
 @jit
 def surely_stands(
     b: int, n: int, own: float, way: Way, state: State, labels: Labels, drivers: Drivers, desk: Desk
@@ -316,13 +447,17 @@ def surely_stands(
     """
     build = drivers.build[b]
     lane = drivers.ints[b, n, LANE]
+    if drivers.ints[b, n, WATCHED] * build[PERIOD] < build[STAND_TIME] + build[PERIOD]:
+        return False
+    watch_x, watch_y = drivers.floats[b, n, WATCH_X], drivers.floats[b, n, WATCH_Y]
     found = False
     j = desk.head[lane >> 1]
     while j >= 0:
         bits = labels.bits[b, j]
         if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
             return False
-        if j != n and bits & STANDS != 0 and state.speed[b, j] == 0.0:
+        watched = state.x[b, j] == watch_x and state.y[b, j] == watch_y
+        if j != n and bits & STANDS != 0 and watched:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - build[MIDDLE]
             half = half_width(b, j, way, state, build)

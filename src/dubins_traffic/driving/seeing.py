@@ -43,8 +43,8 @@ FACING_GAP = 0.8
 """Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
 CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
-SIDE = 0.04
-"""What is kept free beside the body along the way, metres."""
+SIDE, NARROW = 0.04, 0.02
+"""What is kept free beside the body along the way, metres; the same beside obstacles, which never move."""
 BACKWARD = -0.9
 """Cosine of the angle between two lanes below which the way between them counts as turning round."""
 HALF_TURN = 3.1
@@ -149,8 +149,9 @@ def look_ahead(
     low, high = corridor(left, wide)
     passing = floats[ASIDE] != 0.0
     if passing and way_to_go(way, x, y) < floats[UNTIL]:
-        low = min(left, floats[ASIDE]) - 0.1
-        high = floats[ASIDE] + wide
+        on_right = floats[ASIDE] < 0.0
+        low = floats[ASIDE] - wide if on_right else min(left, floats[ASIDE]) - 0.1
+        high = max(left, floats[ASIDE]) + 0.1 if on_right else floats[ASIDE] + wide
     gap = HELD
     who = -1
     close = False
@@ -167,7 +168,8 @@ def look_ahead(
         there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
         if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
             continue
-        if passing and labels.bits[b, j] & STANDS != 0 and its_left < floats[ASIDE] - wide + SIDE:
+        passed = floats[ASIDE] > 0.0 and labels.bits[b, j] & STANDS != 0
+        if passed and its_left < floats[ASIDE] - wide + SIDE:
             continue
         far = sqrt(d2)
         if there - part == 2:
@@ -177,14 +179,12 @@ def look_ahead(
         if its_gap < gap:
             gap = its_gap
             who = j
-    return see_obstacles(
-        b, part, key, x, y, way, low, high, passing, gap, who, close, obstacles, build, floats
-    )
+    return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, build, floats)
 
 
 @jit_inline
 def see_obstacles(
-    b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float, passing: bool,
+    b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float,
     gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
 ) -> tuple[float, int, bool]:  # fmt: skip
     """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
@@ -200,12 +200,12 @@ def see_obstacles(
         if d2 < (build[REACH] + row[7] + 0.2) * (build[REACH] + row[7] + 0.2):
             close = True
         there, its_key, its_left, _, _ = on_way(way, row[0], row[1])
-        aside = row[7] - build[HALF_WIDTH] - build[ROUNDING]
+        aside = row[7] - build[HALF_WIDTH] - build[ROUNDING] + NARROW - SIDE
         if there < part or (there == part and its_key <= key):
             continue
         if its_left < low - aside or its_left > high + aside:
             continue
-        if passing and its_left < floats[ASIDE] - wide - aside:
+        if floats[ASIDE] > 0.0 and its_left < floats[ASIDE] - wide - aside:
             continue
         its_gap = sqrt(d2) - build[REACH] - row[7]
         if its_gap < gap:
@@ -233,7 +233,7 @@ def wanted_gap(
     if labels.bits[b, n] & LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
-        return standing
+        return QUEUE_GAP if labels.crosses[b, n] >= 0 else standing
     if ints[MOOD] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])

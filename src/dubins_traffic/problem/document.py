@@ -158,7 +158,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
     )
     check_formulas(problem, names)
     planned, ego = _placed(model, network, planned)
-    wishes = [ego, *agent_wishes(network, planned, agents)]
+    wishes = [ego, *agent_wishes(network, planned, agents, car, problem.obstacles)]
     ground = Ground(network, car, model.radius, problem.obstacles)
     check_given(ground, names, wishes)
     duration = model.duration

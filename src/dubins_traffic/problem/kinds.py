@@ -118,6 +118,10 @@ class Lawful(Strict):
         description="for loop: lattice points of the intersections, in order; null: drawn",
     )
     speed: Speed = Field(default=0.5, description="speed, m/s")
+    departs_after: Annotated[float, Field(ge=0, le=50)] = Field(
+        default=0.0,
+        description="seconds for which it parks where it starts; before a crossing it does not park",
+    )
     rolls: Share = Field(
         default=0.0, description="share of crossings entered without stopping or waiting (E1)"
     )
@@ -166,6 +170,8 @@ KINDS: Mapping[str, type[Strict]] = {
     REMOTE: Remote,
 }
 """Kinds by name, each with the model of its parameters."""
+KEEP_RULES = frozenset({"lawful", "nemesis"})
+"""Kinds of e-agents that keep the rules of the road."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}
 """Types (package/executable) of 2016, and what they are called here."""

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntEnum
 
+from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import PlannedAgent
 from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
 from dubins_traffic.problem.instance import EAgent
-from dubins_traffic.problem.kinds import loops
+from dubins_traffic.problem.kinds import KEEP_RULES, loops
+from dubins_traffic.problem.overlap import Shape, obstacle_shape, overlap
 from dubins_traffic.problem.starts import Wish
 from dubins_traffic.roads.network import RoadNetwork
+
+BESIDE = 0.02
+"""What a car needs beside it to pass an obstacle in its lane, metres."""
 
 
 class Stream(IntEnum):
@@ -65,10 +70,19 @@ def complete_agents(
 
 
 def agent_wishes(
-    network: RoadNetwork, planned: Sequence[PlannedAgent], agents: Sequence[EAgent]
+    network: RoadNetwork,
+    planned: Sequence[PlannedAgent],
+    agents: Sequence[EAgent],
+    car: Car,
+    obstacles: Sequence[Obstacle],
 ) -> list[Wish]:
-    """Return where each e-agent is to start: as planned, else drawn; a loop on its cycle."""
+    """Return where each e-agent is to start: as planned, else drawn; a loop on its cycle.
+
+    One that keeps the rules starts on a lane without obstacles in the way, as long as there is one: before an obstacle
+    that it can't pass it might never be able to keep them.
+    """
     wishes: list[Wish] = []
+    clear = _clear_lanes(network, car, obstacles)
     for plan, agent in zip(planned, agents, strict=True):
         lanes = None
         if loops(agent.kind, agent.parameters):
@@ -76,5 +90,18 @@ def agent_wishes(
                 lanes = cycle_lanes(network, agent.parameters["cycle"])
             except InputError as error:
                 raise error.within(field=f"{plan.field}.parameters") from None
+        if agent.kind in KEEP_RULES and clear is not None:
+            lanes = clear if lanes is None else [lane for lane in lanes if lane in clear] or lanes
         wishes.append(Wish(plan.start, lanes, f"{plan.field}.start"))
     return wishes
+
+
+def _clear_lanes(network: RoadNetwork, car: Car, obstacles: Sequence[Obstacle]) -> list[int] | None:
+    """Return the lanes in whose middle a car meets no obstacle; None if that is all of them or none."""
+    if not obstacles:
+        return None
+    shapes = [obstacle_shape(obstacle) for obstacle in obstacles]
+    beside = 0.5 * car.body.width + BESIDE
+    swept = [Shape(network.lane_line(lane, -car.w), beside) for lane in range(network.lanes)]
+    clear = [lane for lane, way in enumerate(swept) if not any(overlap(way, shape) for shape in shapes)]
+    return clear if 0 < len(clear) < network.lanes else None

@@ -123,7 +123,8 @@ class Recipe:
             check_demands(network, self._radius, self._car, self._settings.sensing_radius, self._rules)
         planned = self._configuration.agents
         agents = complete_agents(network, planned, Draws(seed, trial, Stream.CYCLES))
-        wishes = [Wish(self._ego_start(network), None, "ego.start"), *agent_wishes(network, planned, agents)]
+        others = agent_wishes(network, planned, agents, self._car, self._obstacles)
+        wishes = [Wish(self._ego_start(network), None, "ego.start"), *others]
         ground = Ground(network, self._car, self._radius, self._obstacles)
         check_given(ground, self._names, wishes)
         site = Site(network, agents, wishes, ground)
