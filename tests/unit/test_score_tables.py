@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from dubins_traffic.campaign import rows
+from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report import terminal, worst
 from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.table import read
+from dubins_traffic.campaign.report.page import page
 from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
@@ -198,7 +198,8 @@ def campaign_of(folder: Path, *found: tuple[End, Score]) -> tuple[Comparison, An
     made = [rows.row(k, Ending(end, 3), own, {}) for k, (end, own) in enumerate(found)]
     part = folder / "part.parquet"
     part.write_bytes(rows.encoded(rows.columns(made)))
-    results = read(folder, campaign, [part])
+    results = table.read(folder, campaign, [part])
+    table.merge(campaign, [part], table.Kind.RESULTS, folder / table.RESULTS)
     return compare(campaign, results), results
 
 
@@ -225,8 +226,8 @@ def test_a_ranking_of_the_worst_knows_no_excuse(tmp_path: Path) -> None:
     breach = replace(BREACH, car="ego")
     excused = replace(verdict("excused"), violations=(breach, breach))
     violated = replace(verdict("violated"), violations=(breach,))
-    found = [(End.DURATION, scored(verdict=own)) for own in (violated, excused)]
-    assert worst.order(campaign_of(tmp_path, *found)[1]).tolist() == [1, 0], "more breaches are worse"
+    found = [(End.DURATION, scored(verdict=own)) for own in (violated, excused, verdict(), verdict())]
+    assert worst.order(campaign_of(tmp_path, *found)[1]).tolist() == [1, 0, 2, 3], "more breaches are worse"
 
 
 def test_a_campaign_counts_near_and_broken_assumptions_and_says_what_is_not_defined(tmp_path: Path) -> None:
@@ -235,7 +236,7 @@ def test_a_campaign_counts_near_and_broken_assumptions_and_says_what_is_not_defi
         for own in (replace(verdict("excused"), near=True), verdict("excused"), verdict(), verdict())
     ]
     comparison, _ = campaign_of(tmp_path, *found)
-    assert (comparison.broken, comparison.judged) == (2, 4)
+    assert (comparison.broken, comparison.judged) == table.assumption(tmp_path) == (2, 4)
     own = {standing.controller: standing for standing in comparison.standings}
     assert (own["lanes"].near.count, own["lanes"].near.total, own["simple"].near.total) == (1, 2, 0)
     assert [(own[name].clean.count, own[name].clean.total) for name in own] == [(0, 2), (2, 2)]
@@ -245,3 +246,18 @@ def test_a_campaign_counts_near_and_broken_assumptions_and_says_what_is_not_defi
     (tmp_path / "other").mkdir()
     defined, _ = campaign_of(tmp_path / "other", *((end, replace(own, icra2016=4.0)) for end, own in found))
     assert "not defined" not in told(defined)
+
+
+@pytest.mark.parametrize("broken", [2, 3])
+def test_the_page_of_a_report_says_that_its_verdicts_say_little(broken: int, tmp_path: Path) -> None:
+    found = [(End.DURATION, scored(verdict=verdict(fallen=k < broken))) for k in range(4)]
+    comparison, _ = campaign_of(tmp_path, *found)
+    made = {"versions": {}, "campaign": "", "configurations": {}, "controllers": [], "code": ""}
+    text = page(replace(comparison, metrics=()), made, {})
+    notice = "the assumption was broken in 3 of 4 trials: these verdicts say little"
+    assert (notice in text) == (broken == 3)
+    assert (
+        text.index("<th>clean</th>")
+        < text.index("<th>counted rounds</th>")
+        < text.index("<th>satisfied</th>")
+    )

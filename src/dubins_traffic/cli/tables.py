@@ -183,7 +183,7 @@ def _ranked(scores: Scores) -> dict[str, list[Score]]:
     def mean(name: str) -> float:
         return sum(score.counted_rounds for score in found[name]) / len(found[name])
 
-    return {name: found[name] for name in sorted(found, key=lambda name: (-mean(name), name))}
+    return {name: found[name] for name in sorted(found, key=lambda name: -mean(name))}
 
 
 def _needed(scores: Scores) -> dict[str, Column]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dubins_traffic.campaign import folder as folders
-from dubins_traffic.campaign import manifest, table
+from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.page import page
@@ -110,7 +110,8 @@ def replay_trial(
     place = Path(folder)
     _, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
-    found = results.filter([one == number for one in results["number"].to_pylist()]).to_pylist()
+    compute: Any = rows.arrow().compute
+    found = results.filter(compute.equal(results["number"], number)).to_pylist()
     if not found:
         expected = f"the number of a trial that has been run; {len(results)} of {campaign.total} have"
         raise InputError("no such trial", file=str(place), field="number", value=number, expected=expected)
