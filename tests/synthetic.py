@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import Any
+
 import numpy as np
 
 from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, Obstacle, PolygonObstacle, Rectangle
@@ -150,4 +153,8 @@ def verdict(instance: Instance, breaches: list[tuple[float, str, str]], excuse: 
     ruling = Ruling.SATISFIED if clean else fault
     why = None if excuse is None else Excuse("E1", violations[excuse], sensed=True)
     assert all(car in instance.names for _, car, _ in breaches)
-    return Verdict(ruling, clean, why, violations, (), 2, 10.0, 100.0, {}, {})
+    found: dict[str, Any] = dict.fromkeys((own.name for own in fields(Verdict)), None)
+    found |= {"verdict": ruling, "clean": clean, "excuse": why, "violations": violations, "collisions": ()}
+    return Verdict(
+        **found | {"rounds": 2, "longest_gap_s": 10.0, "gap_limit_s": 100.0, "formulas": {}, "robustness": {}}
+    )

@@ -14,7 +14,9 @@ _ARGUMENTS: Final = {
     "--jobs 1": "workers=1",
     "--lockstep": "lockstep=True",
     "--overwrite": "overwrite=True",
+    "--overwrite-trial-data": "overwrite_data=True",
     "--resume": "resume=True",
+    "--trial-data": "data",
     "-F": "overwrite_data=True",
     "-f": "data",
     **{

@@ -10,6 +10,7 @@ import re
 import shutil
 import statistics
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,11 @@ from pyarrow import parquet
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
+from dubins_traffic.campaign import manifest
 from dubins_traffic.campaign.conduct import run_campaign
+from dubins_traffic.campaign.report.comparison import compare
 from dubins_traffic.campaign.report.metrics import METRICS
+from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.write import write_report
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.rows import SCORES
@@ -236,6 +240,17 @@ def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:
     assert set(charts) == {metric.heading for metric in METRICS if metric.column not in silent}
     assert 'alt="Collisions by fault"' in text
     assert "the egos had none" not in text
+
+
+def test_without_collisions_there_is_no_chart_of_faults(folder: Path) -> None:
+    results = load_results(folder)
+    comparison = compare(results.campaign, results.table)
+    quiet = [replace(own, faults=dict.fromkeys(own.faults, 0)) for own in comparison.standings]
+    known = manifest.read(folder)
+    assert known is not None
+    text = page(replace(comparison, standings=quiet), known, {})
+    assert "No chart of collisions by fault: the egos had none." in text
+    assert "Collisions by fault" not in text
 
 
 @pytest.fixture

@@ -6,14 +6,12 @@ import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
 from dubins_traffic.cars.state import Frames
@@ -22,6 +20,7 @@ from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import write_replay
+from tests.pages import ask, element, has_colour, press
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -97,18 +96,6 @@ def judged(
     )
     yield browser
     assert browser.get_log("browser") == []
-
-
-def ask(page: webdriver.Chrome, what: str) -> Any:
-    return page.execute_script(f"return window.replay.{what}")
-
-
-def element(page: webdriver.Chrome, name: str) -> WebElement:
-    return page.find_element(By.ID, name)
-
-
-def press(page: webdriver.Chrome, *keys: str) -> None:
-    ActionChains(page).send_keys(*keys).perform()
 
 
 def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
@@ -224,18 +211,6 @@ def test_choosing_a_car_or_an_event_leads_there(page: webdriver.Chrome) -> None:
     press(page, Keys.ESCAPE)
     page.execute_script("[...document.querySelectorAll('#events .breach button')][0].click()")
     assert ask(page, "time") == pytest.approx(9.0)
-
-
-def has_colour(page: webdriver.Chrome, colour: str) -> bool:
-    return page.execute_script(
-        "const wanted = getComputedStyle(document.documentElement).getPropertyValue(arguments[0]).trim();"
-        "const c = document.getElementById('map'), copy = new OffscreenCanvas(c.width, c.height);"
-        "const own = copy.getContext('2d', {willReadFrequently: true}); own.drawImage(c, 0, 0);"
-        "const d = own.getImageData(0, 0, c.width, c.height).data;"
-        "for (let i = 0; i < d.length; i += 4) if ('#' + [d[i], d[i+1], d[i+2]].map(v => v.toString(16)"
-        ".padStart(2, '0')).join('') === wanted) return true; return false",
-        f"--{colour}",
-    )
 
 
 def test_breaches_stand_on_the_map_in_two_colours_with_filters(judged: webdriver.Chrome) -> None:

@@ -74,7 +74,7 @@ class MapView {
     Object.assign(this.camera, { width, height });
   }
 
-  // Show all roads and starts, and leave the given strips of the canvas to the controls on it.
+  // Show all roads, goals and starts, and leave the given strips of the canvas to the controls on it.
   fit({ above, right: beside, below }) {
     const { trial, camera } = this;
     const margin = trial.width / 2 + 0.3;
@@ -84,6 +84,12 @@ class MapView {
       const pose = trial.pose(car, trial.start);
       xs.push(pose.x);
       ys.push(pose.y);
+    }
+    const beyond = Math.max(0, trial.goals.radius - margin + 0.1);
+    for (const vertex of trial.goals.vertices) {
+      const [x, y] = trial.points[vertex];
+      xs.push(x - beyond, x + beyond);
+      ys.push(y - beyond, y + beyond);
     }
     const span = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
     const [left, right] = span(xs);
