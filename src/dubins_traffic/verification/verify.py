@@ -10,7 +10,7 @@ from pathlib import Path
 from dubins_traffic.errors import InputError, RecordError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.record import reader
+from dubins_traffic.record import header, reader
 from dubins_traffic.record.chunks import pieces
 from dubins_traffic.record.reader import Record
 from dubins_traffic.verification.again import trial_difference
@@ -79,6 +79,7 @@ def _verified(
         ticks=max(0, len(record.frames) - 1),
         cars=len(record.instance.names),
         end=None if record.ending is None else record.ending.end.value,
+        written_by=record.versions[header.PACKAGE],
         unchecked=_unchecked(record),
     )
 
@@ -87,7 +88,7 @@ def _first_difference(record: Record, data: bytes, expected: Instance | None) ->
     other = None if expected is None else instance_difference(record, expected)
     head = next(pieces(data)).messages[0].data
     found = other or header_difference(head, record) or _earlier(record)
-    return found or written_difference(data, record)
+    return found or written_difference(data, head, record)
 
 
 def _earlier(record: Record) -> Difference | None:
@@ -106,4 +107,4 @@ def _unchecked(record: Record) -> tuple[str, ...]:
     taken.append("what the controller reported")
     if record.instance.simulator != OURS:
         taken.append(f"poses within the bounds: the world is {record.instance.simulator}")
-    return (*taken, "the sidecar")
+    return (*taken, "the controller's name and the versions", "the sidecar")
