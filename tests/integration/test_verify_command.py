@@ -132,6 +132,25 @@ def test_the_instance_that_was_to_be_run(run: Run, config: Path, record: Path) -
     assert "needs more" in run("verify", record, "--trial", "1", status=2)
 
 
+def test_scores_that_were_printed_are_those_of_the_records(run: Run, config: Path) -> None:
+    printed = run("run", config, "--seed", "4", "--records", "out", "--trials", "2", "--json")
+    Path("scores.json").write_text(printed)
+    records = sorted(Path("out").glob("*.mcap"))
+    told = run("verify", *records, "--scores", "scores.json").splitlines()
+    assert told == [f"{path}: verified" for path in records]
+    document = json.loads(printed)
+    document["trials"][1]["icra2016"] += 1
+    Path("scores.json").write_text(json.dumps(document))
+    told = run("verify", *records, "--scores", "scores.json", status=1).splitlines()
+    assert told[0] == f"{records[0]}: verified"
+    assert told[1].startswith(f"{records[1]}: differs: score.icra2016: recorded ")
+    Path("scores.json").write_text(json.dumps({"trials": document["trials"][:1]}))
+    told = run("verify", *records, "--scores", "scores.json", status=1)
+    assert "score: recorded nothing, expected a score of trial-0001.mcap" in told
+    Path("scores.json").write_text("{}")
+    assert "no scores" in run("verify", *records, "--scores", "scores.json", status=2)
+
+
 def test_an_altered_sidecar_is_no_concern_of_it(run: Run, record: Path) -> None:
     wall.write(record, wall.measured(0.0, {}))
     assert "verified" in run("verify", record)
