@@ -15,10 +15,11 @@ import pytest
 from benchmarks.verify import CONTROLLERS, WAYS, case, verified
 
 import dubins_traffic as dt
+from dubins_traffic.campaign.conduct import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.record import schema, wall
-from tests.campaigns import campaign
+from tests.campaigns import campaign, written
 from tests.tampering import find, heading, put, rebuilt
 
 Run = Callable[..., str]
@@ -61,13 +62,13 @@ def test_records_of_runs_batches_and_campaigns_are_verified(run: Run, config: Pa
     run("run", config, "--seed", "4", "--records", "out", "--trials", "2")
     run("run", config, "--seed", "4", "--records", "shielded", "--shield", "--controller", "simple")
     run("batch", config, "--trials", "2", "--keep", "all", "--records", "kept")
-    document = campaign(controllers=["lanes", "rules"])
-    text = "\n".join(f"{key} = {json.dumps(value)}" for key, value in document.items() if key != "cells")
-    assert text
-    records = [*Path("out").glob("*.mcap"), *Path("shielded").glob("*.mcap"), *Path("kept").glob("*.mcap")]
-    told = run("verify", *records).splitlines()
-    assert told == [f"{path}: verified" for path in records]
-    assert len(records) >= 5
+    file = written(Path.cwd(), campaign(trials=2, controllers=["lanes", "rules", "controllers.py:Logged"]))
+    run_campaign(file, "campaign", workers=1, records="all")
+    folders = {"out": 2, "shielded": 1, "kept": 2, "campaign/records": 24}
+    for folder, count in folders.items():
+        records = sorted(Path(folder).glob("*.mcap"))
+        assert len(records) == count
+        assert run("verify", *records).splitlines() == [f"{path}: verified" for path in records]
 
 
 def test_one_line_a_record_and_the_exit_status(run: Run, record: Path) -> None:
@@ -97,7 +98,13 @@ def test_json_for_machines(run: Run, record: Path) -> None:
         "ticks": 90,
         "cars": 3,
         "end": "duration",
-        "unchecked": ["commands of the ego", "what the controller reported", "the sidecar"],
+        "written_by": dt.__version__,
+        "unchecked": [
+            "commands of the ego",
+            "what the controller reported",
+            "the controller's name and the versions",
+            "the sidecar",
+        ],
     }
     difference = found[1]["difference"]
     assert (difference["what"], difference["tick"], difference["car"]) == ("bits", 0, "agent0")
@@ -123,6 +130,25 @@ def test_the_instance_that_was_to_be_run(run: Run, config: Path, record: Path) -
         "verify", record, "--instance", "given.json", "--configuration", config, status=2
     )
     assert "needs more" in run("verify", record, "--trial", "1", status=2)
+
+
+def test_scores_that_were_printed_are_those_of_the_records(run: Run, config: Path) -> None:
+    printed = run("run", config, "--seed", "4", "--records", "out", "--trials", "2", "--json")
+    Path("scores.json").write_text(printed)
+    records = sorted(Path("out").glob("*.mcap"))
+    told = run("verify", *records, "--scores", "scores.json").splitlines()
+    assert told == [f"{path}: verified" for path in records]
+    document = json.loads(printed)
+    document["trials"][1]["icra2016"] += 1
+    Path("scores.json").write_text(json.dumps(document))
+    told = run("verify", *records, "--scores", "scores.json", status=1).splitlines()
+    assert told[0] == f"{records[0]}: verified"
+    assert told[1].startswith(f"{records[1]}: differs: score.icra2016: recorded ")
+    Path("scores.json").write_text(json.dumps({"trials": document["trials"][:1]}))
+    told = run("verify", *records, "--scores", "scores.json", status=1)
+    assert "score: recorded nothing, expected a score of trial-0001.mcap" in told
+    Path("scores.json").write_text("{}")
+    assert "no scores" in run("verify", *records, "--scores", "scores.json", status=2)
 
 
 def test_an_altered_sidecar_is_no_concern_of_it(run: Run, record: Path) -> None:

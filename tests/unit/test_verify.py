@@ -80,6 +80,19 @@ def test_an_honest_record_is_verified(data: bytes, given_up: bytes, tmp_path: Pa
     assert verify(from_bytes(data)).verified
 
 
+def test_an_instance_put_together_by_hand_is_verified(tmp_path: Path) -> None:
+    """Its document leaves out what has a default, and has whole numbers."""
+    agents = tuple(replace(agent, parameters={}) for agent in INSTANCE.e_agents)
+    own = replace(INSTANCE, e_agents=agents, duration=3)
+    run_trial(own, "simple", record=tmp_path / "a.mcap")
+    assert verify(tmp_path / "a.mcap").verified
+    spaced = rebuilt(
+        (tmp_path / "a.mcap").read_bytes(),
+        lambda chunks: edit(chunks, schema.HEADER, 0, lambda text: text.replace(b",", b", ")),
+    )
+    assert "header" in str(outcome(spaced, tmp_path / "b.mcap"))
+
+
 def swap(one: str, two: str) -> Callable[[dict[str, Any]], None]:
     def change(document: dict[str, Any]) -> None:
         text = json.dumps(document["cars"]).replace(one, "@").replace(two, one).replace("@", two)
@@ -296,6 +309,14 @@ def test_a_controller_that_writes_the_state_is_refused(car: int, tmp_path: Path)
     assert found.difference is not None
     assert found.difference.tick in (30, 31)
     assert not outcome((tmp_path / "a.mcap").read_bytes(), tmp_path / "b.mcap").verified
+
+
+def test_a_difference_names_the_version_that_wrote_the_record(data: bytes, tmp_path: Path) -> None:
+    older = rebuilt(data, heading(lambda own: own.update(package="0.0.1")))
+    assert outcome(older, tmp_path / "a.mcap").verified
+    altered = rebuilt(older, put(schema.FRAMES, 40, "x", 0, 0.0, CARS))
+    told = str(outcome(altered, tmp_path / "a.mcap"))
+    assert told.endswith(f"(written by dubins-traffic 0.0.1, this is {dt.__version__})")
 
 
 def test_the_sidecar_is_not_verified_and_this_is_said(data: bytes, tmp_path: Path) -> None:

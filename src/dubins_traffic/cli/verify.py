@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_text
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -61,6 +61,12 @@ def verify(
             autocompletion=options.simulators,
         ),
     ] = None,
+    scores: Annotated[
+        str | None,
+        typer.Option(
+            "--scores", metavar="FILE", help="What `run --json` or `score --json` printed of the records."
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Go through recorded trials again, and say what in a record is not what happened.
@@ -69,10 +75,11 @@ def verify(
     status: 0 if all are verified, 1 if one differs, 2 if one can't be read.
     """
     expected = _expected(instance, configuration, rnd, seed, trial, simulator)
+    printed = None if scores is None else _scores(scores)
     found: list[dict[str, Any]] = []
     status = faults.OK
     for record in records:
-        outcome = _outcome(record, expected, quiet=json)
+        outcome = _outcome(record, expected, printed, quiet=json)
         found.append(outcome)
         unread = "error" in outcome
         status = max(status, faults.WRONG_INPUT if unread else int(not outcome["verified"]))
@@ -82,18 +89,37 @@ def verify(
         raise typer.Exit(status)
 
 
-def _outcome(record: str, expected: Callable[[Record], Instance] | None, *, quiet: bool) -> dict[str, Any]:
+def _outcome(
+    record: str,
+    expected: Callable[[Record], Instance] | None,
+    scores: list[dict[str, Any]] | None,
+    *,
+    quiet: bool,
+) -> dict[str, Any]:
     """Verify a record, print its line and return what JSON says of it."""
     from dubins_traffic.verification.verify import verify as verified
 
     try:
-        result = verified(record, instance=expected)
+        result = verified(record, instance=expected, scores=scores)
     except InputError as error:
         faults.tell(str(error))
         return {"record": record, "verified": False, "error": str(error)}
     if not quiet:
         print(f"{record}: {result}")
     return {**result.to_json(), "record": record}
+
+
+def _scores(file: str) -> list[dict[str, Any]]:
+    """Return the scores in a file."""
+    from dubins_traffic.files import read_text
+    from dubins_traffic.problem.files import parse_json
+
+    trials = parse_json(read_text(file), file).get("trials")
+    if isinstance(trials, list):
+        entries = cast("list[Any]", trials)
+        if all(isinstance(entry, dict) for entry in entries):
+            return cast("list[dict[str, Any]]", entries)
+    raise InputError("no scores", file=file, field="trials", expected="what `run --json` prints")
 
 
 def _expected(

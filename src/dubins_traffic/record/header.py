@@ -37,8 +37,12 @@ def encode(instance: Instance, controller: str | None, versions: Mapping[str, st
     Of a controller given by a file's path only the last part of the path is kept (`bare_name`). The versions are those
     of this package and of the encoding library unless given.
     """
-    written = document(instance, controller, versions)
-    return json.dumps(written, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    return as_message(document(instance, controller, versions))
+
+
+def as_message(document: Mapping[str, Any]) -> bytes:
+    """Return a document as the text of the message on ``/trial``."""
+    return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
 def document(

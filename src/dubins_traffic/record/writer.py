@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -25,22 +25,16 @@ class RecordEncoder:
     ----------
     stream : binary stream
         Where the record goes; it stays open.
-    controller : str, optional
-        Name of the ego's controller, kept in the header.
-    versions : mapping, optional
-        Versions to write into the header, by default those of this package and its encoding library.
+    head : bytes
+        The message on ``/trial``, made by `record.header.encode`.
     """
 
-    def __init__(
-        self, stream: BinaryIO, controller: str | None = None, versions: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, stream: BinaryIO, head: bytes) -> None:
         self._stream = stream
-        self._controller = controller
-        self._versions = versions
+        self._head = head
 
     def begin(self, instance: Instance) -> None:
         """Write the header, alone in the first chunk."""
-        message = header.encode(instance, self._controller, self._versions)
         self._cars = len(instance.names)
         self._rate = instance.problem.rate
         self._mcap = McapFile(self._stream, library=f"dubins-traffic record {schema.VERSION}")
@@ -50,7 +44,7 @@ class RecordEncoder:
         for topic, (name, definition) in schema.MESSAGES.items():
             form = (name, "ros1msg", definition.encode())
             self._channel[topic] = self._mcap.register(topic, "ros1", form)
-        self._chunk({schema.HEADER: [Message(0, 0, message)]})
+        self._chunk({schema.HEADER: [Message(0, 0, self._head)]})
 
     def frames(self, frames: Frames) -> None:
         """Write a block of frames as one chunk and flush it."""
@@ -104,8 +98,9 @@ class RecordWriter:
         InputError
             If the file exists and may not be replaced, or can't be made.
         """
+        head = header.encode(instance, self._controller)
         self._file = self._open()
-        self._encoder = RecordEncoder(self._file, self._controller)
+        self._encoder = RecordEncoder(self._file, head)
         with self._written():
             self._encoder.begin(instance)
 

@@ -14,6 +14,7 @@ from dubins_traffic.controllers import blame
 from dubins_traffic.errors import ControllerError, PeerError, shown
 from dubins_traffic.protocols import Closes, Controller, End, Ending, Reports
 from dubins_traffic.record.wall import Wall, measured, summary
+from dubins_traffic.trial.interrupts import heard_between_frames
 from dubins_traffic.trial.trial import Trial
 
 CLOSE_RAISED: Final = "close raised"
@@ -34,17 +35,18 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
     """
     latencies: list[float] = []
     begin: float | None = None
-    try:
-        started = perf_counter()
-        with _Answerable(trial):
-            controller.start(trial.instance.problem)
-        begin = perf_counter() - started
-        _drive(trial, controller, deadline, latencies)
-    except (KeyboardInterrupt, SystemExit):
-        trial.end(End.INTERRUPTED)
-        raise
-    except ControllerError as error:
-        trial.end(End(error.reason), error.detail)
+    with heard_between_frames():
+        try:
+            started = perf_counter()
+            with _Answerable(trial):
+                controller.start(trial.instance.problem)
+            begin = perf_counter() - started
+            _drive(trial, controller, deadline, latencies)
+        except (KeyboardInterrupt, SystemExit):
+            trial.end(End.INTERRUPTED)
+            raise
+        except ControllerError as error:
+            trial.end(End(error.reason), error.detail)
     ending = close(controller, trial.end(End.DURATION))
     return ending, measured(begin, summary(latencies), reproducible=ending.end is not End.DEADLINE)
 

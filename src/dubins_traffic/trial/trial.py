@@ -15,6 +15,7 @@ from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import agent_fault, checked_command, collision_detail
+from dubins_traffic.trial.interrupts import WHOLE
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -118,11 +119,12 @@ class Trial:
         commands[0, EGO, 1] = yaw
         if not all_finite(commands):
             return self._agent_fault()
-        contacts = self._simulator.step(commands)
-        self._tick += 1
-        self._observation = None
-        contacts = self._labeller.update(self._tick, self._state, contacts)[0]
-        self._buffer.push(self._state, self._labels, commands, contacts, ())
+        with WHOLE:
+            contacts = self._simulator.step(commands)
+            self._tick += 1
+            self._observation = None
+            contacts = self._labeller.update(self._tick, self._state, contacts)[0]
+            self._buffer.push(self._state, self._labels, commands, contacts, ())
         if self._tick >= self._ticks:
             self.end(End.DURATION)
         elif contacts and self.instance.end_on_collision:
@@ -138,10 +140,11 @@ class Trial:
     def end(self, end: End, detail: str = "") -> Ending:
         """End the trial for the reason `end` unless it has ended; return its ending."""
         if self.ending is None:
-            if end is not End.DURATION:
-                self.note(end.value, detail)
-            self.ending = Ending(end, self._tick, detail)
-            self._buffer.end(self.ending)
+            with WHOLE:
+                if end is not End.DURATION:
+                    self.note(end.value, detail)
+                self.ending = Ending(end, self._tick, detail)
+                self._buffer.end(self.ending)
         return self.ending
 
     def close(self) -> None:

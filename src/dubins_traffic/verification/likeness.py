@@ -3,26 +3,52 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
+from pathlib import PurePath
 from typing import Any, cast
 
-from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import header
 from dubins_traffic.record.reader import Record
+from dubins_traffic.scoring.score import score
 from dubins_traffic.verification.result import Difference
 
 
 def header_difference(written: bytes, record: Record) -> Difference | None:
-    """Return where the header of `record`, as it is `written`, says other things than its own instance does."""
+    """Return where the header of `record`, as it is `written`, says other things than its own instance does.
+
+    The instance may be written in more ways than one: what its document leaves out has its default.
+    """
     expected = header.document(record.instance, record.controller, record.versions)
-    return unlike("header", json.loads(written), _as_json(expected))
+    found = json.loads(written)
+    different = unlike("header", {**found, "instance": None}, _as_json({**expected, "instance": None}))
+    if different is None and header.as_message(found) != written:
+        return Difference("header", "other text", "JSON as it is written, each key once")
+    return different
 
 
 def instance_difference(record: Record, expected: Instance) -> Difference | None:
     """Return where the instance of `record` is another than the one that was to be run."""
-    documents = [_as_json(instance_to_document(instance)) for instance in (record.instance, expected)]
+    same = instance_from_document(instance_to_document(expected))  # with what it leaves out at its default
+    documents = [_as_json(instance_to_document(instance)) for instance in (record.instance, same)]
     return unlike("instance", documents[0], documents[1])
+
+
+def score_difference(record: Record, scores: Sequence[Mapping[str, Any]]) -> Difference | None:
+    """Return where the score printed of `record`, the one of `scores` that names its file, is another than its own.
+
+    What was measured on a wall clock is left out.
+    """
+    name = PurePath(record.file or "").name
+    printed = next((one for one in scores if PurePath(str(one.get("record"))).name == name), None)
+    if printed is None:
+        return Difference("score", None, f"a score of {name}")
+    found, expected = dict(printed), _as_json(score(record).to_json())
+    for left_out in ("record", "time_to_begin_s"):
+        found[left_out] = expected[left_out] = None
+    return unlike("score", found, expected)
 
 
 def unlike(path: str, recorded: object, expected: object) -> Difference | None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
+
+from dubins_traffic.record.header import PACKAGE
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +46,8 @@ class Verification:
         Ticks of the trial that the record holds, and its cars.
     end : str or None
         The named end; None if the record was cut off, and what is there has been verified.
+    written_by : str
+        The version of this package that wrote the record.
     unchecked : tuple of str
         What could not be checked, and is taken as it was recorded.
     """
@@ -53,6 +58,7 @@ class Verification:
     ticks: int
     cars: int
     end: str | None
+    written_by: str
     unchecked: tuple[str, ...]
 
     @property
@@ -62,7 +68,7 @@ class Verification:
 
     def __str__(self) -> str:
         if self.difference is not None:
-            return f"differs: {self.difference}"
+            return f"differs: {self.difference}{self._versions()}"
         early = "" if self.end is not None else f", ends early: cut off after tick {self.ticks}"
         only = (
             ""
@@ -81,8 +87,14 @@ class Verification:
             "ticks": self.ticks,
             "cars": self.cars,
             "end": self.end,
+            "written_by": self.written_by,
             "unchecked": list(self.unchecked),
         }
+
+    def _versions(self) -> str:
+        """Return what is said where the record is of another version, in which other things may have followed."""
+        own = version(PACKAGE)
+        return "" if own == self.written_by else f" (written by {PACKAGE} {self.written_by}, this is {own})"
 
 
 OURS = "embedded"

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from dubins_traffic.errors import InputError, RecordError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.record import reader
+from dubins_traffic.record import header, reader
 from dubins_traffic.record.chunks import pieces
 from dubins_traffic.record.reader import Record
 from dubins_traffic.verification.again import trial_difference
 from dubins_traffic.verification.elsewhere import world_difference
-from dubins_traffic.verification.likeness import header_difference, instance_difference
+from dubins_traffic.verification.likeness import header_difference, instance_difference, score_difference
 from dubins_traffic.verification.result import OURS, Difference, Verification
 from dubins_traffic.verification.written import encoded, written_difference
 
@@ -26,6 +27,7 @@ def verify(
     record: Record | str | os.PathLike[str],
     *,
     instance: Instance | Callable[[Record], Instance] | None = None,
+    scores: Sequence[Mapping[str, Any]] | None = None,
 ) -> Verification:
     """Go through a recorded trial again and compare all of it with its record, bit for bit.
 
@@ -40,6 +42,8 @@ def verify(
     instance : Instance or callable, optional
         The instance that was to be run, or a function that returns it for the record; by default the record's own is
         taken to be it.
+    scores : sequence of mapping, optional
+        Scores that were printed as JSON (`Score.to_json`); the one that names the record's file must be the record's.
 
     Raises
     ------
@@ -52,19 +56,24 @@ def verify(
     True
     """
     if isinstance(record, Record):
-        return _verified(record, encoded(record), instance)
+        return _verified(record, encoded(record), instance, scores)
     name = os.fspath(record)
     stdin = name == STANDARD_INPUT
     data = reader.take_bytes(sys.stdin.buffer, name) if stdin else reader.read_bytes(Path(name))
-    return _verified(reader.from_bytes(data, name), data, instance)
+    return _verified(reader.from_bytes(data, name), data, instance, scores)
 
 
 def _verified(
-    record: Record, data: bytes, instance: Instance | Callable[[Record], Instance] | None
+    record: Record,
+    data: bytes,
+    instance: Instance | Callable[[Record], Instance] | None,
+    scores: Sequence[Mapping[str, Any]] | None,
 ) -> Verification:
     expected = instance(record) if callable(instance) else instance
     try:
         difference = _first_difference(record, data, expected)
+        if difference is None and scores is not None:
+            difference = score_difference(record, scores)
     except InputError as error:
         raise RecordError(
             f"its instance can't be run ({error.problem})",
@@ -79,6 +88,7 @@ def _verified(
         ticks=max(0, len(record.frames) - 1),
         cars=len(record.instance.names),
         end=None if record.ending is None else record.ending.end.value,
+        written_by=record.versions[header.PACKAGE],
         unchecked=_unchecked(record),
     )
 
@@ -87,7 +97,7 @@ def _first_difference(record: Record, data: bytes, expected: Instance | None) ->
     other = None if expected is None else instance_difference(record, expected)
     head = next(pieces(data)).messages[0].data
     found = other or header_difference(head, record) or _earlier(record)
-    return found or written_difference(data, record)
+    return found or written_difference(data, head, record)
 
 
 def _earlier(record: Record) -> Difference | None:
@@ -106,4 +116,4 @@ def _unchecked(record: Record) -> tuple[str, ...]:
     taken.append("what the controller reported")
     if record.instance.simulator != OURS:
         taken.append(f"poses within the bounds: the world is {record.instance.simulator}")
-    return (*taken, "the sidecar")
+    return (*taken, "the controller's name and the versions", "the sidecar")

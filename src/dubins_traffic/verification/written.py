@@ -6,17 +6,19 @@ import struct
 from io import BytesIO
 from itertools import zip_longest
 
-from dubins_traffic.record import schema
+from dubins_traffic.record import header, schema
 from dubins_traffic.record.chunks import Entry, Piece, is_finished, pieces
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.writer import RecordEncoder
 from dubins_traffic.verification.result import Difference
 
 
-def encoded(record: Record) -> bytes:
-    """Return the file that writes what `record` holds, by the versions that its header names."""
+def encoded(record: Record, head: bytes | None = None) -> bytes:
+    """Return the file that writes what `record` holds after the header `head`, by default its own written anew."""
     stream = BytesIO()
-    encoder = RecordEncoder(stream, record.controller, record.versions)
+    encoder = RecordEncoder(
+        stream, head or header.encode(record.instance, record.controller, record.versions)
+    )
     encoder.begin(record.instance)
     for block in record.blocks:
         encoder.frames(block)
@@ -25,12 +27,12 @@ def encoded(record: Record) -> bytes:
     return stream.getvalue()
 
 
-def written_difference(data: bytes, record: Record) -> Difference | None:
-    """Return where the bytes of a record's file are not those that it is written with.
+def written_difference(data: bytes, head: bytes, record: Record) -> Difference | None:
+    """Return where the bytes of a record's file are not those that it is written with after its header `head`.
 
     A file that was cut off is compared as far as its last whole chunk.
     """
-    expected = encoded(record)
+    expected = encoded(record, head)
     if record.ending is None and is_finished(data):
         return Difference("end of the file", "a finished file without an end", "an end, or a file cut off")
     whole = len(expected) if is_finished(data) or len(data) > len(expected) else len(data)
