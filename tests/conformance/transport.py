@@ -29,7 +29,8 @@ from dubins_traffic.protocols import Transport
 from dubins_traffic.record.sink import End
 from dubins_traffic.record.wall import read
 from dubins_traffic.transports.clocks import Lockstep, RealTime
-from dubins_traffic.transports.link import Link, Patience
+from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.patience import Patience
 from tests.recordings import make_instance
 
 BRIEF = Patience(begin=600.0, silence=3.0, absence=3.0, flood=1000, settle=0.3)
@@ -122,6 +123,7 @@ class TransportConformance:
 
     @pytest.mark.parametrize("clock", [Lockstep(SOON), RealTime(2.0)], ids=["lockstep", "real time"])
     def test_a_silent_peer(self, clock: Any) -> None:
+        self.ticks = 1200
         result = self.run(answer(until=5), clock)
         assert result.ending.end is (End.DEADLINE if clock.lockstep else End.PEER_SILENT)
         assert result.ending.ticks >= 5

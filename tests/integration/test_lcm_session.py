@@ -167,19 +167,19 @@ def test_a_second_session_and_an_interrupted_one() -> None:
     assert "interrupted after 0 trials" in err
 
 
-def logged(folder: Path) -> tuple[Path, list[Path]]:
+def logged(folder: Path, pause: float) -> tuple[Path, list[Path]]:
     """Run two sessions of one and two trials beside lcm-logger; return the log and the records."""
     logger = str(Path(library.__file__).parents[1] / "bin" / "lcm-logger")
     log, config = folder / "trial.log", folder / "short.json"
     config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [2, 2]}))
     url = os.environ["LCM_DEFAULT_URL"]
     with running(logger, "-l", url, "--quiet", str(log)) as logging, running(*PYTHON):
-        time.sleep(0.5)
+        time.sleep(pause)  # lcm-logger does not say that it listens
         for trials in ("1", "2"):
             options = ("--lockstep", "--trials", trials, "--records", str(folder / trials))
             with running(COMMAND, "lcm", "run", str(config), "--seed", trials, *options) as session:
                 assert ended(session)[0] == 0
-        time.sleep(0.3)
+        time.sleep(pause)
         logging.send_signal(signal.SIGINT)
         logging.wait(600)
     return log, sorted(folder.glob("?/*.mcap"))
@@ -189,7 +189,7 @@ def converted(folder: Path, made: Path, tries: int = 6) -> tuple[Path, list[Path
     """Log and convert trials. On a busy machine the logger may miss a datagram; then the log is refused."""
     own = folder / f"try-{tries}"
     own.mkdir()
-    log, records = logged(own)
+    log, records = logged(own, 0.5 * 2 ** (6 - tries))
     done = subprocess.run([COMMAND, "convert", str(log), "-o", str(made)], check=False, capture_output=True)
     if done.returncode == 0 or tries == 1:
         assert done.returncode == 0

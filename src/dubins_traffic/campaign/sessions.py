@@ -33,8 +33,9 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.foreign import ForeignMaestro
-from dubins_traffic.transports.link import Link, Patience
+from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.patience import Patience
 
 REHEARSAL = 1.2
 """Seconds: more than a block of frames."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Clock, End, Ending, Polled, Streams, Transport, View
 from dubins_traffic.record.wall import summary
 from dubins_traffic.transports.inbox import Inbox, Slot
+from dubins_traffic.transports.patience import Patience
 from dubins_traffic.transports.shown import between, kept, onward
 
 if TYPE_CHECKING:
@@ -27,22 +27,6 @@ AGAIN = 1.0
 """Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
 NEVER_BY_ITSELF = 1e9
 SIGHT = 1e150
-
-
-@dataclass(frozen=True, slots=True)
-class Patience:
-    """How long peers are waited for, in seconds of wall clock, and how much they may send.
-
-    `begin`: for the first command after the announcement. `silence`: in real time, without any command. `absence`:
-    for a peer that went to come back. `settle`: in lockstep without tags, for further answers to the first frame,
-    which is shown until it is answered. `flood`: commands a second of one car.
-    """
-
-    begin: float = 60.0
-    silence: float = 5.0
-    absence: float = 2.0
-    settle: float = 0.2
-    flood: int = 1000
 
 
 class Link:
