@@ -111,13 +111,8 @@ class Programme:
         see `foreign.run_under`.
         """
         try:
-            link = Link(
-                transport,
-                pace.clock(),
-                ego=self.controller is None,
-                patience=pace.patience,
-                at_once=foreign is not None,
-            )
+            patience = replace(pace.patience, at_once=foreign is not None)
+            link = Link(transport, pace.clock(), ego=self.controller is None, patience=patience)
             if at is not None:
                 self.say(at())
             session = Session(

@@ -42,23 +42,14 @@ class Link:
         Whether the ego is remote. E-agents are if their kind is `remote`.
     patience : Patience
         How long peers are waited for.
-    at_once : bool
-        Whether a trial's time begins with its announcement; else with the ego's first command, if the ego is remote.
     """
 
     def __init__(
-        self,
-        transport: Transport,
-        clock: Clock,
-        *,
-        ego: bool = True,
-        patience: Patience | None = None,
-        at_once: bool = False,
+        self, transport: Transport, clock: Clock, *, ego: bool = True, patience: Patience | None = None
     ) -> None:
         self.transport = transport
         self.clock = clock
         self.ego = ego
-        self._at_once = at_once
         self._patience = patience or Patience()
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
@@ -111,7 +102,7 @@ class Link:
         self.transport.announce(self._instance)
         self._announced = monotonic()
         self._send()
-        if self.ego and not self._at_once:
+        if self.ego and not self._patience.at_once:
             self._first_command(self.inbox.slot(EGO_NAME))
         self.clock.start(self._instance.problem.period, monotonic())
         self._sent = monotonic()
@@ -168,7 +159,7 @@ class Link:
     @property
     def time_to_begin(self) -> float | None:
         """Seconds from the announcement to the ego's first command; None before, and for an ego that is here."""
-        if self.ego and self._at_once and self._begun is None:
+        if self.ego and self._patience.at_once and self._begun is None:
             began = self.inbox.slot(EGO_NAME).began
             return None if began is None else max(0.0, began - self._announced)
         return self._begun
@@ -211,7 +202,7 @@ class Link:
         if slot.gone_since is not None:
             return
         patience = self._patience.silence
-        if slot.arrived is None and self._at_once:
+        if slot.arrived is None and self._patience.at_once:
             patience = max(patience, self._patience.begin)  # it may be planning
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
         if monotonic() - since > patience:

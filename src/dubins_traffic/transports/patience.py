@@ -11,7 +11,8 @@ class Patience:
 
     `begin`: for the first command after the announcement. `silence`: in real time, without any command. `absence`:
     for a peer that went to come back. `settle`: in lockstep without tags, for further answers to the first frame,
-    which is shown until it is answered. `flood`: commands a second of one car.
+    which is shown until it is answered. `flood`: commands a second of one car. `at_once`:
+    whether a trial's time begins with its announcement; else it begins with the ego's first command, if that is remote.
     """
 
     begin: float = 60.0
@@ -19,3 +20,4 @@ class Patience:
     absence: float = 2.0
     settle: float = 0.2
     flood: int = 1000
+    at_once: bool = False
