@@ -44,6 +44,7 @@ class Maestro:
 
     def answer(self, request):
         with self.changed:
+            self.changed.wait_for(lambda: self.phase != BUSY)
             granted = self.phase == (RUNNING if request.mode == MModeRequest.RESET else READY)
             if request.mode == MModeRequest.START and granted:
                 self.unpause()
@@ -63,6 +64,7 @@ class Maestro:
         problem, self.reset = self.draw(), threading.Event()
         with self.changed:
             self.phase = READY
+            self.changed.notify_all()
             self.changed.wait_for(lambda: self.phase == RUNNING)
         self.problem.publish(rospy.Time.now(), json.dumps(problem))
         duration, began = random.randint(*self.durations), time.time()

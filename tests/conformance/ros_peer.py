@@ -43,7 +43,7 @@ class RosPeer:
             self.begun = isinstance(came, str) and came != ""
             self.start: tuple[float, float] | None = None
             self.answered = -1
-        until = time.monotonic() + 10
+        until = time.monotonic() + 600
         while not self.heard():
             assert time.monotonic() < until
             time.sleep(0.01)
@@ -71,7 +71,7 @@ class RosPeer:
         self.put(speed, yaw_rate)
 
     def next(self) -> str | Odometry:
-        until = time.monotonic() + 10
+        until = time.monotonic() + 600
         while (came := self.fetch()) is None:
             assert time.monotonic() < until, "nothing comes"
         return came

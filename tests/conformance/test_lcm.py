@@ -173,7 +173,7 @@ def test_equal_frames_from_a_controller_in_another_process(tmp_path: Path) -> No
             result = run_trial(instance, record=there, link=link)
         finally:
             link.close()
-        said, _ = peer.communicate(timeout=30)
+        said, _ = peer.communicate(timeout=600)
     assert result.ending.end is End.DURATION
     assert said == "duration\n"
     assert frames(there) == frames(here)
@@ -203,7 +203,7 @@ def without_network(code: str, before: str = "true") -> str:
     """Return what a Python program prints in a network of its own that has no route, after a shell command."""
     command = ["unshare", "-rn", "sh", "-c", f'{before}; exec "$0" -c "$1"', sys.executable, code]
     try:
-        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=600)
     except FileNotFoundError:
         pytest.skip("unshare is not here")
     if "unshare" in done.stderr:

@@ -139,7 +139,7 @@ def test_a_hostile_line_is_garbage_and_the_next_trial_goes_on(line: bytes) -> No
         peer = LinesPeer(link.transport.address, "ego")
         future = pool.submit(drive, peer)
         ends = [result.ending.end for result in run_remote(Session(link, instances.__getitem__, 2))]
-        future.result(timeout=60)
+        future.result(timeout=600)
         peer.hang_up()
     assert ends == [End.PEER_GARBAGE, End.DURATION]
 

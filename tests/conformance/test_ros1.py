@@ -1,7 +1,6 @@
 import gc
 import queue
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,7 +11,7 @@ from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
 from tests.conformance.ros_peer import Odometry, RosPeer
-from tests.conformance.transport import BRIEF, TransportConformance
+from tests.conformance.transport import TransportConformance
 from tests.recordings import make_instance
 from tests.ros import need_ros
 
@@ -86,7 +85,6 @@ class Ros1Peer(RosPeer):
 
 class TestRos1(TransportConformance):
     tagged = False
-    patience = replace(BRIEF, absence=2.0)
 
     @pytest.fixture(autouse=True)
     def _at(self, uri: str) -> None:

@@ -1,6 +1,5 @@
 import itertools
 import os
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,7 +11,7 @@ from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from dubins_traffic.transports.ros2.transport import Ros2
 from tests.conformance.ros_peer import Odometry, RosPeer
-from tests.conformance.transport import BRIEF, TransportConformance
+from tests.conformance.transport import TransportConformance
 from tests.recordings import make_instance
 
 DOMAINS = itertools.count(30 + 20 * (os.getpid() % 10))
@@ -60,7 +59,6 @@ class Ros2Peer(RosPeer):
 
 class TestRos2(TransportConformance):
     tagged = False
-    patience = replace(BRIEF, absence=2.0)
 
     def make(self) -> Ros2:
         return Ros2(next(DOMAINS), clock=True)

@@ -33,7 +33,7 @@ def asked(tool: str, script: str, request: object) -> Any:
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=600,
     )
     assert ran.returncode == 0, ran.stderr[-2000:]
     return json.loads(ran.stdout.strip().splitlines()[-1])
@@ -42,7 +42,7 @@ def asked(tool: str, script: str, request: object) -> Any:
 def spin_output(text: str) -> str:
     """Return what SPIN makes of a formula: a never claim."""
     ran = subprocess.run(
-        [program("spin"), "-f", text], capture_output=True, text=True, check=False, timeout=60
+        [program("spin"), "-f", text], capture_output=True, text=True, check=False, timeout=600
     )
     assert ran.returncode == 0, f"{text}: {ran.stdout}{ran.stderr}"
     assert "syntax error" not in ran.stdout, f"{text}: {ran.stdout}"

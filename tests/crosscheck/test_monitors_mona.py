@@ -27,7 +27,7 @@ def accepted(questions: list[tuple[str, str, list[list[int]]]]) -> list[list[boo
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=600,
     )
     assert ran.returncode == 0, ran.stderr[-2000:]
     answers: list[list[bool]] = json.loads(ran.stdout.strip().splitlines()[-1])

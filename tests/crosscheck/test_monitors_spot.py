@@ -50,7 +50,7 @@ def by_spot(questions: list[tuple[Formula, list[int]]]) -> list[list[int] | None
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=600,
     )
     assert ran.returncode == 0, ran.stderr[-2000:]
     answers: list[list[int] | None] = json.loads(ran.stdout.strip().splitlines()[-1])

@@ -175,7 +175,7 @@ def test_over_ros1_a_node_is_started_and_ended(tmp_path: Path) -> None:
     command = ["env", f"PYTHONPATH={tmp_path}:{DIST_PACKAGES}", SYSTEM_PYTHON, str(node)]
     done = subprocess.run(
         [COMMAND, "check-controller", shlex.join(command), "--over", "ros1"],
-        check=False, capture_output=True, text=True, timeout=180,
+        check=False, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("ok ") == 7

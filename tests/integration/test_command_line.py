@@ -355,11 +355,11 @@ def test_ctrl_c_keeps_finished_trials(jobs, place):
         text=True,
         start_new_session=True,
     )
-    until = time.monotonic() + 120
+    until = time.monotonic() + 600
     while len(list(place.glob("out/*.wall.json"))) < 3 and time.monotonic() < until:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 1
     kept = json.loads(out)["trials"]
     assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
@@ -374,11 +374,11 @@ def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
     process = subprocess.Popen(
         [COMMAND, *ask], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    until = time.monotonic() + 120
+    until = time.monotonic() + 600
     while len(list(place.glob("out/*.wall.json"))) < 3 and time.monotonic() < until:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 1
     kept = [trial["trial"] for trial in json.loads(out)["trials"]]
     assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
@@ -386,14 +386,22 @@ def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
     assert kept == list(range(len(kept)))
 
 
+def processor_seconds(stat: Path) -> float:
+    """Return how long a process has had a processor, whatever the clock says."""
+    user, system = stat.read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
 def test_ctrl_c_ends_a_long_search_and_writes_nothing(place):
     ask = ["synth", "demo", "--cars", "3", "--assume", "E1,E2,E3:one-forfeit,E4,E5,E6", "-o", "won.npz"]
     process = subprocess.Popen(
         [COMMAND, *ask], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(timeout=5)
+    began = Path(f"/proc/{process.pid}/stat")
+    while processor_seconds(began) < 5.0:
+        assert process.poll() is None
+        time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert (process.returncode, out, err) == (1, "", "dubins-traffic: interrupted: the game is not solved\n")
     assert not (place / "won.npz").exists()

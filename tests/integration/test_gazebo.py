@@ -77,7 +77,7 @@ def gone_within(seconds: float, parent: int) -> bool:
 def command(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     around = {key: value for key, value in os.environ.items() if key != "DISPLAY"} | environment
     return subprocess.run(
-        [*PROGRAM, *arguments], capture_output=True, text=True, timeout=120, check=False, env=around
+        [*PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False, env=around
     )
 
 
@@ -229,7 +229,7 @@ def test_no_room_to_write(tmp_path: Path) -> None:
     install = ["0", *PROGRAM, "gazebo", "install", "--prefix", str(tmp_path)]
     for words in (run, install):
         full = ["bash", "-c", 'ulimit -f "$1" && shift && exec "$@"', "full", *words]
-        done = subprocess.run(full, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(full, capture_output=True, text=True, timeout=600, check=False)
         assert done.returncode == 2, done.stderr
         assert "File too large" in done.stderr
 
@@ -310,7 +310,7 @@ def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
     found = installation()
     check = [str(found.gzserver.with_name("gz")), "sdf", "-k", str(tmp_path / "1.6.sdf")]
     old = subprocess.run(
-        check, capture_output=True, text=True, env=os.environ | found.environment(), check=True, timeout=60
+        check, capture_output=True, text=True, env=os.environ | found.environment(), check=True, timeout=600
     )
     assert "Check complete" in old.stdout
     ask = "import ctypes,sys; ctypes.CDLL('libsdformat12.so.12').cmdCheck(sys.argv[1].encode())"
@@ -335,6 +335,6 @@ def test_an_installation_that_is_interrupted_says_how_to_go_on(tmp_path: Path) -
     while "list of packages" not in process.stdout.readline():
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == 1
     assert err == "dubins-traffic: interrupted; the same command goes on where it stopped\n"

@@ -75,6 +75,28 @@ def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path:
     assert order == sorted(order)
 
 
+def test_json_lines_work_as_typed(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "attach.md").read_text(encoding="utf-8")
+    section = text.partition("## Over JSON lines")[2].partition("\n## ")[0]
+    (typed,) = re.findall(r"```bash\ndubins-traffic (.*?)\n```", section, re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    around = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    command = [sys.executable, "-m", "dubins_traffic.cli", *shlex.split(typed)]
+    process = subprocess.Popen(command, cwd=tmp_path, env=around, stderr=subprocess.PIPE, text=True)
+    try:
+        read_until(process, "JSON lines at 127.0.0.1:7411")
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=around, check=True, capture_output=True, text=True
+        )
+        process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    assert done.stdout.count("'end': 'duration'") == 3
+    assert process.returncode == 0
+    assert len(list((tmp_path / "out").glob("*.mcap"))) == 3
+
+
 def test_the_launch_file_works_as_typed(tmp_path: Path) -> None:
     need_ros()
     text = (ROOT / "docs" / "attach.md").read_text(encoding="utf-8")

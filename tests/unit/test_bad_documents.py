@@ -228,10 +228,10 @@ TRIAL_DATA: list[tuple[str, Document, str, str | None, str]] = [
 def refused(tmp_path: Path, document: Document, read: Callable[[str], object]) -> str:
     file = tmp_path / "bad.json"
     file.write_text(json.dumps(document))
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError) as caught:
         read(str(file))
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
     message = str(caught.value)
     assert message.startswith(f"{file}: ")
     assert "\n" not in message

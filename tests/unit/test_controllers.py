@@ -78,10 +78,10 @@ def test_simple_without_goals_stands() -> None:
 
 def test_simple_costs_microseconds() -> None:
     controller, observation = begun(), seen(0.0, 0.0, 0.5)
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(20_000):
         controller.act(observation)
-    assert time.perf_counter() - began < 20_000 * 20e-6
+    assert time.process_time() - began < 20_000 * 20e-6
 
 
 def test_built_in_controllers_are_listed() -> None:

@@ -156,10 +156,10 @@ def test_parts_are_split_and_share_tables() -> None:
 def test_what_is_too_large_is_refused_with_a_reason(text: str, reason: str) -> None:
     formula = parse(text)
     names = tuple({f"p{i}" for i in range(13)} | {"a", "b", "c"})
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(FormulaError, match=reason) as caught:
         Monitors({"mine": formula}, names, 1 / 30)
-    assert time.perf_counter() - start < 30
+    assert time.process_time() - start < 30
     assert str(caught.value).startswith("mine: ")
     assert caught.value.expected
 

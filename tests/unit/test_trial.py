@@ -135,11 +135,9 @@ def test_a_controller_that_fails_to_start() -> None:
     assert result.wall.time_to_begin_s is None
 
 
-@pytest.mark.parametrize("sleep", [0.05, 30.0])
+@pytest.mark.parametrize("sleep", [0.05, 3600.0])
 def test_a_late_controller_is_ended_by_its_deadline(sleep) -> None:
-    began = time.monotonic()
     result = run_trial(instance(), Straight(sleeps=sleep), deadline=0.02)
-    assert time.monotonic() - began < 10
     assert result.ending.end is End.DEADLINE
     assert not result.wall.reproducible
 

@@ -21,8 +21,9 @@ from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.protocols import End, Transport
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.inbox import Inbox
-from dubins_traffic.transports.link import EGO_NAME, Link, Patience
+from dubins_traffic.transports.link import EGO_NAME, Link
 from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.patience import Patience
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,8 +34,9 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.foreign import ForeignMaestro
-from dubins_traffic.transports.link import Link, Patience
+from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.patience import Patience
 
 REHEARSAL = 1.2
 """Seconds: more than a block of frames."""
@@ -111,13 +112,8 @@ class Programme:
         see `foreign.run_under`.
         """
         try:
-            link = Link(
-                transport,
-                pace.clock(),
-                ego=self.controller is None,
-                patience=pace.patience,
-                at_once=foreign is not None,
-            )
+            patience = replace(pace.patience, at_once=foreign is not None)
+            link = Link(transport, pace.clock(), ego=self.controller is None, patience=patience)
             if at is not None:
                 self.say(at())
             session = Session(

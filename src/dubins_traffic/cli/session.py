@@ -92,7 +92,7 @@ class Asked:
     def pace(self) -> Pace:
         """Return how drivers are waited for."""
         from dubins_traffic.campaign.sessions import Pace
-        from dubins_traffic.transports.link import Patience
+        from dubins_traffic.transports.patience import Patience
 
         patience = Patience(begin=self.begin, silence=self.silence)
         return Pace(self.lockstep, self.factor, self.deadline, patience)

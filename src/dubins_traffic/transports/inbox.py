@@ -18,8 +18,8 @@ class Slot:
     """The latest command of one car, and what is counted of its peer.
 
     `tick` is the frame that it says it answers; `fresh` whether it came since the last frame was sent; `arrived` when,
-    monotonic seconds, None before the first, and `began` when the first did. `gone_since` is set while a peer that was there is away. `peers` is how
-    many there were at most at a time, 0 where the transport does not know.
+    monotonic seconds, None before the first, and `began` when the first did. `gone_since` is set while a peer that
+    was there is away. `peers` is how many there were at most at a time, 0 where the transport does not know.
     """
 
     speed: float = 0.0

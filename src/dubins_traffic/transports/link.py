@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Clock, End, Ending, Polled, Streams, Transport, View
 from dubins_traffic.record.wall import summary
 from dubins_traffic.transports.inbox import Inbox, Slot
+from dubins_traffic.transports.patience import Patience
 from dubins_traffic.transports.shown import between, kept, onward
 
 if TYPE_CHECKING:
@@ -27,22 +27,6 @@ AGAIN = 1.0
 """Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
 NEVER_BY_ITSELF = 1e9
 SIGHT = 1e150
-
-
-@dataclass(frozen=True, slots=True)
-class Patience:
-    """How long peers are waited for, in seconds of wall clock, and how much they may send.
-
-    `begin`: for the first command after the announcement. `silence`: in real time, without any command. `absence`:
-    for a peer that went to come back. `settle`: in lockstep without tags, for further answers to the first frame,
-    which is shown until it is answered. `flood`: commands a second of one car.
-    """
-
-    begin: float = 60.0
-    silence: float = 5.0
-    absence: float = 2.0
-    settle: float = 0.2
-    flood: int = 1000
 
 
 class Link:
@@ -58,23 +42,14 @@ class Link:
         Whether the ego is remote. E-agents are if their kind is `remote`.
     patience : Patience
         How long peers are waited for.
-    at_once : bool
-        Whether a trial's time begins with its announcement; else with the ego's first command, if the ego is remote.
     """
 
     def __init__(
-        self,
-        transport: Transport,
-        clock: Clock,
-        *,
-        ego: bool = True,
-        patience: Patience | None = None,
-        at_once: bool = False,
+        self, transport: Transport, clock: Clock, *, ego: bool = True, patience: Patience | None = None
     ) -> None:
         self.transport = transport
         self.clock = clock
         self.ego = ego
-        self._at_once = at_once
         self._patience = patience or Patience()
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
@@ -127,7 +102,7 @@ class Link:
         self.transport.announce(self._instance)
         self._announced = monotonic()
         self._send()
-        if self.ego and not self._at_once:
+        if self.ego and not self._patience.at_once:
             self._first_command(self.inbox.slot(EGO_NAME))
         self.clock.start(self._instance.problem.period, monotonic())
         self._sent = monotonic()
@@ -184,7 +159,7 @@ class Link:
     @property
     def time_to_begin(self) -> float | None:
         """Seconds from the announcement to the ego's first command; None before, and for an ego that is here."""
-        if self.ego and self._at_once and self._begun is None:
+        if self.ego and self._patience.at_once and self._begun is None:
             began = self.inbox.slot(EGO_NAME).began
             return None if began is None else max(0.0, began - self._announced)
         return self._begun
@@ -227,7 +202,7 @@ class Link:
         if slot.gone_since is not None:
             return
         patience = self._patience.silence
-        if slot.arrived is None and self._at_once:
+        if slot.arrived is None and self._patience.at_once:
             patience = max(patience, self._patience.begin)  # it may be planning
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
         if monotonic() - since > patience:

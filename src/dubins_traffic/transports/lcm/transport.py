@@ -33,7 +33,7 @@ MOST_AT_ONCE = 256
 """Messages after which the trial is looked at again, however many there are."""
 MOST_WAITING = 1000
 """Requests that may wait for the next instance; of more, the oldest are never answered."""
-ANSWER = 0.25
+ANSWER = 0.5
 """Seconds in which another session at the same URL would answer; it looks at what has come every 0.1 s."""
 GARBAGE = (ValueError, struct.error, IndexError)
 

@@ -17,7 +17,10 @@ from dubins_traffic.errors import TransportError
 from dubins_traffic.transports.ros1.debian import ros
 
 PR_SET_PDEATHSIG = 1
-PATIENCE = 15.0
+PATIENCE = 120.0
+"""Seconds in which a master must come up; one that ends before is noticed at once."""
+ANSWER = 10.0
+"""Seconds for an answer on a busy machine; where nobody listens, that is known at once."""
 
 
 class Master:
@@ -68,12 +71,12 @@ class Master:
             self._child.communicate()
 
 
-def answers(uri: str, patience: float = 1.0) -> bool:
+def answers(uri: str, patience: float = ANSWER) -> bool:
     """Tell whether there is a ROS master, or a node, at `uri`."""
     return pid_at(uri, patience) is not None
 
 
-def pid_at(uri: str, patience: float = 1.0) -> int | None:
+def pid_at(uri: str, patience: float = ANSWER) -> int | None:
     """Return the process number of the master or node at `uri`, None if nobody answers."""
     try:
         with ServerProxy(uri, transport=_Brief(patience)) as proxy:
