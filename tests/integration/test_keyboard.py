@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import termios
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -94,6 +96,33 @@ def test_a_person_drives_and_gives_up(terminal: Terminal) -> None:
     assert terminal.screen.rstrip().endswith("\x1b[?25h\x1b[?1049l") or "\x1b[?1049l" in terminal.screen
 
 
+def test_time_begins_with_the_first_key_and_there_is_a_legend(terminal: Terminal) -> None:
+    terminal.see("press a key of the last line to start")
+    terminal.type("x")  # no key of the keyboard's
+    until = time.monotonic() + 120
+    while terminal.screen.count("press a key") < 4:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    assert set(re.findall(r"(\d+\.\d) s ", terminal.screen)) == {"0.0"}
+    for part in ("→ you", "o ' another car", "1, 2, ... goals", "q: give up"):
+        assert part in terminal.screen
+    terminal.type("\x1b[A")
+    terminal.see("0.5 s   +0.1 m/s")
+    assert "press a key" not in terminal.screen.rpartition("\x1b[H")[2]
+    terminal.type("q")
+    out, _ = terminal.process.communicate(timeout=60)
+    assert json.loads(out)["trials"][0]["end"] == "gave_up"
+
+
+def test_goals_at_one_place_have_their_numbers_joined_as_in_pictures() -> None:
+    instance = draw(load_config("demo"), 1, 0)
+    goal = instance.problem.goals[0]
+    problem = replace(instance.problem, goals=(goal, goal))
+    with Trial(instance) as trial:
+        seen = trial.observation
+    assert "1+2" in "\n".join(Map(problem).draw(seen, 80, 24))
+
+
 def test_ctrl_c_gives_the_terminal_back(terminal: Terminal) -> None:
     terminal.see("space: stop")
     assert termios.tcgetattr(terminal.own) != terminal.before
@@ -122,5 +151,6 @@ def test_the_map_shows_roads_goals_and_cars() -> None:
     assert max(map(len, lines)) <= 80
     assert text.count("→") == 1
     assert text.count("o") == len(seen.others)
-    assert all(str(number) in text for number in range(len(instance.problem.goals)))
+    assert all(str(number + 1) in text for number in range(len(instance.problem.goals)))
+    assert "0" not in text
     assert text.count("·") > 100

@@ -14,8 +14,9 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.asked import Maker, ask, grouped
+from dubins_traffic.campaign.batch_records import chosen, folder_of
 from dubins_traffic.campaign.group import Group, Outcome
-from dubins_traffic.campaign.record_folder import check_folder, claim
+from dubins_traffic.campaign.record_folder import claim
 from dubins_traffic.campaign.record_folder import name as record_name
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers import registry as controllers
@@ -26,9 +27,7 @@ from dubins_traffic.files import locked
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
-from dubins_traffic.protocols import End
 from dubins_traffic.scoring.score import ScoreSheet
-from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.viewer.notebook import Sheeted
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ UNDER_WAY = 3
 """Groups under way for each thread: while the oldest is waited for, the others go on."""
 LEAST = 4
 """Trials in the smallest of the last groups, which still hide what it costs to begin one."""
-KEEP = "none, all, failures or sample:K"
 Progress = Callable[[int], object]
 
 
@@ -157,7 +155,7 @@ def run_each(
     for name, value in (("trials", count), ("batch", batch), ("threads", threads)):
         if value < 1:
             raise InputError("too few", field=name, value=value, expected="at least 1")
-    kept, folder = _kept(keep, count), _folder(keep, records)
+    kept, folder = chosen(keep, count), folder_of(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
     each = outcomes(instances, controller, batch=batch, threads=threads)
     if folder is None:
@@ -331,40 +329,6 @@ def _undisturbed(instance: Instance) -> bool:
 def _alone(instance: Instance, make: Maker, name: str) -> Outcome:
     result = run_trial(instance, controllers.made(make), name=name)
     return Outcome(instance, result.ending, result.score)
-
-
-def _kept(keep: str, count: int) -> Callable[[int, Outcome], bool]:
-    kind, colon, number = keep.partition(":")
-    if kind == "sample" and colon and number.isdigit() and int(number) > 0:
-        wanted = min(int(number), count)
-        chosen = {k * count // wanted for k in range(wanted)}
-        return lambda place, _outcome: place in chosen
-    if keep not in ("none", "all", "failures"):
-        raise InputError("not a choice of records", file="--keep", value=keep, expected=KEEP)
-    if keep == "failures":
-        return lambda _place, outcome: failed(outcome)
-    return lambda _place, _outcome: keep == "all"
-
-
-def failed(outcome: Outcome) -> bool:
-    """Tell whether a trial counts as failed: a rule broken and not excused, a fault, or, unjudged, a collision."""
-    if outcome.ending.end not in (End.DURATION, End.COLLISION):
-        return True
-    verdict = outcome.score.verdict
-    return bool(outcome.score.collisions) if verdict is None else verdict.verdict is Ruling.VIOLATED
-
-
-def _folder(keep: str, records: str | os.PathLike[str] | None) -> Path | None:
-    if keep == "none" or records is None:
-        if (keep == "none") != (records is None):
-            raise InputError(
-                "records are kept in a folder",
-                file="--keep, --records",
-                value=(keep, records),
-                expected="both, or neither",
-            )
-        return None
-    return check_folder(records)
 
 
 def _recorded(outcome: Outcome, controller: str | Maker, record: Path) -> Outcome:

@@ -221,7 +221,9 @@ def _check_deadline(deadline: float | None) -> None:
 def check_data_file(path: Path, overwrite: bool) -> Path:
     """Return `path` if a file can be written there; InputError if not, or if one exists and may not be replaced."""
     if path.exists() and not overwrite:
-        raise InputError("exists", file=str(path), expected="a new file; -F overwrites")
+        raise InputError(
+            "exists", file=str(path), expected="a new file; --overwrite-trial-data (-F) overwrites"
+        )
     if path.is_dir() or not path.parent.is_dir():
         problem = "a folder" if path.is_dir() else "its folder does not exist"
         raise InputError(problem, file=str(path), expected="a file to write")

@@ -2,41 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json as json_text
+import textwrap
 from enum import StrEnum
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("list agents", "list controllers")
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dubins_traffic.campaign.catalogue import Entry, Parameter
+
+EXAMPLES = options.examples("list agents", "list rules", "list configurations --json", "list controllers")
+WIDTH = 100
+"""Columns of what is listed."""
 
 
 class Subject(StrEnum):
     """What there are several of."""
 
     AGENTS = "agents"
+    CONFIGURATIONS = "configurations"
     CONTROLLERS = "controllers"
+    RULES = "rules"
     SIMULATORS = "simulators"
 
 
 def listing(
     subject: Annotated[Subject, typer.Argument(help="What to list.", show_default=False)],
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """List the e-agents, controllers or simulators that there are, with what each does."""
-    lines = _names(subject)
-    width = max(map(len, lines))
-    for name, line in lines.items():
-        print(f"{name:{width}}  {line}")
+    """List what there is, with what each does, its parameters and their defaults."""
+    from dubins_traffic.campaign import catalogue
+
+    if subject is Subject.RULES:
+        rules = catalogue.rules()
+        if json:
+            _print_json(subject, catalogue.Entry("rules", "", rules).to_json()["parameters"])
+        else:
+            _print_parameters(rules, "")
+        return
+    entries: Sequence[Entry] = getattr(catalogue, subject.value)()
+    if json:
+        _print_json(subject, [entry.to_json() for entry in entries])
+        return
+    width = max(len(entry.name) for entry in entries)
+    for entry in entries:
+        print(f"{entry.name:{width}}  {entry.line}")
+        _print_parameters(entry.parameters, "    ")
+        for remark in entry.remarks:
+            print(f"    ({remark})")
 
 
-def _names(subject: Subject) -> Mapping[str, str]:
-    match subject:
-        case Subject.AGENTS:
-            from dubins_traffic.agents.registry import names
-        case Subject.CONTROLLERS:
-            from dubins_traffic.controllers.registry import names
-        case Subject.SIMULATORS:
-            from dubins_traffic.simulators.registry import names
-    return names()
+def _print_json(subject: Subject, found: list[Any]) -> None:
+    print(json_text.dumps({subject.value: found}, indent=2))
+
+
+def _print_parameters(parameters: Sequence[Parameter], indent: str) -> None:
+    """Print a line for each parameter: name, default, meaning."""
+    if not parameters:
+        return
+    first = max(len(own.name) for own in parameters)
+    second = max(len(own.shown) for own in parameters)
+    for own in parameters:
+        head = f"{indent}{own.name:{first}}  {own.shown:{second}}  "
+        lines = textwrap.wrap(own.meaning, max(40, WIDTH - len(head))) or [""]
+        print((head + lines[0]).rstrip())
+        for line in lines[1:]:
+            print(" " * len(head) + line)

@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
-import dubins_traffic
 from dubins_traffic.errors import DubinsTrafficError, shown
 
 DEBUG = "DUBINS_TRAFFIC_DEBUG"
@@ -27,7 +26,7 @@ LONGEST = 300
 """Most characters of a message."""
 LONGEST_LINE = 80
 """Most characters of a line of a controller."""
-_OURS = str(Path(dubins_traffic.__file__).parent) + os.sep
+_OURS = str(Path(__file__).parents[1]) + os.sep
 _INSTALLED = tuple(sysconfig.get_path(name) + os.sep for name in ("purelib", "platlib"))
 _PYTHON = (sysconfig.get_path("stdlib") + os.sep, "<frozen ")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")

@@ -19,11 +19,15 @@ SPEED_STEP, YAW_STEP = 0.1, 0.3
 """What one press of a key changes, m/s and rad/s."""
 DRAWINGS = 15.0
 """Drawings a second, at most."""
+WAKING = 0.25
+"""Seconds after which it is drawn anew while the first key is waited for: the window may have changed."""
 MARGIN = 1.0
 """Metres shown around the network."""
 ARROWS = "→↗↑↖←↙↓↘"
 KEYS = {"\x1b[A": "faster", "\x1b[B": "slower", "\x1b[D": "left", "\x1b[C": "right", " ": "stop", "q": "quit"}
 HELP = "up, down: speed   left, right: turn   space: stop   q: give up"
+LEGEND = f"{ARROWS[0]} you   o ' another car and its front   1, 2, ... goals   · roads"
+WAITING = "press a key of the last line to start"
 ENTER, LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 """To another screen without cursor, and back."""
 
@@ -50,14 +54,16 @@ class Keyboard:
         self._map = Map(problem)
         self._speed = self._yaw_rate = 0.0
         self._given_up = False
-        self._next = self._drawn = monotonic()
+        self._waits = True
         self._before = termios.tcgetattr(sys.stdin)
         atexit.register(self.close)
         tty.setcbreak(sys.stdin)
         _write(ENTER)
 
     def act(self, observation: Observation) -> Command | None:
-        """Wait until the tick is due, look at the keys, draw."""
+        """Wait until the tick is due, look at the keys, draw; before the first tick, wait for the first key."""
+        if self._waits:
+            self._wait_for_a_key(observation)
         self._next += self._problem.period
         now = monotonic()
         if self._next > now:
@@ -69,6 +75,16 @@ class Keyboard:
             self._drawn = self._next
             self._draw(observation)
         return None if self._given_up else Command(self._speed, self._yaw_rate)
+
+    def _wait_for_a_key(self, observation: Observation) -> None:
+        """Show where everything is until a key of ours is pressed; time begins then."""
+        self._waits = False
+        typed = ""
+        while not any(key in typed for key in KEYS):
+            self._draw(observation, WAITING)
+            typed += _typed(WAKING)
+        self._press(typed)
+        self._next = self._drawn = monotonic()
 
     def close(self) -> None:
         """Give the terminal back as it was."""
@@ -101,12 +117,13 @@ class Keyboard:
         self._speed = min(bounds.speed, max(bounds.speed_low, self._speed))
         self._yaw_rate = min(bounds.yaw_rate, max(-bounds.yaw_rate, self._yaw_rate))
 
-    def _draw(self, observation: Observation) -> None:
+    def _draw(self, observation: Observation, notice: str = "") -> None:
         columns, rows = os.get_terminal_size(sys.stderr.fileno())
         state = f"{observation.time:6.1f} s   {self._speed:+.1f} m/s   {self._yaw_rate:+.1f} rad/s"
         lines = [
-            state[: columns - 1],
-            *self._map.draw(observation, columns - 1, rows - 3),
+            f"{state}   {notice}".rstrip()[: columns - 1],
+            *self._map.draw(observation, columns - 1, rows - 4),
+            LEGEND[: columns - 1],
             HELP[: columns - 1],
         ]
         _write("\x1b[H" + "".join(f"{line}\x1b[K\r\n" for line in lines))
@@ -146,9 +163,11 @@ class Map:
             steps = max(1, floor(scale * max(abs(x1 - x0), abs(y1 - y0))))
             for k in range(steps + 1):
                 put(x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps, "·")
-        for number, vertex in enumerate(self._goals):
+        for vertex in dict.fromkeys(self._goals):
             x, y = self._points[vertex]
-            put(x, y, str(number % 10))
+            numbers = [str(number) for number, other in enumerate(self._goals, 1) if other == vertex]
+            for k, sign in enumerate("+".join(numbers)):
+                put(x + k / scale, y, sign)
         for car in observation.others:
             put(car.pose.x, car.pose.y, "o")
             x, y = _ahead(car.pose, 1.5 / scale)
@@ -165,10 +184,10 @@ def _ahead(pose: Pose, distance: float) -> tuple[float, float]:
     return pose.x + distance * cos(pose.theta), pose.y + distance * sin(pose.theta)
 
 
-def _typed() -> str:
-    """Return what has been typed, without waiting."""
+def _typed(patience: float = 0.0) -> str:
+    """Return what has been typed, at the latest after so many seconds."""
     file = sys.stdin.fileno()
-    if not select([file], [], [], 0.0)[0]:
+    if not select([file], [], [], patience)[0]:
         return ""
     return os.read(file, 1024).decode(errors="replace")
 

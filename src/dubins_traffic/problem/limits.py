@@ -1,7 +1,7 @@
 """Largest values that documents may ask for; beyond them a request is refused at once, before anything is built.
 
-They are far above what a trial can use and low enough that no size, tick or coordinate overflows. The least values are as
-far below.
+They are far above what a trial can use and low enough that no size, tick or coordinate overflows. The least values are
+as far below.
 """
 
 from __future__ import annotations

@@ -227,19 +227,11 @@ def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:
     return dict(extra)
 
 
-def _is_deep(value: object) -> bool:
-    """Whether a JSON value has more than `DEEPEST` levels."""
-    level: list[object] = [value]
-    for _ in range(DEEPEST):
-        level = [
-            item
-            for outer in level
-            if isinstance(outer, list | tuple | dict)
-            for item in (cast("dict[str, object]", outer).values() if isinstance(outer, dict) else outer)  # pyright: ignore[reportUnknownVariableType]
-        ]
-        if not level:
-            return False
-    return True
+def _is_deep(value: Any, levels: int = DEEPEST) -> bool:
+    """Whether a JSON value has more than so many levels."""
+    holds = isinstance(value, dict | list | tuple)
+    items: Iterable[Any] = cast("Any", value).values() if isinstance(value, dict) else value if holds else ()
+    return levels < 0 or any(_is_deep(item, levels - 1) for item in items)
 
 
 def write_json(document: Mapping[str, Any]) -> str:
