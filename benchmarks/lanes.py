@@ -5,8 +5,9 @@
 Each instance is a random network of 6 to 60 intersections (anything from a tree to as many segments as a grid has),
 1 to 4 goals and 1 to 8 e-agents of the kind `wander`. It is run without e-agents for ten free-flow rounds, and with
 them for 120 s. Free flow is that of `dubins_traffic.driving.free_flow`, turning round at dead ends only. "Stood while
-free" is the longest time for which the ego stood although, all the while, nobody was within 1.5 m ahead in its lane and, if it was within 2 m of its
-lane's end, nobody's body met the disc of the intersection there (for an ego inside a disc: nobody else met that disc).
+free" is the longest time for which the ego stood although, all the while, nobody was within 1.5 m ahead in its lane
+and, if it was within 2 m of its lane's end, nobody's body met the disc of the intersection there (for an ego inside a
+disc: nobody else met that disc).
 """
 
 from __future__ import annotations
