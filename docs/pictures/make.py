@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from bends import free_bend
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from stage import (
@@ -373,6 +374,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "3-clear": clear,
     "E3-first-enters": first_enters,
     "E4-free-exit": free_exit,
+    "E4-bend": free_bend,
     "E5-free-way": free_way,
     "E6-free-goal": free_goal,
     "verdicts": verdicts,
