@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
 import sys
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -16,17 +19,18 @@ import pytest
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.assumption import Assumption, Forfeits, Order
+from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.checker import StrategyError, check
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.export import save_game
 from dubins_traffic.synthesis.game import build, estimate
 from dubins_traffic.synthesis.play import Environment, play
+from dubins_traffic.synthesis.queues import OTHER
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.story import told
 from dubins_traffic.synthesis.strategy import Strategy
-from tests.games import ALL, board, solved
+from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
 
@@ -56,6 +60,75 @@ def test_with_the_assumption_every_position_is_won() -> None:
 def test_so_it_is_where_opposing_cars_pass_each_other_in_bends() -> None:
     assert figures(solved(2, 2, 3, ALL, 3)) == (7_280, 7_280, 0)
     assert figures(solved(3, 4, 2, ALL, 3)) == (63_204, 63_204, 0)
+
+
+def test_e_agents_that_meet_in_a_bend_must_not_excuse_each_other() -> None:
+    weak = "E1,E2,E3,E4:unmet,E5,E6"
+    assert figures(solved(2, 2, 2, ALL, 3)) == (1_680, 1_680, 0)
+    assert figures(solved(2, 2, 2, weak, 3)) == (1_680, 784, 0)
+    assert figures(solved(3, 4, 2, weak, 3)) == (63_204, 63_012, 0)
+
+
+def test_a_way_out_that_an_e_agent_holds_must_not_excuse_who_waits_before_a_bend() -> None:
+    weak = "E1,E2,E3,E4,E5:way-out,E6"
+    assert figures(solved(2, 2, 3, weak, 3)) == (7_280, 7_280, 0)
+    assert figures(solved(2, 2, 4, ALL, 3)) == (21_840, 21_840, 0)
+    assert figures(solved(2, 2, 4, weak, 3)) == (21_840, 21_340, 60)
+    dead_end = pan(2, (0, 4), "E1,E2,E3,E4,E5", 3)
+    assert figures(solve(build(dead_end))) == (2_598, 2_598, 0)
+    weak_end = replace(dead_end, assumption=Assumption.parse(["E1", "E2", "E3", "E4", "E5:way-out"]))
+    assert figures(solve(build(weak_end))) == (2_598, 0, 0)
+
+
+def test_whom_the_ego_blocks_at_a_bend_owes_nothing() -> None:
+    """On the square each corner is two cells; lanes and cells of one direction follow each other."""
+    some = board(2, 2, 1, ALL, 3)
+    game, arena = build(some), some.arena
+    nodes = len(arena.nodes)
+    seen = 0
+    for position in range(game.positions):
+        owed = game.owed[game.owed_at[position] : game.owed_at[position + 1]].tolist()
+        scenes = some.scenes(position)
+        ego = int(game.ego_cell[position])
+        inside = [n for n, scene in enumerate(scenes) if scene.inside == OTHER]
+        waits = [
+            nodes + arena.nodes[n].inbound[0] for n, scene in enumerate(scenes) if (0, OTHER) in scene.queue
+        ]
+        for n in inside:
+            excused = ego == arena.opposite(n) or ego in arena.following(n)
+            assert (n in owed) is not excused
+            seen += excused
+        for lane in waits:
+            (node,) = arena.following(lane)
+            excused = ego in (node, arena.opposite(node), *arena.following(node))
+            assert (lane in owed) is not excused
+            seen += excused
+    assert seen == 8 * 2 + 8 * 3
+
+
+def test_a_single_goal_is_left_between_two_visits() -> None:
+    """An ego that stays at its only goal does not win: the strategy has a second table, for all other places."""
+    some = pan(1, (3,))
+    solution = solve(build(some))
+    check(solution.game, solution.ranks)
+    away = solution.game.at_target(1)
+    assert len(solution.ranks) == 2
+    assert not (away & solution.game.at_target(0)).any()
+    assert ((solution.ranks[1].rank == 0) == away).all()
+    played = play(Strategy.of(solution), 5_000, Environment.GREEDY, seed=2)
+    assert played.astray == 0
+    assert min(played.visits) > 100
+    shut = solve(build(pan(1, (4,), "E1,E2,E3,E5,E6")))
+    assert not shut.winning[shut.game.at_target(0)].all()
+
+
+def test_a_place_may_be_given_up_at_any_time_but_once_in_a_wait() -> None:
+    """As who backs out of the approach and stops again: also behind others, and before a crossing that is not clear."""
+    some = board(2, 2, 2, "E1,E2,E3:one-forfeit,E4,E5,E6")
+    kind = some.scenery(0)
+    for scene, row in zip(kind.scenes, kind.removed().tolist(), strict=True):
+        for slot, who in scene.queue:
+            assert (row[slot] >= 0) is (who == OTHER)
 
 
 def test_one_forfeit_a_wait_does_no_harm_and_any_number_does() -> None:
@@ -141,12 +214,85 @@ def test_files_that_are_no_strategies_are_refused(tmp_path: Path) -> None:
         Strategy.load(path)
     header = {"format": "dubins-traffic strategy", "version": 99}
     np.savez(path, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8))
-    with pytest.raises(InputError, match=r"unknown version: got 99; expected 1"):
+    with pytest.raises(InputError, match=r"unknown version: got 99; expected 2"):
         Strategy.load(path)
     Strategy.of(solved(2, 2, 1)).save(path)
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(InputError, match="can't be read as a strategy"):
         Strategy.load(path)
+
+
+def saved(path: Path, **changes: object) -> Path:
+    """Write a strategy with other arrays, or with another header where `header` is a dict or a text."""
+    Strategy.of(solved(2, 2, 1)).save(path)
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    header = changes.pop("header", {})
+    text = header if isinstance(header, str) else json.dumps(json.loads(arrays["header"].tobytes()) | header)
+    arrays["header"] = np.frombuffer(text.encode(), dtype=np.uint8)
+    np.savez_compressed(path, **(arrays | changes))
+    return path
+
+
+COUNT = 140
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"rank_0": np.full(COUNT, np.nan)}, r"rank_0: not an array of a strategy: got 'float64 \(140,\)'"),
+        ({"rank_0": np.full(COUNT, -1)}, "rank_0: not an array"),
+        ({"rank_0": np.full(COUNT, -1, dtype=np.int32)}, "a strategy that wins from nowhere"),
+        ({"rank_0": np.full(COUNT, -2, dtype=np.int32)}, "rank_0: tables of another game"),
+        ({"rank_1": np.zeros(COUNT - 1, dtype=np.int32)}, "rank_1: of another size: got 139; expected 140"),
+        ({"rank_1": np.zeros((2, 70), dtype=np.int32)}, "rank_1: not an array"),
+        ({"start_0": np.full(40, 99, dtype=np.int32)}, "start_0: tables of another game|debt_0: of another"),
+        ({"header": {"cars": 10**18}}, "header.cars"),
+        ({"header": {"cars": 12}}, "header.cars: no game"),
+        ({"header": {"goals": 3}}, "header.goals"),
+        ({"header": {"goals": [[0, 0], [0, 1.5]]}}, "header.goals"),
+        ({"header": {"network": []}}, "header.network"),
+        ({"header": {"assume": "E1"}}, "header.assume"),
+        ({"header": {"order_degree": "1"}}, "header.order_degree"),
+        ({"header": "[1, 2]"}, "the header of a strategy"),
+        ({"header": "[" * 5_000 + "]" * 5_000}, "the header of a strategy"),
+        ({"header": '{"a":' * 200_000 + "1" + "}" * 200_000}, "the header of a strategy"),
+    ],
+    ids=range(17),
+)
+def test_damaged_strategies_are_wrong_input(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message) as found:
+        Strategy.load(saved(tmp_path / "some.npz", **changes))
+    assert "some.npz" in str(found.value)
+
+
+def test_arrays_are_refused_by_the_size_that_they_claim(tmp_path: Path) -> None:
+    """A bomb of 1 GB and one row after another of 1e14: neither is read."""
+    path = tmp_path / "bomb.npz"
+    saved(path)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("header.npy", members["header.npy"])
+        with archive.open("rank_0.npy", "w", force_zip64=True) as stream:
+            for _ in range(1 << 10):
+                stream.write(bytes(1 << 20))
+    begun = perf_counter()
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"bomb.npz: rank_0: too large: got '1073741824 bytes'"):
+        Strategy.load(path)
+    assert tracemalloc.get_traced_memory()[1] < 1 << 26
+    tracemalloc.stop()
+    huge = io.BytesIO()
+    np.lib.format.write_array_header_1_0(huge, {"descr": "<i4", "fortran_order": False, "shape": (10**14,)})
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("header.npy", members["header.npy"])
+        archive.writestr("rank_0.npy", huge.getvalue())
+    with pytest.raises(
+        InputError, match=r"rank_0: not an array of a strategy: got 'int32 .100000000000000,.'"
+    ):
+        Strategy.load(path)
+    assert perf_counter() - begun < 60.0
 
 
 def test_too_large_a_game_is_refused_before_it_is_built() -> None:
@@ -232,7 +378,9 @@ def test_assumptions_by_name() -> None:
     assert Assumption.parse(ALL.split(",")) == Assumption()
     assert str(Assumption()) == ALL
     weaker = Assumption.parse(["e1:any-order", "E3:one-forfeit"])
-    assert (weaker.order, weaker.forfeits, weaker.leaves) == (Order.NONE, Forfeits.ONCE, False)
+    assert (weaker.order, weaker.forfeits, weaker.leaves) == (Order.NONE, Forfeits.ONCE, Leaving.NEVER)
+    weaker = Assumption.parse(["E4:unmet", "E5:way-out"])
+    assert (weaker.leaves, weaker.arrives) == (Leaving.UNMET, Arriving.WAY_OUT)
     assert Assumption.parse(weaker.words()) == weaker
     for words in (["E7"], ["E1", "E1:any-order"]):
         with pytest.raises(InputError, match="assume"):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -14,7 +16,9 @@ import pytest
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.files import write_document
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.arena import Arena
@@ -43,17 +47,22 @@ def test_bounds_of_an_ego_on_shortest_routes() -> None:
         (rows, columns, degree): route_bound(board(rows, columns, 1, ALL, degree).arena, Assumption())
         for rows, columns, degree in ((2, 2, 1), (3, 4, 1), (2, 2, 3), (3, 4, 3))
     }
-    assert bounds == {(2, 2, 1): 9, (3, 4, 1): 41, (2, 2, 3): 6, (3, 4, 3): 42}
+    assert bounds == {(2, 2, 1): 9, (3, 4, 1): 41, (2, 2, 3): 5, (3, 4, 3): 42}
     for left_out in ("E1", "E2", "E3", "E4", "E5"):
         parts = [part for part in ALL.split(",") if part != left_out]
         assert route_bound(board(2, 2, 1).arena, Assumption.parse(parts)) == 0
     assert route_bound(board(3, 4, 1, ALL, 4).arena, Assumption()) == 0
+    for weak in ("E1,E2,E3,E4:unmet,E5", "E1,E2,E3,E4,E5:way-out", "E1,E2,E3:forfeits,E4,E5"):
+        assert route_bound(board(3, 4, 1).arena, Assumption.parse(weak.split(","))) == 0
+    once = Assumption.parse(["E1", "E2", "E3:one-forfeit", "E4", "E5"])
+    assert route_bound(board(3, 4, 1).arena, once) == 41
 
 
 def test_a_goal_in_a_dead_end_bears_two() -> None:
     network = pan(1, [0]).arena.network
     dead_end = network.vertex((2, 1))
     assert route_bound(Arena.of(network, [0, dead_end]), Assumption()) == 2
+    assert route_bound(Arena.of(network, [0, dead_end], 3), Assumption()) == 2
     assert route_bound(Arena.of(network, [0, 3]), Assumption()) > 2
 
 
@@ -63,6 +72,8 @@ def test_the_bound_holds_where_games_can_be_solved() -> None:
     for others in (1, 2):
         assert solved_pan(others, [0, 4], "E1,E2,E3,E4,E5").everywhere
     assert not solved_pan(3, [0, 4], "E1,E2,E3,E4,E5").everywhere
+    assert solved(2, 2, 5, "E1,E2,E3,E4,E5", 3).everywhere
+    assert solve(build(pan(2, [0, 4], "E1,E2,E3,E4,E5", 3))).everywhere
 
 
 def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
@@ -180,7 +191,7 @@ def test_the_game_as_a_graph_says_what_its_numbers_mean(tmp_path: Path) -> None:
     with np.load(path, allow_pickle=False) as archive:
         arrays = dict(archive)
     header = json.loads(arrays["header"].tobytes())
-    assert (header["format"], header["version"], header["cars"]) == ("dubins-traffic game", 1, 1)
+    assert (header["format"], header["version"], header["cars"]) == ("dubins-traffic game", 2, 1)
     for position in range(0, len(arrays["ego_cell"]), 37):
         ego: list[int] = []
         others: list[int] = []
@@ -221,6 +232,53 @@ def test_the_command_refuses_what_is_wrong(capsys: pytest.CaptureFixture[str], t
         assert main(["synth", "demo", *arguments]) == 2
         assert message in capsys.readouterr().err
     assert not (tmp_path / "none.npz").exists()
+
+
+def test_targets_are_checked_before_the_game_is_solved(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there, closed = tmp_path / "there.npz", tmp_path / "closed"
+    there.write_bytes(b"old")
+    (tmp_path / "folder.npz").mkdir()
+    closed.mkdir(mode=0o500)
+    for option in ("-o", "--graph"):
+        for name, message in (
+            (there, "exists already; expected a new name, or --overwrite"),
+            (tmp_path / "folder.npz", "a folder; expected a file to write"),
+            (tmp_path / "none" / "own.npz", "none: no such folder"),
+            (there / "own.npz", "there.npz: no such folder"),
+        ):
+            assert main(["synth", "demo", "--cars", "8", option, str(name)]) == 2
+            assert message in capsys.readouterr().err
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path) != closed)
+    assert main(["synth", "demo", "--cars", "8", "-o", str(closed / "own.npz")]) == 2
+    assert "closed: no permission to write" in capsys.readouterr().err
+    assert there.read_bytes() == b"old"
+    assert main(["synth", "demo", "--cars", "1", "-o", str(there), "--overwrite"]) == 0
+    assert Strategy.load(there).board.others == 1
+
+
+def test_wins_that_are_all_vacuous_are_called_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """On one road of three places, each a crossing, three e-agents fill the dead end that the ego is not in."""
+    own = draw(load_config("demo"), 0, 0)
+    network = RoadNetwork(((0, 0, 1, 0), (1, 0, 2, 0)), 3.0, (0.0, 0.0, 0.0), (1, 3))
+    problem = replace(own.problem, network=network, goals=((0, 0), (2, 0)))
+    path = tmp_path / "road.json"
+    write_document(instance_to_document(replace(own, problem=problem)), path)
+    asked = ["synth", str(path), "--order-degree", "1"]
+    for cars, realizable in (("2", True), ("3", "vacuously"), ("4", "vacuously")):
+        assert main([*asked, "--cars", cars, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["realizable"] == realizable, cars
+        assert found["vacuous"] == (found["winning"] if realizable == "vacuously" else 0)
+    assert main([*asked, "--cars", "3", "--assume", "E6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["realizable"] is False
+    assert main([*asked, "--cars", "3", "--explain"]) == 0
+    text = capsys.readouterr().out
+    assert "It wins vacuously: each of these wins rests on an assumption that can't be kept then." in text
+    assert "The ego has no strategy but to keep the e-agents from freeing a goal (E6)." in text
+    assert main([*asked, "--cars", "3", "-o", str(tmp_path / "none.npz")]) == 2
+    assert "wins from nowhere" in capsys.readouterr().err
 
 
 def test_instances_without_goals_are_refused() -> None:

@@ -251,7 +251,7 @@ def test_commands_show_them(command: Command, tmp_path: Path) -> None:
     checked = json.loads(command("check", kept, "--json"))["records"][0]
     assert checked["formulas"] == live["trials"][0]["formulas"]
     assert [one["name"] for one in checked["formulas"]] == list(MINE)
-    assert all(set(one) == {"name", "formula", "verdict", "time"} for one in checked["formulas"])
+    assert all(set(one) == {"name", "formula", "verdict", "time", "early"} for one in checked["formulas"])
     text = command("check", kept)
     for words in ("no crash: ", "never: false since 0.000 s", "goals: presumably "):
         assert words in text
@@ -278,3 +278,41 @@ def test_the_example_of_the_documentation_can_be_judged() -> None:
     made = draw(load_config("town"), 0, 0)
     check_formulas(replace(made.problem, formulas=found), made.names)
     assert len(found) >= 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "<>[0,1e308] still_ego",
+            "expected [a, b] with 0 <= a <= b <= 1e+09, seconds",
+        ),
+        (
+            "[] (still_ego -> <>[1e8,1e9] left_ego)",
+            "begins too late: got 3000000000; expected at most 1000000 ticks",
+        ),
+        ("!" * 5_000 + "still_ego", "nested too deeply"),
+        ("X " * 50_000 + "still_ego", "nested too deeply"),
+        ("(" * 50_000 + "still_ego", "ends too early"),
+        ("still_ego U " * 5_000 + "still_ego", "nested too deeply"),
+        ("(" * 250_000 + "still_ego", "too long"),
+    ],
+    ids=range(7),
+)
+def test_huge_bounds_and_deep_formulas_are_wrong_input(
+    command: Command, tmp_path: Path, text: str, message: str
+) -> None:
+    told = command("run", written(tmp_path, {"mine": text}), status=2)
+    assert "formulas.mine" in told
+    assert message in told
+
+
+def test_parts_that_contradict_each_other_are_false_at_frame_0(command: Command, tmp_path: Path) -> None:
+    large = " && ".join(f"[] (still_ego -> <> cross_ego_{k % 3}_{k // 3})" for k in range(9))
+    formulas = {"early": "[] still_ego && <> !still_ego", "large": large}
+    path = written(tmp_path, formulas, duration=1)
+    (row,) = json.loads(command("run", path, "--controller", "simple", "--json"))["trials"]
+    early, late = row["formulas"]
+    assert (early["verdict"], early["time"], early["early"]) == ("false", 0.0, True)
+    assert late["early"] is False
+    assert "(judged by parts)" in command("run", path, "--controller", "simple")

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import TypeAdapter, ValidationError
 
 from dubins_traffic import files
 from dubins_traffic.errors import InputError
@@ -25,6 +26,7 @@ MOST_HEADER: Final = 64 << 20
 """Most bytes of the JSON in an archive."""
 SPARE: Final = 4096
 """Most bytes that say what an array is like."""
+_OBJECT: Final = TypeAdapter(dict[str, Any])
 DAMAGED: Final = (OSError, ValueError, EOFError, AttributeError, RuntimeError, SyntaxError, zlib.error)
 """What NumPy and zipfile raise for files that are not what they claim."""
 
@@ -99,12 +101,11 @@ class Archive:
         """Return the header, a JSON object; InputError if there is none."""
         text = self.array("header", np.uint8, MOST_HEADER).tobytes()
         try:
-            found = json.loads(text.decode())
-        except (ValueError, RecursionError):
-            found = None
-        if not isinstance(found, dict):
-            raise InputError(f"no {self._what}", field="header", expected=f"the header of a {self._what}")
-        return found
+            return _OBJECT.validate_json(text)
+        except ValidationError:
+            raise InputError(
+                f"no {self._what}", field="header", expected=f"the header of a {self._what}"
+            ) from None
 
     def array(
         self, name: str, kind: type[np.generic], most: int, *, exactly: bool = False

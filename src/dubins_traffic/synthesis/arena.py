@@ -130,9 +130,8 @@ class Arena:
         """
         if len(self.goals) > 1:
             return self.goal_nodes
-        return (
-            *self.goal_nodes,
-            tuple(n for n, node in enumerate(self.nodes) if node.vertex != self.goals[0]),
+        return *self.goal_nodes, tuple(
+            n for n, node in enumerate(self.nodes) if node.vertex not in self.goals
         )
 
     def target_name(self, target: int) -> str:
