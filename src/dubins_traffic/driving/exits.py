@@ -41,7 +41,7 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
 )
 from dubins_traffic.driving.passing import is_barred
-from dubins_traffic.driving.seeing import NARROW
+from dubins_traffic.driving.seeing import SIDE
 from dubins_traffic.driving.turn_arcs import on_way, way_between
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
@@ -183,7 +183,7 @@ def is_shut(
     if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
         return True
     way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
-    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
+    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         dx, dy = row[0] - way.x, row[1] - way.y

@@ -11,6 +11,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.exits import BARRED, cheapest, price_exits, ticks_of
 from dubins_traffic.driving.law_tables import (
+    APPROACHES,
     BACKS_UP,
     CROSSING,
     DEGREE,
@@ -36,7 +37,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP, SIDE, way_to_go
+from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE, way_to_go
 from dubins_traffic.driving.turn_arcs import BEFORE, Way, on_way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
@@ -80,6 +81,10 @@ def mind_gate(
     bits = np.int64(labels.bits[b, n])
     its_turn = count_turn(bits, drivers.way[b, n], ints)
     line = to_line(left, x, y, way, build)
+    behind = n != EGO and is_behind_ego(b, n, x, y, way, state, labels, drivers)
+    if behind and drivers.way[b, n, CROSSING] != 0.0:
+        line -= build[APPROACHES]
+        its_turn = False
     if line >= speed * build[PERIOD]:
         return speed
     v = lane_end(roads, net, ints[LANE])
@@ -140,6 +145,20 @@ def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) 
         return 1
     _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
     return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+
+
+@jit_inline
+def is_behind_ego(
+    b: int, n: int, x: float, y: float, way: Way, state: State, labels: Labels, drivers: Drivers
+) -> bool:
+    """Tell whether the ego is ahead in a car's lane.
+
+    Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
+    again, and then bars the way of who would be first.
+    """
+    if labels.lane[b, EGO] != drivers.ints[b, n, LANE]:
+        return False
+    return way_to_go(way, state.x[b, EGO], state.y[b, EGO]) > way_to_go(way, x, y)
 
 
 @jit_inline
@@ -343,7 +362,7 @@ def before_obstacles(
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         along, aside = lane_coordinates(roads, drivers.net[b], lane, row[0], row[1])
-        wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW + row[7]
+        wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
         if abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]:
             free = min(free, along - row[7] - build[REACH] - QUEUE_GAP)
     return free

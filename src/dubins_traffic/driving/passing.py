@@ -35,7 +35,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP
+from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -294,7 +294,7 @@ def next_narrow(
     from `right` to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
     """
     begin = INFINITE
-    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
+    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
     for p in range(first, last):
         along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
         size = obstacles.part[p, 7]
