@@ -4,8 +4,8 @@
     python -m benchmarks.odd_egos [TRIALS] [JOBS] [FIRST]
 
 Each trial is 120 s. Of two trials one is on a grid, with up to a third of its segments removed, the other on a random
-network of 4 to 24 intersections. One in three has obstacles in and beside the lanes, also just behind intersections. There
-are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is among
+network of 6 to 24 intersections. One in three has obstacles in and beside the lanes, also just behind intersections.
+There are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is among
 them, and one of sixteen has a team `counter`. The kinds of `benchmarks.odd_drivers` take turns. A trial in which the ego
 is not clean does not count.
 """
