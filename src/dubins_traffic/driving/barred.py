@@ -23,6 +23,10 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
 from dubins_traffic.roads.table import RoadTable
 
+LATE = 0.85
+"""An obstacle farther from the intersection than this, in units of R, can be passed on the right by who comes out of
+the disc."""
+
 
 @jit
 def is_barred(
@@ -40,10 +44,11 @@ def is_barred(
         if begin >= length:
             return False
         done = end + 1e-6
-        if begin - build[REACH] - QUEUE_GAP < build[DISC] + build[REACH] + EDGE:
-            return True
-        if low - wide - BESIDE >= EDGE - build[MIDDLE]:
+        own = begin - build[REACH] - QUEUE_GAP
+        if low - wide - BESIDE >= EDGE - build[MIDDLE] and own >= LATE * build[DISC]:
             continue
+        if own < build[DISC] + build[REACH] + EDGE:
+            return True
         own = begin - build[REACH] - SLIP
         back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
         offset += BERTH + wide

@@ -9,6 +9,7 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.barred import is_shut, leads_nowhere
 from dubins_traffic.driving.lane_graph import FAR, aim_for, place_of, spread
 from dubins_traffic.driving.law_tables import (
+    ASIDE,
     BLOCKS,
     FIRST,
     GOAL,
@@ -70,6 +71,7 @@ def take_lane(
     ints[LANE] = lane
     ints[TURN] = 0
     ints[KEPT_OUT] = 0
+    floats[ASIDE] = 0.0
     if ints[KIND] == LOOP:
         following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
         if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:

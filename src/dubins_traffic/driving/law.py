@@ -49,7 +49,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off_right, keep_passing
 from dubins_traffic.driving.room import is_pressed
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
@@ -323,8 +323,11 @@ def pass_what_stands(
     ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
         ints[MOOD] &= ~LEFT_SIDE
+    if who < -1 and part == BEFORE and floats[ASIDE] == 0.0 and offset == 0.0:
+        keep_off_right(b, n, way, state, labels, obstacles, drivers, desk)
     if not outside:
-        floats[ASIDE] = 0.0
+        there = part == BEFORE and floats[ASIDE] < 0.0
+        floats[ASIDE] = offset = floats[ASIDE] if there else 0.0
     elif floats[ASIDE] != 0.0:
         speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)
         offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0

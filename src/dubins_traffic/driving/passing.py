@@ -55,6 +55,8 @@ FOLLOWED = 1.5
 """Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
 OVERTAKEN = 2.0
 """Who comes from behind on the left within this is let past first, metres."""
+TINY = 0.002
+"""Who passes on the right is this far right of its way at least, metres."""
 NARROWS = 1.5
 """What stands so near behind what is passed is passed with it, metres."""
 EDGE = 0.05
@@ -111,16 +113,10 @@ def find_way_past(
     floats = drivers.floats[b, n]
     reach = build[REACH]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, offset, _ = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
     line = stop_line(build)
     until = end + SLIP + 2.0 * build[HALF_LENGTH]
-    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
-    if end >= own and low >= EDGE - build[MIDDLE]:
-        floats[ASIDE] = min(low, -0.002)
-        floats[UNTIL] = until
-        drivers.ints[b, n, WAITED] = 0
-        return
     back = until + BACK
     if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
@@ -164,6 +160,21 @@ def find_way_past(
     floats[ASIDE] = offset
     floats[UNTIL] = until
     drivers.ints[b, n, WAITED] = 0
+
+
+@jit
+def keep_off_right(
+    b: int, n: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
+    desk: Desk,
+) -> None:  # fmt: skip
+    """Begin to pass obstacles ahead on the right, if there is room on the road: nobody can come there."""
+    build = drivers.build[b]
+    own = along(way, state.x[b, n], state.y[b, n])
+    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
+    if end >= own and low >= EDGE - build[MIDDLE]:
+        drivers.floats[b, n, ASIDE] = min(low, -TINY)
+        drivers.floats[b, n, UNTIL] = end + SLIP + 2.0 * build[HALF_LENGTH]
 
 
 @jit
