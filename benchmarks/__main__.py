@@ -5,7 +5,8 @@ two minutes more. Its parts `queries`, `generation` and `peers` are run by thems
 `million`, which takes some minutes.
 
 `motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`: about a minute;
-`ros1`: three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each; `synthesis` solves its
+`ros1`: three; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so does `odd_egos` for its
+2,000; `synthesis` solves its
 games in about two minutes; `campaign` runs 300,000 short trials in as many; `shield` runs 22,000 of a minute
 each, in about a quarter of an hour, and `synthesized` 2,000 of 300 s, in half an hour.
 """
@@ -28,6 +29,7 @@ NAMES = (
     "monitors",
     "lanes",
     "rules",
+    "odd_egos",
     "shield",
     "lcm",
     "ros1",

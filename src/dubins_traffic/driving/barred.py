@@ -110,8 +110,22 @@ def next_narrow(
 
 @jit
 def leads_nowhere(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+    """Tell whether no way on from the end of a lane, nor from the end of the next, is free of what can't be passed."""
+    net = drivers.net[b]
+    row = roads.vert_off[net] + lane_end(roads, net, lane)
+    shut = 0
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        if is_shut(b, lane, out, roads, obstacles, drivers) or ends_there(b, out, roads, obstacles, drivers):
+            shut += 1
+    return shut == roads.degree[row]
+
+
+@jit
+def ends_there(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
     """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
-    row = roads.vert_off[drivers.net[b]] + lane_end(roads, drivers.net[b], lane)
+    net = drivers.net[b]
+    row = roads.vert_off[net] + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
         shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), roads, obstacles, drivers) else 0
