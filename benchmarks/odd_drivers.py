@@ -1,6 +1,7 @@
 """Egos that drive oddly and break nothing: what `benchmarks.odd_egos` puts among cars that keep the rules.
 
-Each drives as the controller `rules` says until its habit takes over, and all under the shield, so that they stay clean.
+Each drives as the controller `rules` says until its habit takes over, and all under the shield, so that they stay
+clean.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ NEAR: Final = 2.5
 
 
 class Odd:
-    """An ego with a habit; the base of all of them drives as `rules` does.
+    """An ego with a habit, which drives as `rules` does till this takes over; the base of all of them.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class Odd:
 
     def habit(self, observation: Observation) -> tuple[float, float]:
         """Return the speed and yaw rate asked for in this tick."""
-        return self.law
+        raise NotImplementedError(f"no habit, at {observation.time} s")
 
     def keep(
         self, observation: Observation, seconds: float, command: tuple[float, float] = (0.0, 0.0)
@@ -289,9 +290,9 @@ class Races(Odd):
                 continue
             speed = car.twist.speed if abs(ahead) < 0.1 else 0.7 if ahead > 0.0 else 0.0
             return (speed, self.law.yaw_rate)
-        if seen.lane >= 0 and observation.tick > self._waits + 30 * self.problem.rate:
-            if self.dice.random() < 0.02:
-                self._waits = observation.tick
+        long_ago = observation.tick > self._waits + 30 * self.problem.rate
+        if seen.lane >= 0 and long_ago and self.dice.random() < 0.02:
+            self._waits = observation.tick
         if observation.tick < self._waits + 15 * self.problem.rate and self._waits >= 0:
             return 0.0, 0.0
         return self.law

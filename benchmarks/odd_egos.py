@@ -4,14 +4,15 @@
     python -m benchmarks.odd_egos [TRIALS] [JOBS] [FIRST]
 
 Each trial is 120 s. Of two trials one is on a grid, with up to a third of its segments removed, the other on a random
-network of 4 to 24 intersections. One in three has obstacles in and beside the lanes, also just behind intersections. There
-are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is among
-them, and one of sixteen has a team `counter`. The kinds of `benchmarks.odd_drivers` take turns. A trial in which the ego
-is not clean does not count.
+network of 6 to 24 intersections. One in three has obstacles in and beside the lanes, also just behind intersections.
+There are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is
+among them, and one of sixteen has a team `counter`. The kinds of `benchmarks.odd_drivers` take turns. A trial in which
+the ego is not clean does not count.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -31,8 +32,6 @@ DURATION = 120.0
 SEED = 2016
 TRIALS = 2000
 NAMES = tuple(kind.__name__.lower() for kind in KINDS)
-BARRED_FROM, BARRED_TO = 0.25, 0.8
-"""Obstacles stand within these shares of a segment: from the edge of one disc to near the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +75,16 @@ def _grid(draws: Draws, small: bool) -> dict[str, Any]:
 
 
 def _obstacles(bare: Instance, draws: Draws) -> list[dict[str, Any]]:
-    """Return discs in and beside lanes, one to one for every four lanes."""
+    """Return discs in and beside lanes and outside intersections, at most two or one for every four lanes."""
     network = bare.problem.network
     found: list[dict[str, Any]] = []
     for _ in range(draws.between(1, max(2, network.lanes // 4))):
         (x0, y0), (x1, y1) = network.lane_line(draws.below(network.lanes), draws.uniform(-0.7, 0.1))
-        share = draws.uniform(BARRED_FROM, BARRED_TO)
+        radius = draws.uniform(0.05, 0.2)
+        least = (bare.problem.intersection_radius + radius) / math.hypot(x1 - x0, y1 - y0)
+        share = draws.uniform(least, 1.0 - least)
         x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-        found.append({"disc": {"x": x, "y": y, "radius": draws.uniform(0.05, 0.2)}})
+        found.append({"disc": {"x": x, "y": y, "radius": radius}})
     return found
 
 

@@ -13,7 +13,6 @@ from dubins_traffic.agents.lawful import drivers_of
 from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.gates import MARGIN
 from dubins_traffic.driving.law import decide
 from dubins_traffic.driving.law_tables import (
     FIRST,
@@ -30,6 +29,7 @@ from dubins_traffic.driving.law_tables import (
     blank,
     desk,
 )
+from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import COUNTER

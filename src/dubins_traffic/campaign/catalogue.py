@@ -14,10 +14,9 @@ from typing import Any, Final
 from pydantic_core import PydanticUndefined
 
 from dubins_traffic.agents.registry import names as agent_names
-from dubins_traffic.agents.tables import KEEP_RULES
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
-from dubins_traffic.problem.kinds import COUNTER, KINDS, REMOTE
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
 from dubins_traffic.simulators.registry import names as simulator_names
 from dubins_traffic.spec.parameters import RuleParameters
 

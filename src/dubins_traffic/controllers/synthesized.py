@@ -13,10 +13,10 @@ from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import told
 from dubins_traffic.driving.exits import BACK
-from dubins_traffic.driving.gates import MARGIN
 from dubins_traffic.driving.guard import Guard
 from dubins_traffic.driving.lane_graph import nearest_stage
 from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
+from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import SHIELD

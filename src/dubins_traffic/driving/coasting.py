@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.driving.gates import GOES_NOW, MARGIN, count_turn, faces_gate, to_line
+from dubins_traffic.driving.gates import GOES_NOW, count_turn, faces_gate, to_line
 from dubins_traffic.driving.kept_ways import kept_way
 from dubins_traffic.driving.late import note
 from dubins_traffic.driving.law_tables import (
@@ -45,6 +45,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.driving.safety import VERGE
 from dubins_traffic.driving.seeing import meets_nobody, way_to_go
 from dubins_traffic.driving.steering import slowed

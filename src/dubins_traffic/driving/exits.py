@@ -6,13 +6,13 @@ from typing import Any
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.barred import is_shut, leads_nowhere
 from dubins_traffic.driving.lane_graph import FAR, aim_for, place_of, spread
 from dubins_traffic.driving.law_tables import (
+    ASIDE,
     BLOCKS,
-    DISC,
     FIRST,
     GOAL,
-    HALF_WIDTH,
     HOLD,
     KEPT_OUT,
     KIND,
@@ -21,7 +21,6 @@ from dubins_traffic.driving.law_tables import (
     LEFT_SIDE,
     LEFTS,
     LOOP,
-    MIDDLE,
     MOOD,
     NEMESIS,
     NEXT,
@@ -33,16 +32,12 @@ from dubins_traffic.driving.law_tables import (
     ROLLING,
     ROLLS,
     ROUND,
-    ROUNDING,
     TAILGATES,
     TAILGATING,
     TURN,
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import is_barred
-from dubins_traffic.driving.seeing import NARROW
-from dubins_traffic.driving.turn_arcs import on_way, way_between
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.roads.lookup import lane_end
@@ -76,6 +71,7 @@ def take_lane(
     ints[LANE] = lane
     ints[TURN] = 0
     ints[KEPT_OUT] = 0
+    floats[ASIDE] = 0.0
     if ints[KIND] == LOOP:
         following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
         if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
@@ -162,36 +158,6 @@ def price_exits(
         ):
             cost += BARRED
         desk.cost[k] = cost
-
-
-@jit
-def leads_nowhere(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
-    """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
-    row = roads.vert_off[drivers.net[b]] + lane_end(roads, drivers.net[b], lane)
-    shut = 0
-    for k in range(roads.degree[row]):
-        shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), roads, obstacles, drivers) else 0
-    return shut == roads.degree[row]
-
-
-@jit
-def is_shut(
-    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
-) -> bool:
-    """Tell whether an obstacle is in the way from a lane to the lane `out`, or can't be passed in that."""
-    net, build = drivers.net[b], drivers.build[b]
-    if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
-        return True
-    way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
-    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
-    for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        dx, dy = row[0] - way.x, row[1] - way.y
-        far = build[DISC] + row[7]
-        _, _, left, _, _ = on_way(way, row[0], row[1])
-        if dx * dx + dy * dy < far * far and abs(left) < wide + row[7]:
-            return True
-    return False
 
 
 @jit

@@ -15,9 +15,10 @@ import numpy as np
 from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.choice import STUCK, find_way_out
 from dubins_traffic.driving.coasting import coast, cruise, drive_on, keeps_to_road, stop_coasting
 from dubins_traffic.driving.exits import count_visit, take_lane, ticks_of, watch_ego
-from dubins_traffic.driving.gates import TRAIL, has_room, mind_gate, turn_elsewhere
+from dubins_traffic.driving.gates import TRAIL, mind_gate
 from dubins_traffic.driving.kept_ways import way_of
 from dubins_traffic.driving.lane_graph import lane_at
 from dubins_traffic.driving.late import catch_up, put_off
@@ -48,7 +49,8 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_passing, watch
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off_right, keep_passing
+from dubins_traffic.driving.room import is_pressed
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
     QUEUE_GAP,
@@ -59,21 +61,17 @@ from dubins_traffic.driving.seeing import (
     wanted_gap,
     way_to_go,
 )
+from dubins_traffic.driving.standing import watch
 from dubins_traffic.driving.steering import move
 from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_lane, on_way
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, STOPPED
 
-STUCK = 2.0
-"""Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
-asked, and on its way to another exit it might leave the disc outside its lane."""
 BUMPER = 0.005
 """Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
-PRESSED = 0.4
-"""Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
 
@@ -254,24 +252,6 @@ def drive(
     commands[b, n, 1] = yaw_rate
 
 
-@jit
-def find_way_out(
-    b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
-) -> None:  # fmt: skip
-    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
-    ints = drivers.ints[b, n]
-    build = drivers.build[b]
-    crossing = drivers.way[b, n, CROSSING] != 0.0
-    if not crossing and (part == BEFORE or ints[WAITED] <= ticks_of(STUCK, build)):
-        return
-    if crossing and tick % 4 != 0:
-        return
-    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
-        return
-    turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-
-
 @jit_inline
 def just_drives(ints: Any, floats: Any) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
@@ -343,46 +323,17 @@ def pass_what_stands(
     ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
         ints[MOOD] &= ~LEFT_SIDE
+    if who < -1 and part == BEFORE and floats[ASIDE] == 0.0 and offset == 0.0:
+        keep_off_right(b, n, way, state, labels, obstacles, drivers, desk)
     if not outside:
-        floats[ASIDE] = 0.0
+        there = part == BEFORE and floats[ASIDE] < 0.0
+        floats[ASIDE] = offset = floats[ASIDE] if there else 0.0
     elif floats[ASIDE] != 0.0:
         speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)
         offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0
     elif (bits & BLOCKED != 0 or who < -1) and waited_long(ints, bits, build):
         find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, desk)
     return speed, offset
-
-
-@jit
-def is_pressed(
-    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
-) -> bool:  # fmt: skip
-    """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
-
-    It, or the cars between, are close behind one another already.
-    """
-    net, build, lane = drivers.net[b], drivers.build[b], drivers.ints[b, n, LANE]
-    v = lane_start(roads, net, lane)
-    if labels.crosses[b, n] >= 0:
-        return False
-    own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
-    far = 2.0 * build[REACH] + PRESSED
-    j = desk.head[lane >> 1]
-    while j >= 0:
-        along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
-        if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
-            far += 2.0 * build[REACH] + QUEUE_GAP
-        j = desk.link[j]
-    row = roads.vert_off[net] + v
-    for k in range(roads.degree[row]):
-        j = desk.head[roads.arms[row, k] >> 1]
-        while j >= 0:
-            dx = state.x[b, j] - state.x[b, n]
-            dy = state.y[b, j] - state.y[b, n]
-            if j != n and labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
-                return True
-            j = desk.link[j]
-    return False
 
 
 @jit_inline

@@ -46,15 +46,16 @@ DEPARTS: seconds from the beginning for which it parks.
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
 DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
-STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME = range(19, 23)
-BUILD = 23
+STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME, APPROACHES = range(19, 24)
+BUILD = 24
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
 crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
 place; least speed in a disc, m/s; how far left of the centre line a body may reach, how far behind and ahead what
 stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, and after
 how long a car that does not move stands, s; how far anybody may back up, and how far from the disc who stands in a lane
-leaves it free (E4), metres; for how long an e-agent may stand with a free way (E5), s.
+leaves it free (E4), metres; for how long an e-agent may stand with a free way (E5), s;
+how near to a crossing a car takes its place in the order, metres.
 """
 
 IN, OUT, CROSSING, LENGTH = range(4)
@@ -199,5 +200,6 @@ def _build_of(problems: Sequence[Problem]) -> Floats:
         np.array([own.turn_back for own in rules]),
         np.array([own.exit_gap for own in rules]),
         np.array([own.rest_time for own in rules]),
+        np.array([own.approach_distance for own in rules]),
     )
     return np.stack([column.astype(np.float64) for column in columns], axis=1)

@@ -10,39 +10,27 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.driving.law_tables import (
     ASIDE,
     BACKS_UP,
-    BEHIND,
     DISC,
     FASTEST,
-    FORE,
     HALF_LENGTH,
     HALF_WIDTH,
     LANE,
     LEFT_TIME,
     MIDDLE,
-    NEEDED,
-    OVER,
-    PERIOD,
     REACH,
     ROUNDING,
     SLOWEST,
-    STAND_TIME,
     TIGHTEST,
     UNTIL,
     WAITED,
-    WATCH_X,
-    WATCH_Y,
-    WATCHED,
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.seeing import NARROW, QUEUE_GAP
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.kernels.trig import advance
-from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
+from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.blocking import narrows
-from dubins_traffic.spec.propositions import APPROACH, BLOCKED, LEFT, OVERTAKING, STANDS, STOPPED
+from dubins_traffic.spec.propositions import BLOCKED, LEFT, OVERTAKING, STANDS
 from dubins_traffic.spec.shape import half_extent
 
 PASSING_WAIT = 2.0
@@ -63,12 +51,12 @@ SPARE = 0.6
 """Metres to spare before a car that comes."""
 SLOW = 0.05
 """A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
-LINE, SURE = 0.002, 0.03
-"""What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
 FOLLOWED = 1.5
 """Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
 OVERTAKEN = 2.0
 """Who comes from behind on the left within this is let past first, metres."""
+TINY = 0.002
+"""Who passes on the right is this far right of its way at least, metres."""
 NARROWS = 1.5
 """What stands so near behind what is passed is passed with it, metres."""
 EDGE = 0.05
@@ -125,16 +113,10 @@ def find_way_past(
     floats = drivers.floats[b, n]
     reach = build[REACH]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, offset, _ = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
     line = stop_line(build)
     until = end + SLIP + 2.0 * build[HALF_LENGTH]
-    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
-    if end >= own and low >= EDGE - build[MIDDLE]:
-        floats[ASIDE] = min(low, -LINE)
-        floats[UNTIL] = until
-        drivers.ints[b, n, WAITED] = 0
-        return
     back = until + BACK
     if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
         return
@@ -171,24 +153,52 @@ def find_way_past(
         j = desk.link[j]
     if room < 0.0:
         return
-    v = lane_end(roads, net, drivers.ints[b, n, LANE])
-    row = roads.vert_off[net] + v
-    if -line - reach - build[DISC] + (line - back) < comes:
-        for k in range(roads.degree[row]):
-            j = desk.head[roads.arms[row, k] >> 1]
-            while j >= 0:
-                dx = state.x[b, j] - way.x
-                dy = state.y[b, j] - way.y
-                if j != n and dx * dx + dy * dy < (comes + 1.0) * (comes + 1.0) and j != who:
-                    inbound = labels.lane[b, j] < 0 or lane_end(roads, net, int(labels.lane[b, j])) == v
-                    if inbound and labels.segment[b, j] != drivers.ints[b, n, LANE] >> 1:
-                        return
-                    if labels.crosses[b, j] == v:
-                        return
-                j = desk.link[j]
+    if -line - reach - build[DISC] + (line - back) < comes and may_come(
+        b, n, who, comes, way, state, labels, roads, drivers, desk
+    ):
+        return
     floats[ASIDE] = offset
     floats[UNTIL] = until
     drivers.ints[b, n, WAITED] = 0
+
+
+@jit
+def keep_off_right(
+    b: int, n: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
+    desk: Desk,
+) -> None:  # fmt: skip
+    """Begin to pass obstacles ahead on the right, if there is room on the road: nobody can come there."""
+    build = drivers.build[b]
+    own = along(way, state.x[b, n], state.y[b, n])
+    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
+    if end >= own and low >= EDGE - build[MIDDLE]:
+        drivers.floats[b, n, ASIDE] = min(low, -TINY)
+        drivers.floats[b, n, UNTIL] = end + SLIP + 2.0 * build[HALF_LENGTH]
+
+
+@jit
+def may_come(
+    b: int, n: int, who: int, comes: float, way: Way, state: State, labels: Labels, roads: RoadTable,
+    drivers: Drivers, desk: Desk,
+) -> bool:  # fmt: skip
+    """Tell whether a car may come out of the next disc, from `comes` metres behind it at most."""
+    net = drivers.net[b]
+    v = lane_end(roads, net, drivers.ints[b, n, LANE])
+    row = roads.vert_off[net] + v
+    for k in range(roads.degree[row]):
+        j = desk.head[roads.arms[row, k] >> 1]
+        while j >= 0:
+            dx = state.x[b, j] - way.x
+            dy = state.y[b, j] - way.y
+            if j != n and dx * dx + dy * dy < (comes + 1.0) * (comes + 1.0) and j != who:
+                inbound = labels.lane[b, j] < 0 or lane_end(roads, net, int(labels.lane[b, j])) == v
+                if inbound and labels.segment[b, j] != drivers.ints[b, n, LANE] >> 1:
+                    return True
+                if labels.crosses[b, j] == v:
+                    return True
+            j = desk.link[j]
+    return False
 
 
 @jit_inline
@@ -238,85 +248,6 @@ def extent(
                 offset = max(offset, left + row[7])
                 low = min(low, left - row[7])
     return end, offset, low
-
-
-@jit
-def is_barred(
-    roads: RoadTable, net: int, lane: int, obstacles: ObstacleTable, first: int, last: int, build: Any
-) -> bool:
-    """Tell whether one of the obstacle parts `first` to `last` - 1 is in the way in a lane and can't be passed there.
-
-    What `find_way_past` asks of cars that stand or come is left out: these go.
-    """
-    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
-    wide = build[HALF_WIDTH] + build[ROUNDING]
-    done = 0.0
-    for _ in range(last - first):
-        begin, end, offset, low = next_narrow(roads, net, lane, done, obstacles, first, last, build)
-        if begin >= length:
-            return False
-        done = end + 1e-6
-        if begin - build[REACH] - QUEUE_GAP < build[DISC] + build[REACH] + EDGE:
-            return True
-        if low - wide - BESIDE >= EDGE - build[MIDDLE]:
-            continue
-        own = begin - build[REACH] - SLIP
-        back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
-        offset += BERTH + wide
-        aside = offset > 3.0 * build[MIDDLE] - EDGE
-        if aside or back > length + stop_line(build) or own < build[DISC] + build[REACH] + EDGE:
-            return True
-        if (back - own) / (0.8 * build[FASTEST]) + TURNING > build[LEFT_TIME]:
-            return True
-        for p in range(first, last):
-            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            far = build[REACH] + obstacles.part[p, 7]
-            beside = abs(left + build[MIDDLE] - offset) < wide + BESIDE + obstacles.part[p, 7]
-            if own - far < along < back + far and left + build[MIDDLE] > 0.0 and beside:
-                return True
-    return False
-
-
-@jit
-def next_narrow(
-    roads: RoadTable,
-    net: int,
-    lane: int,
-    done: float,
-    obstacles: ObstacleTable,
-    first: int,
-    last: int,
-    build: Any,
-) -> tuple[float, float, float, float]:
-    """Return (begin, end, left, right) of the next obstacles in the way in a lane, none of which begins before `done`.
-
-    Obstacles that are too near to one another for a car to return in between are passed as one; they reach
-    from `right` to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
-    """
-    begin = INFINITE
-    wide = build[HALF_WIDTH] + build[ROUNDING] + NARROW
-    for p in range(first, last):
-        along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-        size = obstacles.part[p, 7]
-        if abs(left + build[MIDDLE]) < wide + size and along - size >= done:
-            begin = min(begin, along - size)
-    end = begin
-    offset = -1.0
-    low = INFINITE
-    found = begin != INFINITE
-    while found:
-        found = False
-        for p in range(first, last):
-            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            size = obstacles.part[p, 7]
-            in_way = abs(left + build[MIDDLE]) < wide + size and begin <= along - size <= end + NARROWS
-            if in_way and along + size > end:
-                end = along + size
-                found = True
-            if in_way:
-                offset = max(offset, left + build[MIDDLE] + size)
-                low = min(low, left + build[MIDDLE] - size)
-    return begin, end, offset, low
 
 
 @jit
@@ -393,75 +324,3 @@ def pass_again(
         beside = abs(aside(way, state.x[b, j], state.y[b, j])) < build[MIDDLE] and 0.0 < key - own < length
         if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(build):
             floats[UNTIL] = until
-
-
-@jit
-def stays_right(
-    b: int, n: int, speed: float, yaw_rate: float, way: Way, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
-) -> bool:  # fmt: skip
-    """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
-    build = drivers.build[b]
-    x, y, c, s = advance(
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, build[PERIOD]
-    )
-    half = half_extent(way.tx, way.ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
-    if aside(way, x, y) + half <= build[MIDDLE] + build[OVER] - LINE:
-        return True
-    if labels.bits[b, n] & OVERTAKING == 0:
-        return False
-    own = along(way, x, y)
-    for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        key = along(way, row[0], row[1])
-        there = own - row[7] <= key <= own + row[7] + build[FORE]
-        if there and abs(aside(way, row[0], row[1])) - row[7] < build[MIDDLE]:
-            return True
-    return surely_stands(b, n, own, way, state, labels, drivers, desk)
-
-
-@jit_inline
-def watch(
-    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, desk: Desk
-) -> None:  # fmt: skip
-    """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
-    j = desk.head[lane >> 1]
-    while j >= 0:
-        if j != n and state.x[b, j] == floats[WATCH_X] and state.y[b, j] == floats[WATCH_Y]:
-            ints[WATCHED] += 1
-            return
-        j = desk.link[j]
-    ints[WATCHED] = 0
-    if who >= 0:
-        floats[WATCH_X], floats[WATCH_Y] = state.x[b, who], state.y[b, who]
-
-
-@jit
-def surely_stands(
-    b: int, n: int, own: float, way: Way, state: State, labels: Labels, drivers: Drivers, desk: Desk
-) -> bool:  # fmt: skip
-    """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
-
-    Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
-    crossing; and it may drive off.
-    """
-    build = drivers.build[b]
-    lane = drivers.ints[b, n, LANE]
-    if drivers.ints[b, n, WATCHED] * build[PERIOD] < build[STAND_TIME] + build[PERIOD]:
-        return False
-    watch_x, watch_y = drivers.floats[b, n, WATCH_X], drivers.floats[b, n, WATCH_Y]
-    found = False
-    j = desk.head[lane >> 1]
-    while j >= 0:
-        bits = labels.bits[b, j]
-        if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
-            return False
-        watched = state.x[b, j] == watch_x and state.y[b, j] == watch_y
-        if j != n and bits & STANDS != 0 and watched:
-            key = along(way, float(state.x[b, j]), float(state.y[b, j]))
-            left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - build[MIDDLE]
-            half = half_width(b, j, way, state, build)
-            if own - build[BEHIND] + SURE < key < own + build[FORE] - SURE:
-                found = found or narrows(left - half, left + half, 2.0 * build[MIDDLE], build[NEEDED])
-        j = desk.link[j]
-    return found

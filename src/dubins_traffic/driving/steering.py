@@ -25,8 +25,8 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import stays_right
 from dubins_traffic.driving.safety import NEAR, may_hit, motion_is_safe
+from dubins_traffic.driving.standing import stays_right
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.spec.propositions import LEFT

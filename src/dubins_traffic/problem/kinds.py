@@ -170,7 +170,7 @@ KINDS: Mapping[str, type[Strict]] = {
     REMOTE: Remote,
 }
 """Kinds by name, each with the model of its parameters."""
-KEEP_RULES = frozenset({"lawful", "nemesis"})
+KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis"})
 """Kinds of e-agents that keep the rules of the road."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}

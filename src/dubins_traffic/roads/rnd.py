@@ -230,7 +230,9 @@ def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:
 def _is_deep(value: Any, levels: int = DEEPEST) -> bool:
     """Whether a JSON value has more than so many levels."""
     holds = isinstance(value, dict | list | tuple)
-    items: Iterable[Any] = cast("Any", value).values() if isinstance(value, dict) else value if holds else ()
+    if not holds:
+        return levels < 0
+    items = cast("Iterable[Any]", cast(Any, value).values() if isinstance(value, dict) else value)
     return levels < 0 or any(_is_deep(item, levels - 1) for item in items)
 
 
