@@ -56,18 +56,30 @@ def test_controllers_are_compared_on_the_same_instances(tmp_path: Path, table: b
     assert {(row["factor.duration"], row["duration_s"]) for row in rows} == {(1.0, 1.0), (2.0, 2.0)}
 
 
+def await_group(group: int) -> None:
+    """Wait until the workers of a process that was killed have noticed."""
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+
+
 def test_ten_kills_lose_and_repeat_nothing_that_was_finished(tmp_path: Path, table: bytes) -> None:
     file, out = written(tmp_path, campaign()), tmp_path / "out"
     chance = random.Random(2016)
     finished = 0
     for _ in range(10):
         quiet = subprocess.DEVNULL
-        with subprocess.Popen(command(file, out, "--resume", "--workers", "1"), stderr=quiet) as process:
+        own = command(file, out, "--resume", "--workers", "1")
+        with subprocess.Popen(own, stderr=quiet, start_new_session=True) as process:
             time.sleep(chance.uniform(0.5, 3.5))
             process.kill()
+        await_group(process.pid)
         before, finished = finished, kept(out) if not (out / "results.parquet").exists() else TRIALS
         assert finished >= before
-    time.sleep(1.0)  # for the last worker to notice
     begun = logged(tmp_path)
     assert succeed(file, out, "--resume", "--workers", "2") == table
     assert logged(tmp_path) - begun <= (TRIALS - finished)
