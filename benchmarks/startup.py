@@ -23,7 +23,7 @@ def measure() -> list[Row]:
         _row("dubins-traffic --help", [*COMMAND, "--help"], 0.4),
     ]
     with TemporaryDirectory() as folder:
-        records = ["--records", str(Path(folder) / "records")]
+        records = ["--records", str(Path(folder) / "records"), "--overwrite"]
         fresh = {"NUMBA_CACHE_DIR": folder}
         name = "dubins-traffic run, one trial of 60 s"
         rows.append(_row(f"{name}, first ever (compiles)", ONE_TRIAL + records, 30.0, fresh, turns=1))

@@ -77,7 +77,8 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
     sheets: dict[str, dt.ScoreSheet] = {}
     for controller in controllers:
         name = Path(controller).name.replace(":", "-")
-        plan = dt.plan(configuration, controller, trials=trials, seed=seed, records=output / name)
+        folder = output / name
+        plan = dt.plan(configuration, controller, trials=trials, seed=seed, records=folder, overwrite=True)
         print(
             f"{len(plan.jobs)} trials with {controller} (the first on a machine compile first)",
             file=sys.stderr,

@@ -362,7 +362,7 @@ def test_ctrl_c_keeps_finished_trials(jobs, place):
     out, err = process.communicate(timeout=600)
     assert process.returncode == 1
     kept = json.loads(out)["trials"]
-    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
+    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\nout\ndata.json\n"
     assert 1 <= len(kept) < 200
     assert {trial["end"] for trial in kept} == {"duration"}
     assert len(TrialData.read("data.json").instances) == len(kept)
@@ -381,7 +381,7 @@ def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
     out, err = process.communicate(timeout=600)
     assert process.returncode == 1
     kept = [trial["trial"] for trial in json.loads(out)["trials"]]
-    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\n"
+    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\nout\n"
     assert 2 <= len(kept) < 200
     assert kept == list(range(len(kept)))
 

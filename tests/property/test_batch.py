@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dubins_traffic.campaign.asked import BatchView, ask
-from dubins_traffic.campaign.batch import failed, outcomes, run_batch
+from dubins_traffic.campaign.batch import outcomes, run_batch
+from dubins_traffic.campaign.batch_records import failed
 from dubins_traffic.campaign.group import Group
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation, Pose

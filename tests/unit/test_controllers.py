@@ -148,8 +148,11 @@ def test_a_controller_of_ones_own_is_loaded(folder: Path, place: str) -> None:
         ("fine_controller.py:Halting", "it lacks the method act"),
         ("fine_controller.py:Numb", "it lacks the method start"),
         ("fine_controller.py:Picky", "Picky raised TypeError"),
-        ("fine_controller.py:Angry", "Angry raised RuntimeError: no on construction"),
-        ("broken_controller.py:Mine", "raised ValueError: early while it was loaded"),
+        ("fine_controller.py:Angry", "Angry raised RuntimeError: no (fine_controller.py:"),
+        (
+            "broken_controller.py:Mine",
+            "raised ValueError: early (broken_controller.py:2 in <module>: raise ValueError('early')) while it was",
+        ),
         ("odd_controller.py:Mine", "raised SyntaxError"),
         ("no_such_module:Mine", "no module no_such_module"),
         ("needy_controller:Mine", "needy_controller raised ModuleNotFoundError"),

@@ -229,11 +229,11 @@ def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:
 
 def _is_deep(value: Any, levels: int = DEEPEST) -> bool:
     """Whether a JSON value has more than so many levels."""
-    holds = isinstance(value, dict | list | tuple)
-    if not holds:
+    if isinstance(value, dict):
+        return _is_deep(list(cast("dict[str, Any]", value).values()), levels)
+    if not isinstance(value, list | tuple):
         return levels < 0
-    items = cast("Iterable[Any]", cast(Any, value).values() if isinstance(value, dict) else value)
-    return levels < 0 or any(_is_deep(item, levels - 1) for item in items)
+    return levels < 0 or any(_is_deep(item, levels - 1) for item in cast("list[Any]", value))
 
 
 def write_json(document: Mapping[str, Any]) -> str:
