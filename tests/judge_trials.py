@@ -61,7 +61,7 @@ def compare(number: int) -> Counter[str]:
     assert len(found) == len(set(found)), number
     assert set(found) == expected, (number, sorted(set(found) ^ expected))
     lingering = sum(facts["lingers"] for frame in reference.past for facts in frame)
-    return reference.fired + Counter(breach[0] for breach in found) + Counter(lingers=lingering)
+    return reference.fired + Counter(breach[0] for breach in found) + Counter(lingers=int(lingering))
 
 
 def main(arguments: Sequence[str]) -> None:
