@@ -175,6 +175,22 @@ def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
             assert lanes | {n for n, scene in enumerate(scenes) if scene.inside is not None} == set(cells)
 
 
+@pytest.mark.parametrize(
+    ("some", "excuse"),
+    [
+        (board(2, 2, 2, "E1,E2,E3,E4:unmet,E5,E6", 3), r"e-agent \d is in the same bend"),
+        (pan(2, (0, 4), "E1,E2,E3,E4,E5:way-out", 3), r"e-agent \d is in the way out of \[2, 1\]"),
+        (board(2, 2, 1, "E1,E2,E3,E5,E6"), "E4 is not assumed, so it need not leave"),
+        (board(2, 2, 1, "E1,E2,E3,E4,E6", 3), "E5 is not assumed, so it need not enter"),
+    ],
+)
+def test_the_story_names_who_excuses_a_car_at_a_bend(some: Board, excuse: str) -> None:
+    counter = Counterstrategy(solve(build(some)))
+    lost = np.flatnonzero(~counter.solution.winning)
+    stories = ["\n".join(told(counter, int(position))) for position in lost[:: 1 + len(lost) // 12]]
+    assert any(re.search(excuse, story) for story in stories), stories[0]
+
+
 def test_the_command_answers_in_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "won.npz"
     assert main(["synth", "demo", "--cars", "2", "--order-degree", "1", "--json", "-o", str(path)]) == 0

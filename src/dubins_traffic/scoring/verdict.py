@@ -163,7 +163,6 @@ class Verdict:
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
         return {
-            "edition": EDITION,
             "clean": self.clean,
             "verdict": self.verdict.value,
             "near": self.near,
@@ -176,6 +175,7 @@ class Verdict:
             "gap_limit_s": self.gap_limit_s,
             "formulas": dict(self.formulas),
             "robustness": dict(self.robustness),
+            "edition": EDITION,
         }
 
 

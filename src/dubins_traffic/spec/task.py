@@ -22,7 +22,8 @@ i stands for the name of a car, x and y for a lattice point. All mean what RULES
 ====================================  =============================================================================
 
 Durations are the parameters of the problem. E6 is stated without its horizon, which only says how finite trials are
-judged. A problem without rules has the task of 2016: every goal again and again.
+judged, and without its pause: where the ego itself holds a goal closed for ever, the formula assumes more than RULES.
+A problem without rules has the task of 2016: every goal again and again.
 """
 
 from __future__ import annotations

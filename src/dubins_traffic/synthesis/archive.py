@@ -22,8 +22,10 @@ from pydantic import TypeAdapter, ValidationError
 from dubins_traffic import files
 from dubins_traffic.errors import InputError
 
-MOST_HEADER: Final = 64 << 20
+MOST_HEADER: Final = 16 << 20
 """Most bytes of the JSON in an archive."""
+WIDEST: Final = 8
+"""Most bytes of a number."""
 SPARE: Final = 4096
 """Most bytes that say what an array is like."""
 _OBJECT: Final = TypeAdapter(dict[str, Any])
@@ -134,7 +136,7 @@ class Archive:
             raise InputError(
                 f"no {self._what}", field=name, expected=f"the arrays of a {self._what}"
             ) from None
-        room = most * np.dtype(kind).itemsize + SPARE
+        room = most * WIDEST + SPARE
         if member.file_size > room:
             raise InputError(
                 "too large", field=name, value=f"{member.file_size} bytes", expected=f"at most {room}"
@@ -160,7 +162,7 @@ class Archive:
                     value=f"{dtype} {shape}",
                     expected=f"at most {most} numbers of type {np.dtype(kind)}",
                 )
-            data = stream.read()
+            data = stream.read(shape[0] * dtype.itemsize + 1)
         if len(data) != shape[0] * dtype.itemsize:
             raise ValueError(f"{name}: {len(data)} bytes instead of {shape[0]} numbers")
         return np.frombuffer(data, dtype=dtype)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Arriving, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.queues import EGO
@@ -166,9 +167,13 @@ def _line(board: Board, cycle: Sequence[Moment], car: int) -> str:
 
 
 def _excuse_inside(board: Board, cycle: Sequence[Moment], cell: int) -> str:
-    if not board.assumption.leaves:
+    if board.assumption.leaves is Leaving.NEVER:
         return "E4 is not assumed, so it need not leave"
     exits = board.arena.following(cell)
+    opposite = board.arena.opposite(cell)
+    met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
+    if EGO_CAR in met or (met and board.assumption.leaves is Leaving.UNMET):
+        return f"again and again {_cars(met)} {_is(met)} in the same bend"
     for moment in cycle:
         if all(lane in moment.cells for lane in exits):
             holders = _cars({moment.cells.index(lane) for lane in exits})
@@ -182,15 +187,32 @@ def _excuse_lane(board: Board, cycle: Sequence[Moment], cell: int) -> str:
     crossing = arena.nodes[node].crossing
     if all(cell not in moment.orders.get(node, ()) for moment in cycle):
         return "E5 is not assumed, so it need not come to the end of the lane"
-    if not (board.assumption.enters if crossing else board.assumption.arrives):
+    if not (board.assumption.enters if crossing else board.assumption.arrives is not Arriving.NEVER):
         return f"{'E3' if crossing else 'E5'} is not assumed, so it need not enter {arena.name(node)}"
     inside = {moment.cells.index(node) for moment in cycle if node in moment.cells}
     ahead = {moment.cells.index(other) for moment in cycle for other in _ahead(moment, node, cell)}
     if board.scenery(node).kind.ordered and ahead:
-        return f"again and again {_cars(ahead)} {'is' if len(ahead) == 1 else 'are'} before it in the order"
+        return f"again and again {_cars(ahead)} {_is(ahead)} before it in the order"
     if inside:
-        return f"again and again {_cars(inside)} {'is' if len(inside) == 1 else 'are'} in {arena.name(node)}"
-    return "it gives up its place in the order again and again"
+        return f"again and again {_cars(inside)} {_is(inside)} in {arena.name(node)}"
+    excuse = "" if crossing else _excuse_bend(board, cycle, node)
+    return excuse or "it gives up its place in the order again and again"
+
+
+def _excuse_bend(board: Board, cycle: Sequence[Moment], node: int) -> str:
+    """Return who excuses a car that waits before a bend or dead end, though that is clear; nothing if nobody does."""
+    opposite = board.arena.opposite(node)
+    if any(moment.cells[EGO_CAR] == opposite for moment in cycle):
+        return "again and again the ego is in the bend before it"
+    exits = board.arena.following(node)
+    closing = {moment.cells.index(lane) for moment in cycle for lane in exits if lane in moment.cells}
+    if EGO_CAR in closing or (closing and board.assumption.arrives is Arriving.WAY_OUT):
+        return f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.arena.name(node)}"
+    return ""
+
+
+def _is(cars: set[int]) -> str:
+    return "is" if len(cars) == 1 else "are"
 
 
 def _ahead(moment: Moment, node: int, cell: int) -> tuple[int, ...]:
