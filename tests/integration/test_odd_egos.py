@@ -1,4 +1,4 @@
-"""A sample of `benchmarks.odd_egos`, which shows the bar on 2,000 trials: no odd ego brings a lawful car to a breach."""
+"""A sample of `benchmarks.odd_egos`, whose bar is 2,000 trials: no odd ego brings a lawful car to a breach."""
 
 import pytest
 from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial

@@ -24,7 +24,7 @@ class Stands:
     def start(self, problem: Problem) -> None:
         """Nothing to prepare."""
 
-    def act(self, observation: Observation) -> Command:
+    def act(self, _observation: Observation) -> Command:
         """Stand."""
         return Command(0.0, 0.0)
 
