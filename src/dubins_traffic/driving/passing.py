@@ -128,7 +128,12 @@ def find_way_past(
         return
     if stands_beside(b, own, back, offset, way, obstacles, build):
         return
-    if n != EGO and ego_is_beside(b, own, back, way, state, labels, drivers.ints[b, n, LANE], build):
+    crosses_over = not within_lane(offset, build)
+    if (
+        n != EGO
+        and crosses_over
+        and ego_is_beside(b, own, back, way, state, labels, drivers.ints[b, n, LANE], build)
+    ):
         return
     time = (back - own) / (0.8 * build[FASTEST]) + TURNING
     if time > build[LEFT_TIME]:

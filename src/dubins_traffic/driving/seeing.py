@@ -173,13 +173,18 @@ def look_ahead(
             continue
         far = sqrt(d2)
         if there - part == 2:
-            round_it = way.tx * way.ux + way.ty * way.uy < BACKWARD
-            far = max(far, its_key - key + (HALF_TURN * way.radius if round_it else 0.0))
+            far = max(far, its_key - key + around(way))
         its_gap = far - 2.0 * reach
         if its_gap < gap:
             gap = its_gap
             who = j
     return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, build, floats)
+
+
+@jit_inline
+def around(way: Way) -> float:
+    """Return metres of the arc of a way that turns round, 0 of others."""
+    return HALF_TURN * way.radius if way.tx * way.ux + way.ty * way.uy < BACKWARD else 0.0
 
 
 @jit_inline
@@ -207,7 +212,10 @@ def see_obstacles(
             continue
         if floats[ASIDE] > 0.0 and its_left < floats[ASIDE] - wide - aside:
             continue
-        its_gap = sqrt(d2) - build[REACH] - row[7]
+        distance = sqrt(d2)
+        if there - part == 2:
+            distance = max(distance, its_key - key + around(way))
+        its_gap = distance - build[REACH] - row[7]
         if its_gap < gap:
             gap = its_gap
             who = -2 - p
@@ -239,7 +247,8 @@ def wanted_gap(
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
-    if along < -0.3 and labels.crosses[b, who] < 0:
+    stands_facing = labels.crosses[b, n] >= 0 and abs(state.speed[b, who]) < 0.05
+    if along < -0.3 and labels.crosses[b, who] < 0 and not stands_facing:
         return FACING_GAP if labels.bits[b, n] & LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
     waits = its & EXCUSED != 0 or its & APPROACH != 0
