@@ -135,7 +135,8 @@ def test_town_is_lawful_traffic() -> None:
     town = load_config("town")
     for trial in range(4):
         score = run_trial(draw(town, 1, trial), "rules").score
-        assert (score.verdict is not None) and score.verdict.violations == ()
+        assert score.verdict is not None
+        assert score.verdict.violations == ()
 
 
 def test_wanderers_break_the_assumption() -> None:
