@@ -4,9 +4,10 @@
 
 Each instance is a random network of 6 to 60 intersections (anything from a tree to as many segments as a grid has),
 1 to 4 goals and 1 to 8 e-agents of the kind `wander`. It is run without e-agents for ten free-flow rounds, and with
-them for 120 s. Free flow is that of `dubins_traffic.driving.free_flow`. "Stood while free" is the longest time for
-which the ego stood although, all the while, nobody was within 1.5 m ahead in its lane and, if it was within 2 m of its
-lane's end, nobody's body met the disc of the intersection there (for an ego inside a disc: nobody else met that disc).
+them for 120 s. Free flow is that of `dubins_traffic.driving.free_flow`, turning round at dead ends only. "Stood while
+free" is the longest time for which the ego stood although, all the while, nobody was within 1.5 m ahead in its lane
+and, if it was within 2 m of its lane's end, nobody's body met the disc of the intersection there (for an ego inside a
+disc: nobody else met that disc).
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def instance(number: int, seed: int = 2016) -> Instance:
 def drive(number: int, rounds: int = ROUNDS, seconds: float = DURATION) -> Drive:
     """Run `lanes` on an instance, alone for so many rounds and among others for so many seconds."""
     whole = replace(instance(number), duration=seconds)
-    flow = free_flow(whole)
+    flow = free_flow(whole, turns=False)
     duration = math.ceil(flow.arrivals[0][0] / flow.speed + rounds * flow.round_time)
     problem = replace(whole.problem, e_agents=())
     alone = replace(whole, problem=problem, e_agents=(), starts=whole.starts[:1], duration=float(duration))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -23,54 +24,162 @@ class Judge:
         self.reference = Reference(self.problem, len(script[0]))
         self.cars = range(len(script[0]))
         self.past: list[list[dict[str, Any]]] = []
+        self.fired: Counter[str] = Counter()
         for frame in script:
             self.reference.frame(frame)
             self.past.append([self.note(car) for car in self.reference.cars])
+        for k, frame in enumerate(self.past):
+            for n, facts in enumerate(frame):
+                facts["leaves"], facts["shared"] = self.may_leave(k, n), self.shared(k, n)
+                facts["exit"] = facts["leaves"] and not facts["shared"]
+                facts["way"], facts["stays"] = self.way(k, n), False
+        for n in self.cars:
+            self.note_stays(n)
 
     def note(self, car: Car) -> dict[str, Any]:
         toward = -1 if car.lane is None else self.reference.toward(car.lane)
         return {
             **car.facts, "toward": toward, "ticket": car.ticket, "forfeits": car.forfeits,
-            "exit": car.crosses >= 0 and any(self.free(car, arm) for arm in self.arms(car.crosses)),
-            "way": self.way(car),
+            "spot": car.pose[:2],
+            "progress": 0.0 if car.lane is None else self.reference.s(car),
+            "left_by": self.reference.lateral_range(car.lane, car)[1] if car.lane else 0.0,
         }  # fmt: skip
+
+    def note_stays(self, n: int) -> None:
+        """E4: note the frames in which a car has been in a disc with a free exit for longer than it may."""
+        for v in range(len(self.reference.points)):
+            for run in self.runs(
+                lambda k, v=v: self.past[k][n]["leaves"] and self.past[k][n]["crosses"] == v
+            ):
+                spent = 0
+                for k in run:
+                    spent += k > run.start and not self.past[k][n]["shared"]
+                    self.past[k][n]["stays"] = spent >= self.ticks(self.rules.exit_time)
 
     def arms(self, v: int) -> list[tuple[int, int]]:
         return [(s, ends.index(v)) for s, ends in enumerate(self.reference.ends) if v in ends]
 
-    def free(self, car: Car, arm: tuple[int, int]) -> bool:
-        radius, gap, v = self.problem.intersection_radius, self.rules.exit_gap, car.crosses
+    def since(self, k: int, n: int) -> int:
+        """The first frame of the stay in the disc that the body meets in frame k."""
+        v = self.past[k][n]["crosses"]
+        return next((m + 1 for m in range(k, -1, -1) if self.past[m][n]["crosses"] != v), 0)
 
-        def way_out(who: Car) -> float:
-            s, lateral = self.reference.coordinates(arm, *who.pose[:2])
-            return math.hypot(s - radius, lateral + self.problem.car.w)
+    def came_by(self, k: int, n: int) -> int:
+        """The lane, -1: none, by which it came there."""
+        begun = self.since(k, n)
+        return self.past[begun - 1][n]["lane"] if begun > 0 else -1
 
-        for other in self.reference.cars:
-            if other is car or self.reference.gap(other, v) > gap:
+    def exits(self, v: int, came: int) -> list[tuple[int, int]]:
+        """The lanes out of v for a car that came by the lane `came`: at a bend not the way back."""
+        arms = self.arms(v)
+        bend = len(arms) >= 2 and not self.reference.crossing(v)
+        return [arm for arm in arms if not (bend and came >= 0 and arm[0] == came // 2)]
+
+    def mouth(self, arm: tuple[int, int], spot: tuple[float, float]) -> float:
+        s, lateral = self.reference.coordinates(arm, *spot)
+        return math.hypot(s - self.problem.intersection_radius, lateral + self.problem.car.w)
+
+    def takes(self, k: int, other: int, v: int, arm: tuple[int, int], gap: float) -> bool:
+        """Whether a centre outside the disc of v is in a lane out of it, near the disc."""
+        facts = self.past[k][other]
+        s, lateral = self.reference.coordinates(arm, *facts["spot"])
+        far = math.dist(facts["spot"], self.reference.points[v]) - self.problem.intersection_radius
+        inside = -self.reference.w2 <= lateral <= 0 and s > 0 and facts["segment"] == arm[0]
+        return facts["at"] != v and inside and far <= gap
+
+    def free(self, k: int, n: int, v: int, arm: tuple[int, int]) -> bool:
+        facts = self.past[k]
+        own = self.mouth(arm, facts[n]["spot"])
+        for other in self.cars:
+            if other == n:
                 continue
-            if other.at == v:
-                if way_out(other) < way_out(car):
-                    return False
-                continue
-            reach = self.reference.lateral_range(arm, other)[0]
-            if other.facts["segment"] == arm[0] and reach < -self.rules.left_set:
+            if facts[other]["at"] == v and self.mouth(arm, facts[other]["spot"]) < own:
+                self.fired["nearer"] += 1
                 return False
+            if self.takes(k, other, v, arm, self.rules.exit_gap):
+                return False
+        radius = self.problem.intersection_radius
         for obstacle in self.problem.obstacles:
-            reach = self.reference.obstacle_range(arm, obstacle, radius, radius + gap)
+            reach = self.reference.obstacle_range(arm, obstacle, radius, radius + self.rules.exit_gap)
             if reach is not None and self.reference.narrows(*reach):
+                self.fired["narrow exit"] += 1
                 return False
         return True
 
-    def way(self, car: Car) -> bool:
-        facts = car.facts
-        if car.lane is None or not facts["stands"] or facts["blocked"] or facts["stopped"]:
+    def may_leave(self, k: int, n: int) -> bool:
+        """E4: whether some exit is free of the disc that the body meets."""
+        v = self.past[k][n]["crosses"]
+        if v < 0:
             return False
-        return not any(
-            0 < self.reference.s(other) - self.reference.s(car) <= self.rules.way_distance
-            and (other.facts["stands"] or other.facts["excused"] or other.facts["stopped"])
-            for other in self.reference.cars
-            if other.lane == car.lane
-        )
+        came = self.came_by(k, n)
+        found = any(self.free(k, n, v, arm) for arm in self.exits(v, came))
+        if not found and any(self.free(k, n, v, arm) for arm in self.arms(v)):
+            self.fired["way back"] += 1
+        return found
+
+    def shared(self, k: int, n: int) -> bool:
+        """E4: whether the tick that ends in frame k does not count for a car in a disc."""
+        v = self.past[k][n]["crosses"]
+        if v < 0 or self.past[k][0]["crosses"] != v:
+            return False
+        ego, own = self.since(k, 0), self.since(k, n)
+        if ego == own:
+            self.fired["same tick"] += 1
+            return k - own <= self.ticks(self.rules.shared_time)
+        return ego > own
+
+    def way(self, k: int, n: int) -> bool:
+        """E5: whether a car is in a lane with a free way ahead."""
+        facts = self.past[k][n]
+        if facts["lane"] < 0 or facts["blocked"]:
+            return False
+        if facts["stopped"] and not (facts["first"] and facts["clear"]):
+            return False
+        reach = self.rules.way_distance
+        for other in self.cars:
+            its = self.past[k][other]
+            waits = its["stands"] or its["lingers"] or its["excused"] or its["stopped"]
+            if its["lane"] == facts["lane"] and waits and 0 < its["progress"] - facts["progress"] <= reach:
+                return False
+        lane = divmod(facts["lane"], 2)
+        for obstacle in self.problem.obstacles:
+            side = self.reference.obstacle_range(lane, obstacle, facts["progress"], facts["progress"] + reach)
+            if side is not None and self.reference.narrows(*side):
+                return False
+        v = self.reference.toward(lane)
+        begins = self.reference.line(lane[0])[4] - self.problem.intersection_radius
+        if self.reference.crossing(v) or begins - facts["progress"] > reach:
+            return True
+        return self.may_enter(k, n, v, facts["lane"])
+
+    def may_enter(self, k: int, n: int, v: int, lane: int) -> bool:
+        """E5: whether an exit of a bend or dead end is free, and neither the ego nor one of the same lane is in it."""
+        for other in self.cars:
+            if other == n or self.past[k][other]["crosses"] != v:
+                continue
+            if other == 0:
+                self.fired["ego in the bend"] += 1
+                return False
+            if self.came_by(k, other) == lane:
+                self.fired["one in the bend"] += 1
+                return False
+        found = any(self.free(k, n, v, arm) for arm in self.exits(v, lane))
+        self.fired["full bend"] += not found
+        return found
+
+    def held(self, k: int, v: int) -> bool:
+        """E6: whether the tick that ends in frame k does not count for the goal v."""
+        near = False
+        for n in self.cars:
+            if n == 0 or self.past[k][n]["at"] != v:
+                continue
+            for arm in self.exits(v, self.came_by(k, n)):
+                if self.free(k, n, v, arm):
+                    return False
+                away = self.mouth(arm, self.past[k][0]["spot"])
+                gap = self.rules.goal_gap
+                near = near or away <= gap or self.takes(k, 0, v, arm, gap)
+        return near
 
     def ticks(self, duration: float) -> int:
         return self.reference.ticks(duration)
@@ -127,24 +236,65 @@ class Judge:
         found = self.long(
             "E3.enter", n, rules.enter_time, lambda k: past[k][n]["first"] and past[k][n]["clear"]
         )
-        for wait in self.runs(lambda k: past[k][n]["stopped"]):
-            over = [k for k in wait if past[k][n]["forfeits"] > rules.tickets]
-            found |= {("E3.tickets", n, k, wait.start) for k in over[:1]}
+        found |= self.tickets(n)
         for v in range(len(self.reference.points)):
-            found |= self.long(
-                "E4", n, rules.exit_time, lambda k, v=v: past[k][n]["exit"] and past[k][n]["crosses"] == v
-            )
-        return found | self.long("E5", n, rules.rest_time, lambda k: past[k][n]["way"])
+            found |= self.counted(
+                ("E4", n), rules.exit_time,
+                lambda k, v=v: past[k][n]["leaves"] and past[k][n]["crosses"] == v,
+                lambda k: not past[k][n]["shared"],
+            )  # fmt: skip
+        return found | self.long(
+            "E5", n, rules.rest_time, lambda k: past[k][n]["lingers"] and past[k][n]["way"]
+        )
+
+    def tickets(self, n: int) -> Found:
+        """E3: by waits, which begin with a stop and end where the body meets the disc or with the lane state."""
+        found: Found = set()
+        begun, taken = -1, 0
+        for k in range(len(self.past)):
+            facts, before = self.past[k][n], self.past[k - 1][n] if k else None
+            meets = facts["crosses"] >= 0 and facts["crosses"] == facts["toward"]
+            if begun >= 0 and (meets or facts["lane"] != before["lane"]):
+                begun = -1
+            if not facts["stopped"] or facts["ticket"] != k:
+                continue
+            if begun < 0:
+                begun, taken = k, 0
+                continue
+            taken += 1
+            self.fired["stopped again"] += not before["stopped"]
+            if taken == self.rules.tickets + 1:
+                found.add(("E3.tickets", n, k, begun))
+        return found
+
+    def counted(
+        self,
+        who: tuple[str, int],
+        duration: float,
+        holds: Callable[[int], bool],
+        counts: Callable[[int], bool],
+    ) -> Found:
+        """Return the breach of each run of frames in which `holds` for so many ticks that end where they `count`."""
+        found: Found = set()
+        for run in self.runs(holds):
+            spent = [k for k in run[1:] if counts(k)]
+            wait = self.ticks(duration)
+            if len(spent) < len(run) - 1:
+                self.fired[f"{who[0]} paused"] += 1
+            if wait == 0:
+                found.add((*who, run.start, run.start))
+            elif len(spent) >= wait:
+                found.add((*who, spent[wait - 1], run.start))
+        return found
 
     def goals(self) -> Found:
         found: Found = set()
         for v in set(self.problem.goal_vertices):
             at = [[n for n in self.cars if n and facts[n]["at"] == v] for facts in self.past]
-            for run in self.runs(lambda k, at=at: bool(at[k])):
-                tick = run.start + self.ticks(self.rules.goal_time)
-                if tick in run:
-                    began = {n: max((k for k in range(tick) if n not in at[k]), default=-1) for n in at[tick]}
-                    found.add(
-                        ("E6", min(at[tick], key=lambda n, began=began: (began[n], n)), tick, run.start)
-                    )
+            for _, _, tick, begin in self.counted(
+                ("E6", 0), self.rules.goal_time, lambda k, at=at: bool(at[k]),
+                lambda k, v=v: not self.held(k, v),
+            ):  # fmt: skip
+                began = {n: max((k for k in range(tick) if n not in at[k]), default=-1) for n in at[tick]}
+                found.add(("E6", min(at[tick], key=lambda n, began=began: (began[n], n)), tick, begin))
         return found

@@ -22,6 +22,8 @@ GRID = RoadNetwork.grid(3, 3, 5.0)
 ROADS = {"grid": GRID, "kite": KITE}
 CROSSINGS = {id(GRID): GRID.vertex((1, 1)), id(KITE): KITE.vertex((2, 1))}
 EPS = 1e-6
+EASED = 5e-10
+"""Metres by which a limit may be missed."""
 
 
 def lanes_in(roads: RoadNetwork) -> list[int]:
@@ -87,3 +89,20 @@ def said(breaches: Sequence[Breach]) -> list[tuple[Any, ...]]:
 def hold(*cars: tuple[float, ...], frames: int) -> list[Frame]:
     """Return a script in which nobody moves."""
     return [list(cars) for _ in range(frames)]
+
+
+def away(roads: RoadNetwork) -> tuple[float, ...]:
+    """Return a place in a dead end's or bend's lane where a car is in nobody's way, too short-lived for E5."""
+    return on_lane(roads, lanes_out(roads)[0], 2.0, -0.3)
+
+
+def pair(roads: RoadNetwork, who: int, places: list[tuple[float, ...]]) -> list[Frame]:
+    """Return a script in which one car takes `places` and the other is out of the way."""
+    other = away(roads)
+    return [[place, other] if who == 0 else [other, place] for place in places]
+
+
+def entering(roads: RoadNetwork, stop: int, gap: float = 0.3) -> list[tuple[float, ...]]:
+    """Return a car that stands before the crossing for `stop` frames and is in it two frames later."""
+    lane = lanes_in(roads)[0]
+    return [before(roads, lane, gap)] * stop + [before(roads, lane, EPS), before(roads, lane, -EPS)]

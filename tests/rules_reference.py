@@ -15,6 +15,9 @@ class Car:
 
     number: int
     places: list[tuple[float, float]] = field(default_factory=list)
+    lanes: list[tuple[int, int] | None] = field(default_factory=list)
+    """Lane state at each frame, and `ways`: progress in it."""
+    ways: list[float] = field(default_factory=list)
     pose: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
     lane: tuple[int, int] | None = None
     top: float = 0.0
@@ -23,6 +26,9 @@ class Car:
     approaches: list[int] = field(default_factory=list)
     ticket: int | None = None
     forfeits: int = 0
+    waits: int = 0
+    """How often it has stopped in the present wait; `renewals`: forfeits in it."""
+    renewals: int = 0
     first_clear: list[bool] = field(default_factory=list)
     left: bool = False
     overtaking: bool = False
@@ -44,6 +50,7 @@ class Reference:
             "approach_distance": 0.5, "stop_time": 0.5, "queue_distance": 0.5, "group_time": 0.1,
             "forfeit_time": 3.0, "stand_time": 1.0, "excuse_distance": 1.0, "blocked_ahead": 1.5,
             "blocked_gap": 0.1, "overtaking_behind": 0.8, "overtaking_ahead": 1.5, "still_speed": 0.05,
+            "linger_distance": 0.5, "linger_time": 10.0,
         }  # fmt: skip
         self.rules.update(problem.rules)
         self.cars = [Car(n) for n in range(cars)]
@@ -120,6 +127,8 @@ class Reference:
             self.order(v)
         self.excuse()
         for car in self.cars:
+            car.lanes.append(car.lane)
+            car.ways.append(0.0 if car.lane is None else self.s(car))
             self.stand(car)
         for car in self.cars:
             self.overtake(car)
@@ -163,6 +172,7 @@ class Reference:
             car.breach3 = not (fine and self.toward(lane_before) == car.crosses)
         if car.lane != lane_before:
             car.ticket, car.approaches = None, []
+            car.waits, car.renewals = 0, 0
         car.facts.update(
             segment=nearest, at=car.at, crosses=car.crosses, on_road=offs[nearest] <= self.w2,
             turned=turned, entered=entered, breach3=car.breach3,
@@ -195,6 +205,8 @@ class Reference:
             return
         facts["clear"] = self.clear(car, v)
         gap = self.gap(car, v)
+        if gap < 0:
+            car.waits, car.renewals = 0, 0
         before_me = [
             other for other in self.cars
             if other.lane == car.lane and self.s(other) > self.s(car) and self.gap(other, v) >= 0
@@ -205,7 +217,9 @@ class Reference:
             car.ticket = None
         long = len(car.approaches) > self.ticks(self.rules["stop_time"])
         if car.ticket is None and long and self.still(car, self.rules["stop_time"]):
-            car.ticket, car.forfeits, car.first_clear = self.tick, 0, []
+            car.ticket, car.first_clear = self.tick, []
+            car.waits += 1
+            car.forfeits = car.waits - 1 + car.renewals
         facts["stopped"] = car.ticket is not None
 
     def sequence(self, queue: list[Car]) -> list[Car]:
@@ -235,7 +249,9 @@ class Reference:
         first = self.sequence(queue)[0]
         wait = self.ticks(self.rules["forfeit_time"])
         if clear and len(first.first_clear) >= wait and all(first.first_clear[-wait:]):
-            first.ticket, first.forfeits, first.first_clear = self.tick, first.forfeits + 1, []
+            first.ticket, first.first_clear = self.tick, []
+            first.renewals += 1
+            first.forfeits = first.waits - 1 + first.renewals
         ordered = self.sequence(queue)
         for place, car in enumerate(ordered):
             car.first_clear.append(place == 0 and clear)
@@ -253,7 +269,19 @@ class Reference:
                             car.facts["excused"] = True
 
     def stand(self, car: Car) -> None:
-        car.facts["stands"] = car.facts["still"] and not car.facts["excused"]
+        car.facts["lingers"] = self.lingers(car)
+        car.facts["stands"] = (car.facts["still"] or car.facts["lingers"]) and not car.facts["excused"]
+
+    def lingers(self, car: Car) -> bool:
+        """Whether the greatest progress since the lane state was set is about what it was, from the whole history."""
+        if car.lane is None:
+            return False
+        begun = next((k + 1 for k in range(self.tick, -1, -1) if car.lanes[k] != car.lane), 0)
+        ago = self.tick - self.ticks(self.rules["linger_time"])
+        if ago < begun:
+            return False
+        grown = max(car.ways[begun:]) - max(car.ways[begun : ago + 1])
+        return grown < self.rules["linger_distance"]
 
     def narrows(self, low: float, high: float) -> bool:
         if high <= -self.w2 or low >= 0:

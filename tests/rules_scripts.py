@@ -86,14 +86,19 @@ def on_lane(
     return float(x), float(y), float(sign * tx), float(sign * ty)
 
 
-def wander(network: RoadNetwork, cars: int, frames: int, seed: int, rate: float = 10.0) -> list[Frame]:
-    """Return a script of cars that drive, halt, reverse, overtake, cut corners and leave the road now and then."""
+def wander(
+    network: RoadNetwork, cars: int, frames: int, seed: int, rate: float = 10.0, odd: bool = False
+) -> list[Frame]:
+    """Return a script of cars that drive, halt, reverse, overtake, cut corners and leave the road now and then.
+
+    With `odd` they also swing to and fro, stand in discs and just behind them, and back up before crossings.
+    """
     dice = random.Random(seed)
-    tracks = [_track(network, dice, frames, rate) for _ in range(cars)]
+    tracks = [_track(network, dice, frames, rate, odd) for _ in range(cars)]
     return [[track[k] for track in tracks] for k in range(frames)]
 
 
-def _track(network: RoadNetwork, dice: random.Random, frames: int, rate: float) -> Frame:
+def _track(network: RoadNetwork, dice: random.Random, frames: int, rate: float, odd: bool) -> Frame:
     lane = dice.randrange(2 * len(network.segments))
     length = float(network.lengths[lane // 2])
     lateral = dice.uniform(-0.35, -0.25)
@@ -109,11 +114,19 @@ def _track(network: RoadNetwork, dice: random.Random, frames: int, rate: float) 
         stop = length - 1.177 - dice.choice((0.1, 0.2, 0.3, 0.45, 0.55))
         _drive(track, dice, on_lane(network, lane, stop, -0.3)[:2], rate, False)
         _halt(track, dice.choice((0, 4, 6, 8, 15, 40, 75)))
+        if odd and dice.random() < 0.3:
+            for at in (stop - 0.27, stop):
+                _drive(track, dice, on_lane(network, lane, at, -0.3)[:2], rate, at < stop)
+                _halt(track, dice.choice((1, 7)))
         v = int(network.ends[lane // 2][1 - lane % 2])
         arms = list(network.arms(v))
         following = dice.choice(arms)
+        if odd and dice.random() < 0.5:
+            _dally(track, dice, network, lane, rate)
         if dice.random() < 0.3:
             _drive(track, dice, tuple(network.points[v]), rate, False)
+        if odd and dice.random() < 0.5:
+            _dally(track, dice, network, int(following) ^ 1, rate)
         lane = int(following)
         _drive(track, dice, on_lane(network, lane, 1.1, -0.3)[:2], rate, False)
     return track[:frames]
@@ -131,6 +144,17 @@ def _drive(track: Frame, dice: random.Random, goal: Sequence[float], rate: float
     angle = math.atan2(dy, dx) + tilt
     for k in range(1, steps + 1):
         track.append((x + dx * k / steps, y + dy * k / steps, math.cos(angle), math.sin(angle)))
+
+
+def _dally(track: Frame, dice: random.Random, network: RoadNetwork, lane: int, rate: float) -> None:
+    """Swing or stand about the end of a lane: before the disc there, in it, or with the tail in it."""
+    length = float(network.lengths[lane // 2])
+    middle = length - dice.choice((1.9, 1.5, 1.3, 1.1, 0.9, 0.6, 0.3))
+    swing, lateral = dice.choice((0.0, 0.03, 0.12, 0.25, 0.6)), dice.choice((-0.3, -0.3, 0.3, -0.1))
+    for k in range(dice.choice((1, 3, 8))):
+        at = middle + (swing if k % 2 else -swing)
+        _drive(track, dice, on_lane(network, lane, at, lateral)[:2], rate, k % 2 == 0)
+        _halt(track, dice.choice((0, 2, 6, 20)))
 
 
 def _halt(track: Frame, ticks: int) -> None:

@@ -11,7 +11,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.scoring.verdict import first_fall
 from dubins_traffic.spec.judge import Breach
 from dubins_traffic.spec.logic.automaton import VERDICTS
-from dubins_traffic.spec.logic.formula import Formula, always, eventually, propositions
+from dubins_traffic.spec.logic.formula import TRUE, Formula, always, conj, eventually, propositions
 from dubins_traffic.spec.logic.monitor import Monitors
 from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.spec.task import task
@@ -23,7 +23,7 @@ Key: TypeAlias = tuple[str, int, int]
 _FORMS = {
     r"G !collision_(\w+)": "1.collision",
     r"G \(Y on_road_(\w+) -> on_road_\1\)": "1.road",
-    r"G F (\w+)_t_(\d+)_(\d+)": "1.goal",
+    r"G F visit_(\w+)_(\d+)_(\d+)": "1.goal",
     r"G \(left_(\w+) -> overtaking_\1\)": "2.left",
     r"G \(left_(\w+) -> F\[.*\] !left_\1\)": "2.return",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y stopped_\1_\2_\3\)": "3.stop",
@@ -34,7 +34,8 @@ _FORMS = {
     r"G \(first_(\w+)_(\d+)_(\d+) & clear_\1_\2_\3 -> F\[.*\] !\(first_\1_\2_\3 & clear_\1_\2_\3\)\)": "E3.enter",
     r"G !renewed_(\w+)": "E3.tickets",
     r"G \(exit_(\w+) -> F\[.*\] !exit_\1\)": "E4",
-    r"G \(stands_(\w+) & way_\1 -> F\[.*\] !\(stands_\1 & way_\1\)\)": "E5",
+    r"G !stays_(\w+)": "E4",
+    r"G \(lingers_(\w+) & way_\1 -> F\[.*\] !\(lingers_\1 & way_\1\)\)": "E5",
     r"G F free(_)(\d+)_(\d+)": "E6",
 }
 """The forms of the task's formulas, and the rules that they say."""
@@ -42,7 +43,10 @@ _PLACED = ("1.goal", "3.stop", "3.order", "3.clear", "E3.enter", "E6")
 
 
 def stated(instance: Instance) -> dict[Key, Formula]:
-    """Return the formulas of the task by what they say, E6 with its horizon, which the task leaves out."""
+    """Return the formulas of the task by what they say, E6 with its horizon, which the task leaves out.
+
+    Of E6 that is all only where all time counts, as with a `goal_gap` of 0.
+    """
     spec = task(instance.problem, instance.names)
     found: dict[Key, Formula] = {}
     for formula in (*spec.assumptions, *spec.guarantees):
@@ -54,8 +58,8 @@ def stated(instance: Instance) -> dict[Key, Formula]:
         name, *point = match.groups()
         vertex = instance.problem.network.vertex((int(point[0]), int(point[1]))) if point else NONE
         car = NONE if rule == "E6" else instance.names.index(name)
-        assert (rule, car, vertex) not in found
-        found[rule, car, vertex] = formula
+        assert rule == "E4" or (rule, car, vertex) not in found
+        found[rule, car, vertex] = conj(found.get((rule, car, vertex), TRUE), formula)
         if rule == "E6":
             horizon = RuleParameters.from_mapping(instance.problem.rules).goal_time
             found[rule, car, vertex] = always(eventually(formula.args[0].args[0], (0.0, horizon)))

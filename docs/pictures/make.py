@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from bends import free_bend
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from stage import (
@@ -291,7 +292,7 @@ def free_exit() -> Figure:
 
 
 def free_way() -> Figure:
-    """Draw a car that stands with a free way, and ones that a queue excuses."""
+    """Draw a car that lingers with a free way, and ones that a queue excuses."""
     figure, (upper, lower) = column(STAR, (-6.0, -1.15, 1.7, 1.15), (-6.0, -1.15, 1.7, 1.15))
     for panel in (upper, lower):
         panel.disc()
@@ -303,7 +304,7 @@ def free_way() -> Figure:
     upper.note(-5.2, 0.12, "ego", bold=True)
     upper.note(stuck.x, 0.12, "A", bold=True)
     upper.note(-3.6, 0.85, "nothing stands before A, and it holds no ticket")
-    upper.title("E5: A stands there for 60 s", "bad")
+    upper.title("E5: A lingers there for 60 s", "bad")
     front = inward(180, 0.08)
     line = [pose(front.x - 0.62 * n, LOW, 0) for n in range(3)]
     lower.cars(pose(-5.2, LOW, 0), *line, names=False)
@@ -373,6 +374,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "3-clear": clear,
     "E3-first-enters": first_enters,
     "E4-free-exit": free_exit,
+    "E4-bend": free_bend,
     "E5-free-way": free_way,
     "E6-free-goal": free_goal,
     "verdicts": verdicts,

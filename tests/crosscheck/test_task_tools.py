@@ -214,7 +214,7 @@ def test_slugs_of_a_town_keeps_the_grammar(spec: Spec, town: Instance) -> None:
     sections = slugs_sections(spec(town, "--format", "slugs"))
     goals = list(dict.fromkeys(town.problem.goals))
     assert sections["ENV_LIVENESS"] == [f"free_{x}_{y}" for x, y in goals]
-    assert sections["SYS_LIVENESS"] == [f"ego_t_{x}_{y}" for x, y in goals]
+    assert sections["SYS_LIVENESS"] == [f"visit_ego_{x}_{y}" for x, y in goals]
     bounded = [
         formula
         for formula in (*whole.assumptions, *whole.guarantees)

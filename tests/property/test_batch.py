@@ -33,6 +33,13 @@ OWN_NETWORKS = {"random": {"intersections": 8, "segments": 10}}
 GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
 
 
+HURRY = {
+    "linger_time": 0.5, "rest_time": 0.2, "exit_time": 4.0, "goal_time": 1.0, "shared_time": 0.3, "forfeit_time": 0.5,
+    "enter_time": 0.4, "stand_time": 0.2, "stop_time": 0.2,
+}  # fmt: skip
+"""Rules that are soon broken: E3 to E6 too."""
+
+
 def configuration(**more: Any) -> Configuration:
     document = {
         "version": 1,
@@ -65,8 +72,9 @@ def plain(found: Score) -> Mapping[str, Any]:
         {"rules": False, "end_on_collision": True},
         {"disturbances": {"command_delay": 2, "command_loss": 0.2, "position_noise": 0.01}},
         {"obstacles": [{"disc": {"x": 4.0, "y": 0.3, "radius": 0.2}}]},
+        {"rules": HURRY, "network": OWN_NETWORKS},
     ],
-    ids=["judged", "to-collision", "disturbed", "obstacle"],
+    ids=["judged", "to-collision", "disturbed", "obstacle", "hurried"],
 )
 def test_a_batch_equals_its_trials_one_by_one(controller, more) -> None:
     config = configuration(**more)
@@ -166,6 +174,37 @@ def test_a_vectorised_controller_gets_all_trials_at_once_and_those_that_end_are_
     assert np.isnan(view.state.x[~view.seen]).all()
     assert (view.labels.lane[~view.seen] == -1).all()
     assert np.isfinite(view.state.x[view.seen]).all()
+
+
+class Swing:
+    """Swings over the edge of a disc for some time, drives to the next one and back, and swings again."""
+
+    def start(self, problem: Problem) -> None: ...
+
+    def act(self, observation: Observation) -> Command:
+        part = observation.tick % 300
+        if part < 120:
+            return Command(-0.7 if part // 20 % 2 == 0 else 0.7, 0.0)
+        return Command(0.7, 0.0) if part < 195 else Command(-0.7, 0.0) if part < 270 else Command(0.0, 0.0)
+
+    def close(self) -> None: ...
+
+
+def test_visits_are_counted_alike_of_who_swings_over_the_edge_of_a_disc() -> None:
+    """It comes into the disc six times, and after three of them it has been in another one."""
+    config = configuration(
+        **{
+            "duration_bounds": [20, 20],
+            "goals": [[0, 0]],
+            "ego": {"start": [1.2, -0.3, 0.0]},
+            "e-agents": [],
+        },
+        network={"grid": {"rows": 2, "columns": 2, "length": 3.0}},
+    )
+    (found,) = run_batch(config, Swing, trials=1, seed=SEED).outcomes
+    single = run_trial(draw(config, SEED, 0), Swing())
+    assert plain(found.score) == plain(single.score)
+    assert single.score.goals[0].visits == single.score.rounds == 2
 
 
 class Broken(Wheel):

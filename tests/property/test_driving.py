@@ -16,6 +16,7 @@ from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.lanes import Lanes
 from dubins_traffic.driving.free_flow import free_flow
+from dubins_traffic.driving.rounds import round_time
 from dubins_traffic.driving.safety import motion_is_safe
 from dubins_traffic.driving.tours import LaneGraph, Round, find_round
 from dubins_traffic.driving.turns import IMPOSSIBLE, VISIT, Site, along, shape
@@ -140,10 +141,14 @@ def test_free_flow_of_a_grid() -> None:
     network = RoadNetwork.grid(3, 4)
     whole = Instance(problem(network, (0,), Car()), (Pose(1.0, -0.3, 1.0, 0.0),), 60.0, (), 1, 0)
     flow = free_flow(whole)
-    assert flow.round_length == pytest.approx(12.0)
-    assert flow.arrivals[0] == pytest.approx((17.0, 0))
-    assert flow.round_time == pytest.approx(12.0 / 0.7)
-    assert [flow.rounds(t) for t in (24.2, 24.3, 41.4, 41.5)] == [0, 1, 1, 2]
+    assert flow.arrivals == ((pytest.approx(11.0), 0),)
+    assert flow.round_time == pytest.approx(6.0 / 0.7), "to the nearest other disc and back"
+    assert [flow.rounds(t) for t in (15.7, 15.8, 24.2, 24.3)] == [0, 1, 1, 2]
+    loop = free_flow(whole, turns=False)
+    assert loop.arrivals[0] == pytest.approx((17.0, 0))
+    assert loop.round_time == pytest.approx(12.0 / 0.7)
+    assert [loop.rounds(t) for t in (24.2, 24.3, 41.4, 41.5)] == [0, 1, 1, 2]
+    assert round_time(whole.problem) == flow.round_time
 
 
 @PLAIN

@@ -20,6 +20,7 @@ from dubins_traffic.spec.docket import RULES
 from dubins_traffic.spec.judge import Breach, Referee
 from dubins_traffic.spec.labeller import Labeller
 from tests.judge_reference import Judge
+from tests.judge_trials import CLAUSES, compare
 from tests.judging import case, frames_of, judged, said
 from tests.rules_scripts import KITE, STAR, TURNED_STAR, fill, moved, on_lane, wander
 
@@ -46,6 +47,12 @@ def test_the_referee_agrees_with_the_reference(roads: RoadNetwork, body: Car) ->
         assert len(found) == len(set(found))
         expected = Judge(instance, script).breaches()
         assert set(found) == expected, (seed, sorted(set(found) ^ expected))
+
+
+def test_random_trials_with_odd_cars_are_judged_alike_and_every_clause_speaks() -> None:
+    """`python -m tests.judge_trials 500` compares as many as wanted."""
+    seen = sum((compare(number) for number in range(60)), Counter[str]())
+    assert set(seen) >= CLAUSES
 
 
 def test_the_scripts_break_every_rule() -> None:

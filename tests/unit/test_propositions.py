@@ -121,6 +121,52 @@ def test_still_needs_the_whole_time_and_little_way(roads: RoadNetwork) -> None:
 
 
 @both
+def test_who_has_not_come_half_a_metre_farther_in_ten_seconds_lingers(roads: RoadNetwork) -> None:
+    def seen(way: float, frames: int, back: float = 0.0) -> list[bool]:
+        script = [
+            [on_lane(roads, WEST, 1.3 + way * min(k, 100) / 100 - (back if k % 2 else 0.0), -0.3)]
+            for k in range(frames)
+        ]
+        return ["lingers" in found for found in flags(label([instance(roads, 1)], [script]), 0)]
+
+    assert seen(0.0, 102) == [False] * 100 + [True] * 2
+    for back in (0.0, 0.25):
+        assert seen(0.5 - EPS, 101, back)[-1]
+        assert not seen(0.5 + EPS, 101, back)[-1]
+        assert seen(0.5 + EPS, 103, back)[-1]
+
+
+@both
+def test_lingering_begins_anew_with_the_lane_state(roads: RoadNetwork) -> None:
+    """In a disc nobody lingers; and who turns round begins anew, though it makes no way."""
+    script = [[on_lane(roads, WEST, 2.0 - (0.31 if k >= 60 else 0.0), -0.3)] for k in range(170)]
+    assert [
+        k for k, found in enumerate(flags(label([instance(roads, 1)], [script]), 0)) if "lingers" in found
+    ] == [*range(160, 170)]
+    inside = [[on_lane(roads, WEST, 0.5, -0.3)] for _ in range(120)]
+    assert not any("lingers" in found for found in flags(label([instance(roads, 1)], [inside]), 0))
+
+
+@both
+def test_who_lingers_stands_unless_it_waits_in_a_queue(roads: RoadNetwork) -> None:
+    """It swings by 0.1 m, so that it is never still; what swings blocks who is behind it."""
+    swings = [on_lane(roads, WEST, 2.0 - 0.1 * (k % 4 < 2), -0.3) for k in range(120)]
+    behind = [on_lane(roads, WEST, 1.2, -0.3)] * 120
+    found = label([instance(roads, 2)], [[list(cars) for cars in zip(swings, behind, strict=True)]])
+    assert [{"stands", "lingers"} <= own for own in flags(found, 0)] == [k >= 100 for k in range(120)]
+    assert ["blocked" in own for own in flags(found, 1)] == [k >= 100 for k in range(120)]
+
+
+@both
+def test_a_new_stop_in_one_wait_is_a_new_ticket(roads: RoadNetwork) -> None:
+    for between, forfeited in ((0.52, True), (-0.02, False)):
+        gaps = [0.25] * 8 + [between] * 4 + [0.25] * 8
+        script = [[on_lane(roads, WEST, lateral_stop(gap), -0.3)] for gap in gaps]
+        last = flags(label([instance(roads, 1)], [script]), 0)[-1]
+        assert ("forfeited" in last, "stopped" in last) == (forfeited, True)
+
+
+@both
 def test_approach_is_within_half_a_metre_and_foremost(roads: RoadNetwork) -> None:
     near, beyond = (on_lane(roads, WEST, lateral_stop(0.5 + step), -0.3) for step in (-EPS, EPS))
     behind = on_lane(roads, SOUTH, lateral_stop(0.4), -0.3)

@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import InputError, RecordError
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.record.header import decode, encode
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.spec.labels import words
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.spec.parameters import EDITION, RuleParameters
 from dubins_traffic.spec.propositions import NAMES, names
 from dubins_traffic.spec.tables import ticks
 
@@ -39,6 +43,11 @@ def test_a_mapping_changes_what_it_names() -> None:
         ({"turn_back": True}, "turn_back"),
         ({"crossing_degree": 3.0}, "crossing_degree"),
         ({"left_release": 0.1}, "left_release"),
+        ({"edition": 1}, "edition"),
+        ({"edition": 3}, "edition"),
+        ({"edition": 2.0}, "edition"),
+        ({"edition": True}, "edition"),
+        ({"edition": EDITION, "turnback": 0.3}, "turnback"),
     ],
 )
 def test_bad_parameters_are_refused_by_name(rules: dict[str, Any], field: str) -> None:
@@ -55,6 +64,26 @@ def test_bad_parameters_are_refused_by_name(rules: dict[str, Any], field: str) -
 )  # fmt: skip
 def test_a_duration_is_so_many_ticks(duration: float, rate: float, expected: int) -> None:
     assert ticks(duration, rate) == expected
+
+
+def test_a_problem_names_the_edition_of_its_rules() -> None:
+    assert (EDITION, RuleParameters().to_mapping()["edition"]) == (2, 2)
+    document = {**load_config("town").to_document(), "rules": True}
+    instance = draw(load_config(document), 0, 0)
+    assert instance.problem.rules["edition"] == EDITION
+    written = instance_to_document(instance)
+    assert written["rules"]["edition"] == EDITION
+    assert instance_from_document(written).problem.rules == instance.problem.rules
+    for named in (1, 3):
+        with pytest.raises(InputError, match="another edition of the rules of the road") as caught:
+            instance_from_document({**written, "rules": {**written["rules"], "edition": named}})
+        assert (caught.value.field, caught.value.value) == ("rules.edition", named)
+        with pytest.raises(InputError, match="another edition"):
+            load_config({**document, "rules": {"edition": named}})
+        header = encode(instance, "rules").replace(b'"edition":2', b'"edition":%d' % named)
+        with pytest.raises(RecordError, match=r"instance\.rules\.edition: another edition"):
+            decode(header)
+    assert decode(encode(instance, "rules")).instance.problem.rules["edition"] == EDITION
 
 
 def test_flags_are_distinct_and_named() -> None:

@@ -16,9 +16,9 @@ from dubins_traffic.scoring.driving import Driven, Driving
 from dubins_traffic.scoring.goals import GoalVisits, Visiting, Visits
 from dubins_traffic.scoring.score import Scorer, ScoreSheet
 from dubins_traffic.spec.propositions import LEFT, ON_ROAD, STILL
-from tests.recordings import feed, make_frames, make_instance
+from tests.recordings import blocks, feed, make_frames, make_instance
 
-A, B, ROAD = (0.2, 0.1), (6.0, 3.5), (1.5, 0.0)
+A, B, C, ROAD = (0.2, 0.1), (6.0, 3.5), (3.0, 0.1), (1.5, 0.0)
 
 
 def visits(path: list[tuple[float, float]], **settings: object) -> Visits:
@@ -29,11 +29,27 @@ def visits(path: list[tuple[float, float]], **settings: object) -> Visits:
 
 
 def test_a_visit_is_an_entry_and_a_start_inside_counts() -> None:
-    path = [A] * 31 + [ROAD] * 30 + [A] * 30 + [B] * 60 + [ROAD] * 30
+    path = [A] * 31 + [C] * 30 + [A] * 30 + [B] * 60 + [ROAD] * 30
     found = visits(path)
     assert found == Visits(
         (GoalVisits((0, 0), 2, (180 - 61) / 30.0), GoalVisits((2, 1), 1, 91 / 30.0)), 1.0, 1
     )
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_between_two_visits_of_a_goal_is_another_disc(size: int) -> None:
+    """Swinging over the edge of a disc is no visit; one goal counts as another disc for another."""
+    instance = make_instance(goals=[(0, 0), (2, 1)])
+    path = [A, ROAD, A, ROAD, C, ROAD, ROAD, A, ROAD, A, B, ROAD, B, A]
+    frames = make_frames(instance, path)
+    metric = Visiting()
+    metric.begin(instance)
+    for block in blocks(frames, size):
+        metric.frames(block)
+    rate = instance.problem.rate
+    assert metric.result().goals[0] == GoalVisits((0, 0), 3, 7 / rate)
+    assert metric.result().goals[1].visits == 1
+    assert (metric.result().rounds, metric.now) == (1, [True, False])
 
 
 def test_entries_while_inside_at_the_block_border_are_not_counted_again() -> None:
@@ -48,7 +64,8 @@ def test_a_goal_never_visited_has_the_whole_trial_as_its_gap() -> None:
 
 
 def test_rounds_by_visits() -> None:
-    assert visits([A, ROAD, A, ROAD, A], goals=[(0, 0)]).rounds == 3
+    assert visits([A, ROAD, A, ROAD, A], goals=[(0, 0)]).rounds == 1
+    assert visits([A, C, A, ROAD, C, A], goals=[(0, 0)]).rounds == 3
     assert visits([A] * 5, goals=[(0, 0)]).rounds == 1
     assert visits([A, B, A, B, B, A]).rounds == 2
     assert visits([A, B], goals=[(0, 0), (2, 1), (0, 0)]).rounds == 1

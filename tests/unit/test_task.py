@@ -83,7 +83,7 @@ def test_a_goal_drawn_twice_is_one() -> None:
 def test_the_rules_of_the_ego() -> None:
     spec = of(case(GRID, 1, [(2, 2)], left_time=7.5, crossing_degree=4))
     wanted = """
-        [] !collision_ego && [] (Y on_road_ego -> on_road_ego) && []<> ego_t_2_2
+        [] !collision_ego && [] (Y on_road_ego -> on_road_ego) && []<> visit_ego_2_2
         && [] (left_ego -> overtaking_ego) && [] (left_ego -> <>[0,7.5] !left_ego)
         && [] (enter_ego_1_1 -> Y stopped_ego_1_1) && [] (enter_ego_1_1 -> Y !ahead_ego_1_1)
         && [] (enter_ego_1_1 -> Y clear_ego_1_1)
@@ -102,8 +102,8 @@ def test_the_assumption() -> None:
         && [] !at_fault_agent0
         && [] ((first_agent0_1_1 && clear_agent0_1_1) -> <>[0,10] !(first_agent0_1_1 && clear_agent0_1_1))
         && [] !renewed_agent0
-        && [] (exit_agent0 -> <>[0,5] !exit_agent0)
-        && [] ((stands_agent0 && way_agent0) -> <>[0,60] !(stands_agent0 && way_agent0))
+        && [] (exit_agent0 -> <>[0,5] !exit_agent0) && [] !stays_agent0
+        && [] ((lingers_agent0 && way_agent0) -> <>[0,60] !(lingers_agent0 && way_agent0))
         && []<> free_0_0
     """
     assert conj(*spec.assumptions) is parse(wanted)
@@ -117,8 +117,8 @@ def test_the_assumption() -> None:
         (1, ("left_", "enter_")),
         (2, ("at_fault_",)),
         (3, ("first_", "renewed_")),
-        (4, ("exit_",)),
-        (5, ("stands_",)),
+        (4, ("exit_", "stays_")),
+        (5, ("lingers_",)),
         (6, ("free_",)),
     ],
 )

@@ -161,12 +161,11 @@ def visits(
     roads: RoadNetwork = STAR,
     **rules: float,
 ) -> Verdict:
-    """Return the verdict when the ego is in a dead end at some frames, and before it at others."""
+    """Return the verdict when the ego is in a dead end at some frames, and in the last one's disc at others."""
     lane = dead_end(roads)
-    length = float(roads.lengths[lane // 2])
-    inside = on_lane(roads, lane, length - 0.8, -0.3)
-    left = [-0.3 if not visit or k < visit[0] else 0.3 for k in range(frames)]
-    script = [[inside if k in visit else on_lane(roads, lane, length - 1.1, left[k])] for k in range(frames)]
+    inside = on_lane(roads, lane, float(roads.lengths[lane // 2]) - 0.8, -0.3)
+    elsewhere = (*roads.points[-1].tolist(), 1.0, 0.0)
+    script = [[inside if k in visit else elsewhere] for k in range(frames)]
     return verdict(case(roads, 1, goals, **rules), script)
 
 
@@ -195,13 +194,15 @@ def test_formulas_have_four_values() -> None:
     name = f"1.goal {goal[0]} {goal[1]}"
     assert visits(50, visit=[10], goals=[goal]).formulas[name] == "presumably false"
     assert visits(50, visit=[10, 49], goals=[goal]).formulas[name] == "presumably true"
+    assert visits(50, visit=[10], goals=[goal]).to_json()["edition"] == 2
+    assert visits(50, visit=[10, 48, 49], goals=[goal]).formulas[name] == "presumably false"
     late = duel(GRID, 39, 39).formulas
     assert (late["2.left"], late["2.return"], late["3.stop"]) == (
         "false",
         "presumably false",
         "presumably true",
     )
-    early = duel(GRID, 20, -1).formulas
+    early = duel(GRID, 20, -1, linger_time=1.0).formulas
     assert (early["2.left"], early["2.return"]) == ("false", "presumably true")
     assert early["E1"] == "presumably true"
     assert early["E5"] == "presumably false"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.state import Pose
-from dubins_traffic.driving.tours import LaneGraph, free_round, lane_graph
+from dubins_traffic.driving.tours import LaneGraph, find_round, free_round, lane_graph
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -61,18 +61,22 @@ class FreeFlow:
         return 0 if beyond < 0.0 else 1 + int(beyond / self.round_length)
 
 
-def free_flow(instance: Instance) -> FreeFlow:
-    """Return the free flow of an instance."""
+def free_flow(instance: Instance, *, turns: bool = True) -> FreeFlow:
+    """Return the free flow of an instance.
+
+    Without `turns` it turns round at dead ends only for a single goal too, as some drivers do: the round is then the
+    shortest closed route through it.
+    """
     problem = instance.problem
     graph = lane_graph(problem.network)
-    tour = free_round(graph, problem.goal_vertices)
+    tour = (free_round if turns else find_round)(graph, problem.goal_vertices)
     speed = problem.car.bounds.speed
     if tour is None:
         return FreeFlow(speed, inf, ())
     goals = set(problem.goal_vertices)
     lane, to_go = _start_lane(problem, instance.starts[0], graph)
     best, place = inf, 0
-    if len(goals) == 1:
+    if turns and len(goals) == 1:
         best, place = min(graph.distances(into)[lane] for into in graph.into[min(goals)]), tour.arrivals[0]
     else:
         for k in dict.fromkeys(tour.arrivals[:8]):

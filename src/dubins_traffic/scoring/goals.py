@@ -101,9 +101,14 @@ class Visiting:
         if not len(frames):
             return
         inside = self._discs.inside(frames)
-        entered = inside & ~np.vstack([self._inside, inside[:-1]])
+        entered = self._visits_among(inside & ~np.vstack([self._inside, inside[:-1]]), frames)
         self._inside = inside[-1]
         self._end = frames.first + len(frames) - 1
+        self._rounds.add(entered)
+        self._last_frame = frames.first + len(frames) - 1
+
+    def _visits_among(self, entered: Mask, frames: Frames) -> Mask:
+        """Count the visits of each goal, and return which of the entries of its disc, (F, goals), they are."""
         at = self._discs.at(frames)
         for goal, vertex in enumerate(self._discs.vertices):
             elsewhere = frames.first + np.flatnonzero((at >= 0) & (at != vertex))
@@ -111,8 +116,7 @@ class Visiting:
                 entered[row, goal] = self._visit(goal, frames.first + row, elsewhere)
             if len(elsewhere):
                 self._elsewhere[goal] = elsewhere[-1]
-        self._rounds.add(entered)
-        self._last_frame = frames.first + len(frames) - 1
+        return entered
 
     def _visit(self, goal: int, tick: int, elsewhere: Ints) -> bool:
         """Count the entry of a goal's disc in frame `tick`, if it is a visit; return whether it is.

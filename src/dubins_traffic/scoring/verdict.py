@@ -141,7 +141,6 @@ class Verdict:
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as a JSON object."""
         return {
-            "edition": EDITION,
             "verdict": self.verdict.value,
             "clean": self.clean,
             "excuse": None if self.excuse is None else self.excuse.to_json(),
@@ -152,6 +151,7 @@ class Verdict:
             "gap_limit_s": self.gap_limit_s,
             "formulas": dict(self.formulas),
             "robustness": dict(self.robustness),
+            "edition": EDITION,
         }
 
 

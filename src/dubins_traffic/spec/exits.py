@@ -33,15 +33,15 @@ def way_back(b: int, v: int, came: int, t: RoadTable, rules: RuleTable) -> int:
 
 @jit_inline
 def stands_in_exit(
-    b: int, k: int, lane: int, along: float, lateral: float, away2: float, rules: RuleTable, terms: Terms,
+    b: int, k: int, lane: int, along: float, lateral: float, away2: float, far2: float, rules: RuleTable,
     labels: Labels,
 ) -> bool:  # fmt: skip
     """Tell whether the centre of car k, at (along, lateral) of the lane `lane` out of a disc, is in it and near by.
 
-    `away2` is its squared distance from the intersection; it is outside the disc.
+    It is outside the disc, and `away2` is its squared distance from the intersection: near by is up to `far2`.
     """
     inside = -rules.real[b, LANE_WIDTH] - GRAIN <= lateral <= GRAIN
-    return inside and along > 0.0 and labels.segment[b, k] == lane // 2 and away2 <= terms.real[b, EXIT2]
+    return inside and along > 0.0 and labels.segment[b, k] == lane // 2 and away2 <= far2
 
 
 @jit_inline
@@ -89,7 +89,9 @@ def find_exit(
                 own_way = to_mouth(b, own, own_lateral, rules, terms)
                 in_the_way = to_mouth(b, along, lateral, rules, terms) < own_way + GRAIN
             else:
-                in_the_way = stands_in_exit(b, k, lane, along, lateral, away2, rules, terms, labels)
+                in_the_way = stands_in_exit(
+                    b, k, lane, along, lateral, away2, terms.real[b, EXIT2], rules, labels
+                )
             if in_the_way:
                 taken |= 1 << arm
     for arm in range(t.degree[row]):
@@ -155,19 +157,20 @@ def ego_at_exit(
 ) -> bool:
     """E6: tell whether the ego is near an exit of v, of which that on segment `back` is none.
 
-    It is near if its centre is near to where the lane leaves the disc, or takes the lane as E4 says.
+    It is near if its centre is near to where the lane leaves the disc, or in the lane and near the disc.
     """
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v
     x, y = state.x[b, EGO], state.y[b, EGO]
     dx, dy = x - t.vert[row, 0], y - t.vert[row, 1]
+    far = rules.real[b, RADIUS] + terms.real[b, GOAL_GAP]
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
         if lane // 2 == back:
             continue
         along, lateral = lane_coordinates(t, net, lane, x, y)
         takes = labels.at[b, EGO] != v and stands_in_exit(
-            b, EGO, lane, along, lateral, dx * dx + dy * dy, rules, terms, labels
+            b, EGO, lane, along, lateral, dx * dx + dy * dy, far * far, rules, labels
         )
         if takes or to_mouth(b, along, lateral, rules, terms) <= terms.real[b, GOAL_GAP]:
             return True

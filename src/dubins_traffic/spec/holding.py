@@ -112,13 +112,14 @@ def place(n: int) -> int:
 def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
     """Note where the cars of trial b are; find who holds on to its labels where no roads fork, and who was still.
 
-    Of those who hold on it is found who lingers, too.
+    Of those who hold on it is found who lingers, too, and their greatest progress is kept.
     """
     _bring(b, tick, state, rules, memory)
     real = rules.real[b]
     back = real[TURN_BACK]
     still2 = real[STAND_MOVE2] if tick >= rules.whole[b, STAND_TICKS] else -1.0
-    grown, now = real[LINGER_GROWTH], float(tick)
+    least, now = real[LINGER_GROWTH], float(tick)
+    growth = memory.growth[b, growth_row(b, tick, rules)]
     calm = memory.calm[b]
     for first in range(0, state.count[b], BLOCK):
         begin = first * CALM
@@ -148,31 +149,31 @@ def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Me
             calm[k + BLOCK * WAY_SO_FAR] = progress
             top = max(top, progress)
             calm[k + BLOCK * TOP_SO_FAR] = top
-            little = (now >= calm[k + BLOCK * LINGERS_FROM]) & (top - calm[k + BLOCK * TOP_THEN] < grown)
+            then = growth[first + k - begin]
+            growth[first + k - begin] = top
+            calm[k + BLOCK * TOP_THEN] = then
+            little = (now >= calm[k + BLOCK * LINGERS_FROM]) & (top - then < least)
             calm[k + BLOCK * WAS_LINGERING] = 1.0 if little else 0.0
             sure = (abs(x - calm[k + BLOCK * FORK_X]) < half) & (abs(y - calm[k + BLOCK * FORK_Y]) < half)
             holds = 1.0 if sure else IF_NEAREST
             calm[k + BLOCK * HOLDS] = holds if inside else 0.0
             calm[k + BLOCK * WAS_STILL] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
-    _keep_growth(b, tick, rules, memory)
 
 
 @jit_inline
 def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
-    """Put where the cars are, and where they and their greatest progress were some time ago, beside what is kept."""
+    """Put where the cars are, and where they were `stand_time` ago, beside what is kept of them."""
     depth, places = memory.trail.shape[1], memory.trail.shape[3]
     now = tick % depth
     then = (now + depth - rules.whole[b, STAND_TICKS]) % depth
     memory.head[b, 0, NOW] = now
     calm = memory.calm[b]
     x, y, present, past = state.x[b], state.y[b], memory.trail[b, now], memory.trail[b, then]
-    grown = memory.growth[b, growth_row(b, tick, rules)]
     if places % TOGETHER == 0:
         for n in range(0, places, TOGETHER):
             k = place(n)
             _copy(past[0], n, calm, k + BLOCK * THEN_X)
             _copy(past[1], n, calm, k + BLOCK * THEN_Y)
-            _copy(grown, n, calm, k + BLOCK * TOP_THEN)
             _copy(x, n, calm, k + BLOCK * HERE_X)
             _copy(y, n, calm, k + BLOCK * HERE_Y)
             _copy(x, n, present[0], n)
@@ -182,7 +183,6 @@ def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) ->
         k = place(n)
         calm[k + BLOCK * THEN_X] = past[0, n]
         calm[k + BLOCK * THEN_Y] = past[1, n]
-        calm[k + BLOCK * TOP_THEN] = grown[n]
         calm[k + BLOCK * HERE_X] = present[0, n] = x[n]
         calm[k + BLOCK * HERE_Y] = present[1, n] = y[n]
 
@@ -191,19 +191,6 @@ def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) ->
 def growth_row(b: int, tick: int, rules: RuleTable) -> int:
     """Return the row of `Memory.growth` that holds what was `linger_time` ago, until it holds what is now."""
     return tick % max(rules.whole[b, LINGER_TICKS], 1)
-
-
-@jit_inline
-def _keep_growth(b: int, tick: int, rules: RuleTable, memory: Memory) -> None:
-    """Keep the greatest progress of all cars in `Memory.growth`; `note_growth` mends it for those who don't hold on."""
-    calm, grown = memory.calm[b], memory.growth[b, growth_row(b, tick, rules)]
-    places = grown.shape[0]
-    if places % TOGETHER == 0:
-        for n in range(0, places, TOGETHER):
-            _copy(calm, place(n) + BLOCK * TOP_SO_FAR, grown, n)
-        return
-    for n in range(places):
-        grown[n] = calm[place(n) + BLOCK * TOP_SO_FAR]
 
 
 @jit_inline

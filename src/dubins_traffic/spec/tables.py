@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
-from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
+from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
 
 if TYPE_CHECKING:
     from dubins_traffic.spec.parameters import RuleParameters
@@ -141,8 +141,9 @@ class Memory(NamedTuple):
         (`TOP_THEN`), the tick from which on that says whether the car lingers (`LINGERS_FROM`), and whether it does.
     trail : (B, M, 2, N) float64
         Positions at the last M ticks, tick k in row k mod M.
-    growth : (B, L, N) float64
-        `TOP` at the last ticks, as many as `linger_time` has in the trial: tick k in row k mod that number.
+    growth : (B, L, P) float64
+        `TOP` of the cars, in P places, a multiple of WIDE, at the last ticks, as many as `linger_time` has in the
+        trial: tick k in row k mod that number.
     link : (B, N, LINKS) int64
         The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
         are to be looked at in this frame, in order (`DUE`). All but the lists of the lanes is scratch.
@@ -176,7 +177,7 @@ class Memory(NamedTuple):
             np.zeros((trials, cars, PATCH)),
             np.zeros((trials, -(-cars // BLOCK) * BLOCK * CALM)),
             np.zeros((trials, depth, 2, cars)),
-            np.zeros((trials, linger, cars)),
+            np.zeros((trials, linger, -(-cars // WIDE) * WIDE)),
             np.full((trials, cars, LINKS), -1, dtype=np.int64),
             head,
         )

@@ -1,0 +1,338 @@
+"""What e-agents owe, E3 to E6, from both sides of its tolerances, on a grid and on a turned network that is none."""
+
+from __future__ import annotations
+
+import pytest
+
+from dubins_traffic.roads.network import RoadNetwork
+from tests.judging import (
+    EASED,
+    EPS,
+    RHO,
+    ROADS,
+    after,
+    away,
+    before,
+    case,
+    entering,
+    hold,
+    judged,
+    lanes_in,
+    lanes_out,
+    pair,
+    said,
+)
+from tests.rules_scripts import STAR, on_lane
+
+both = pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)
+anybody = pytest.mark.parametrize("who", [0, 1], ids=["ego", "agent"])
+
+
+# E3
+
+
+@both
+@anybody
+def test_e3_who_is_first_goes_before_his_second_new_ticket(roads: RoadNetwork, who: int) -> None:
+    """Stopped at 5, new tickets at 35 and at 65."""
+    waits = before(roads, lanes_in(roads)[0], 0.3)
+
+    def found(frames: int) -> list[tuple[object, ...]]:
+        script = pair(roads, who, [waits] * frames)
+        return [entry for entry in said(judged(case(roads, 2, exit_time=600.0), script)) if entry[0] != "E5"]
+
+    expected = [("E3.tickets", 1, 65, 5), ("E3.enter", 1, 105, 5)] if who == 1 else []
+    assert found(65) == []
+    assert found(66) == expected[:1]
+    assert found(140) == expected
+
+
+@both
+def test_e3_backing_out_and_stopping_again_is_no_new_wait(roads: RoadNetwork) -> None:
+    """A car stops at 5, backs out of the approach at 8, stops at 17, and at 29, before which it has entered or not."""
+    lane = lanes_in(roads)[0]
+    near, far, inside = (before(roads, lane, gap) for gap in (0.3, 0.55, -0.1))
+
+    def found(between: tuple[float, ...], **rules: float) -> list[tuple[object, ...]]:
+        places = [near] * 8 + [far] * 4 + [near] * 8 + [between] * 4 + [near] * 8
+        found = said(judged(case(roads, 2, exit_time=99.0, **rules), pair(roads, 1, places)))
+        return [entry for entry in found if entry[0] == "E3.tickets"]
+
+    assert found(far) == [("E3.tickets", 1, 29, 5)]
+    assert found(far, tickets=2) == []
+    assert found(inside) == []
+
+
+@both
+def test_e3_who_is_first_goes_within_ten_seconds(roads: RoadNetwork) -> None:
+    def found(frames: int, **rules: float) -> list[tuple[object, ...]]:
+        script = [[away(roads), place] for place in entering(roads, frames)]
+        return said(judged(case(roads, 2, tickets=9, **rules), script))
+
+    assert found(104) == []
+    assert found(105) == [("E3.enter", 1, 105, 5)]
+    assert found(24, enter_time=2.0) == []
+    assert found(25, enter_time=2.0) == [("E3.enter", 1, 25, 5)]
+
+
+@both
+def test_e3_waits_for_a_clear_crossing(roads: RoadNetwork) -> None:
+    waits, inside = before(roads, lanes_in(roads)[0], 0.3), after(roads, lanes_out(roads)[1], -0.5)
+    rules = {"tickets": 9, "enter_time": 2.0}
+    assert said(judged(case(roads, 2, **rules), hold(inside, waits, frames=60))) == []
+    script = [[inside if k < 20 else after(roads, lanes_out(roads)[1], 0.5), waits] for k in range(60)]
+    assert said(judged(case(roads, 2, **rules), script)) == [("E3.enter", 1, 40, 20)]
+
+
+# E4
+
+
+@both
+@anybody
+def test_e4_a_disc_with_a_free_exit_is_left_in_time(roads: RoadNetwork, who: int) -> None:
+    out = lanes_out(roads)[1]
+
+    def found(frames: int) -> list[tuple[object, ...]]:
+        places = [after(roads, out, -EPS)] * frames + [after(roads, out, EPS)]
+        return said(judged(case(roads, 2), pair(roads, who, places)))
+
+    assert found(50) == []
+    assert found(51) == ([("E4", 1, 50, 0)] if who == 1 else [])
+
+
+@both
+def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> None:
+    inside = on_lane(roads, lanes_out(roads)[0], 0.1, -0.1)
+
+    def found(gap: float, lateral: float = -0.3) -> list[tuple[object, ...]]:
+        others = [after(roads, lane, 0.4) for lane in lanes_out(roads)]
+        others[1] = after(roads, lanes_out(roads)[1], gap - RHO, lateral)
+        script = hold(others[0], inside, *others[1:], frames=31)
+        return [
+            entry
+            for entry in said(judged(case(roads, len(others) + 1, exit_time=3.0), script))
+            if entry[0] != "2.left"
+        ]
+
+    late = [("E4", 1, 30, 0)]
+    for grain, expected in ((0.0, []), (EPS, late)):
+        assert found(0.8 - EPS) == []
+        assert found(0.8 + EASED + grain) == expected
+        assert found(0.5, EASED + grain) == expected
+        assert found(0.5, -0.6 - EASED - grain) == expected
+
+
+@both
+def test_e4_seconds_do_not_count_in_which_the_ego_has_come_into_the_disc(roads: RoadNetwork) -> None:
+    """The ego, that came later, is there from frame 20 to 40, or later again, or from the same frame on."""
+    out, enters = lanes_out(roads)[1], lanes_in(roads)[0]
+    inside, away_, there = after(roads, out, -EPS), before(roads, enters, 0.3), before(roads, enters, -0.3)
+
+    def found(ego: range, agent: int = 0, **rules: float) -> list[tuple[object, ...]]:
+        waits = before(roads, lanes_in(roads)[1], 0.8)
+        script = [[there if k in ego else away_, inside if k >= agent else waits] for k in range(120)]
+        return [entry for entry in said(judged(case(roads, 2, **rules), script)) if entry[0] == "E4"]
+
+    assert found(range(0)) == [("E4", 1, 50, 0)]
+    assert found(range(20, 40)) == [("E4", 1, 70, 0)]
+    assert found(range(20, 120)) == []
+    assert found(range(10), agent=20) == [("E4", 1, 70, 20)]
+    assert found(range(15, 120), agent=20) == [("E4", 1, 70, 20)]
+    assert found(range(20, 120), agent=20) == []
+    assert found(range(20, 120), agent=20, shared_time=3.0) == [("E4", 1, 100, 20)]
+    assert found(range(20, 30), agent=20) == [("E4", 1, 79, 20)]
+
+
+@both
+def test_e4_the_way_back_is_no_exit_of_a_bend(roads: RoadNetwork) -> None:
+    """A car stands behind the bend's disc; the agent came by the other segment, or began in the disc."""
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    back, out = roads.arms(v)
+    came, inside = before(roads, back ^ 1, 0.3), before(roads, back ^ 1, -0.3)
+    parked = after(roads, out, 0.4)
+
+    def found(*places: tuple[float, ...], last: tuple[float, ...] = parked) -> list[tuple[object, ...]]:
+        script = [[away(roads), place, last] for place in (*places, *[inside] * 60)]
+        return [entry for entry in said(judged(case(roads, 3), script)) if entry[0] == "E4" and entry[1] == 1]
+
+    assert found(came) == []
+    assert found() == [("E4", 1, 50, 0)]
+    assert found(came, last=after(roads, out, 0.8)) == [("E4", 1, 51, 1)]
+    assert found(came, last=after(roads, out, 0.4, 0.3)) == [("E4", 1, 51, 1)]
+
+
+def test_e4_in_a_dead_end_who_is_nearer_to_the_way_out_leaves_first() -> None:
+    out = STAR.arms(STAR.vertex((0, 1)))[0]
+    deep, near = on_lane(STAR, out, 0.1, -0.3), on_lane(STAR, out, 0.6, -0.3)
+    far = on_lane(STAR, lanes_star(), 2.0, -0.3)
+    assert said(judged(case(STAR, 3, rest_time=600.0), hold(far, deep, near, frames=51))) == [
+        ("E4", 2, 50, 0)
+    ]
+    assert said(judged(case(STAR, 2), hold(near, deep, frames=51))) == []
+
+
+def lanes_star() -> int:
+    return STAR.arms(STAR.vertex((2, 1)))[0]
+
+
+def test_e4_from_disc_to_disc_the_time_begins_anew() -> None:
+    roads = RoadNetwork(((0, 0, 1, 0),), 3.0, (0.0, 0.0, 0.0), (1, 2))
+    places = [on_lane(roads, 0, 0.5, -0.3)] * 30 + [on_lane(roads, 0, 2.5, -0.3)] * 30
+    assert said(judged(case(roads, 2), [[on_lane(roads, 1, 1.5, -0.3), place] for place in places])) == []
+
+
+# E5
+
+
+@both
+@anybody
+def test_e5_nobody_lingers_for_long_with_a_free_way(roads: RoadNetwork, who: int) -> None:
+    """Lingers at 100, when ten seconds have passed."""
+    place = on_lane(roads, lanes_out(roads)[1], 2.2, -0.3)
+    other = on_lane(roads, lanes_out(roads)[2], 2.2, -0.3)
+
+    def found(frames: int, **rules: float) -> list[tuple[object, ...]]:
+        length = float(roads.lengths[lanes_out(roads)[2] // 2])
+        creeps = [
+            on_lane(roads, lanes_out(roads)[2], 1.3 + k / 800 * (length - 3.2), -0.3) for k in range(frames)
+        ]
+        script = [[place, creep] if who == 0 else [other, place] for creep in creeps]
+        return said(judged(case(roads, 2, linger_distance=0.01, **rules), script))
+
+    expected = [("E5", 1, 700, 100)] if who == 1 else []
+    assert found(700) == []
+    assert found(701) == expected
+    assert found(130, rest_time=3.0) == []
+    assert found(131, rest_time=3.0) == ([("E5", 1, 130, 100)] if who == 1 else [])
+
+
+@both
+@pytest.mark.parametrize(("way", "rules"), [(0.5 - EPS, ["E5"]), (0.5 + EPS, [])])
+def test_e5_who_swings_to_and_fro_lingers(roads: RoadNetwork, way: float, rules: list[str]) -> None:
+    """It swings by 0.25 m, and comes so far in ten seconds."""
+    lane = lanes_out(roads)[1]
+    places = [on_lane(roads, lane, 1.6 + way * k / 100 - 0.25 * (k % 2), -0.3) for k in range(150)]
+    found = said(judged(case(roads, 2, rest_time=3.0), pair(roads, 1, places)))
+    assert [entry[0] for entry in found if entry[1] == 1] == rules
+
+
+@both
+def test_e5_the_way_is_free_beyond_a_metre_and_a_half(roads: RoadNetwork) -> None:
+    lane = lanes_in(roads)[0]
+
+    def found(ahead: float) -> list[tuple[object, ...]]:
+        script = hold(on_lane(roads, lane, 1.2 + ahead, -0.3), on_lane(roads, lane, 1.2, -0.3), frames=131)
+        return said(judged(case(roads, 2, rest_time=3.0), script))
+
+    assert found(1.5 - EPS) == []
+    assert found(1.5 + EASED) == []
+    assert found(1.5 + EPS) == [("E5", 1, 130, 100)]
+
+
+@both
+def test_e5_a_bend_is_no_free_way_that_is_full_or_has_the_ego_in_it(roads: RoadNetwork) -> None:
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+    waits = before(roads, one ^ 1, 0.4)
+    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+
+    def found(ego: tuple[float, ...], other: tuple[float, ...], **more: float) -> list[tuple[object, ...]]:
+        script = hold(ego, waits, other, frames=22)
+        found = said(judged(case(roads, 3, **{**rules, **more}), script))
+        return [entry for entry in found if entry[:2] == ("E5", 1)]
+
+    late = [("E5", 1, 20, 10)]
+    far, beyond = away(roads), after(roads, two, 1.0)
+    assert found(far, beyond) == late
+    assert found(far, after(roads, two, 0.3)) == []
+    assert found(far, after(roads, two, 0.3, 0.3)) == late
+    assert found(after(roads, two, -EPS), beyond) == []
+    assert found(after(roads, two, -EPS), beyond, way_distance=0.3) == late
+    assert found(far, after(roads, two, -EPS, 0.3)) == late
+
+
+@both
+def test_e5_one_of_the_same_lane_in_the_bend_has_to_leave_it_first(roads: RoadNetwork) -> None:
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+    waits = before(roads, one ^ 1, 0.9)
+    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+
+    def found(came: int) -> list[tuple[object, ...]]:
+        inside = after(roads, two, -EPS, 0.3)
+        script = [[away(roads), waits, place] for place in (before(roads, came ^ 1, 0.1), *[inside] * 22)]
+        found = said(judged(case(roads, 3, **rules), script))
+        return [entry for entry in found if entry[:2] == ("E5", 1)]
+
+    assert found(one) == []
+    assert found(two) == [("E5", 1, 20, 10)]
+
+
+@both
+def test_e5_a_queue_is_no_free_way(roads: RoadNetwork) -> None:
+    lane = lanes_in(roads)[0]
+    length = float(roads.lengths[lane // 2])
+    waits = on_lane(roads, lane, length - 1.6, -0.3)
+    behind = on_lane(roads, lane, length - 2.9, -0.3)
+    inside = after(roads, lanes_out(roads)[1], -0.5)
+    script = [[inside, waits, behind] for _ in range(80)]
+    assert said(judged(case(roads, 3, rest_time=3.0), script)) == []
+
+
+# E6
+
+
+@both
+@anybody
+def test_e6_a_goal_is_free_again_in_time(roads: RoadNetwork, who: int) -> None:
+    v = roads.lane_ends(lanes_out(roads)[1])[1]
+    goal, lane = roads.intersections[v], lanes_out(roads)[1]
+    length = float(roads.lengths[lane // 2])
+    inside, outside = (on_lane(roads, lane, length - 1.0 + step, 0.0) for step in (EPS, -EPS))
+
+    def found(frames: int, **rules: float) -> list[tuple[object, ...]]:
+        script = pair(roads, who, [outside, *[inside] * frames, outside])
+        found = said(judged(case(roads, 2, [goal], exit_time=999.0, rest_time=999.0, **rules), script))
+        return [entry for entry in found if entry[0] == "E6"]
+
+    assert found(600) == []
+    assert found(601) == ([("E6", 1, 601, 1)] if who == 1 else [])
+    assert found(30, goal_time=3.0) == []
+    assert found(70, goal_time=3.0) == ([("E6", 1, 31, 1)] if who == 1 else [])
+
+
+@both
+def test_e6_time_does_not_count_in_which_the_ego_is_at_the_last_exit(roads: RoadNetwork) -> None:
+    """A dead end, or a bend one of whose exits is the way by which the agent came."""
+    v = next((v for v, degree in enumerate(roads.degrees) if degree == 1), None)
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2) if v is None else v
+    out, back = roads.arms(v)[0], roads.arms(v)[-1]
+    inside, came = on_lane(roads, out, 0.2, 0.0), before(roads, back ^ 1, 0.1)
+
+    def found(gap: float, stays: int, **rules: float) -> list[tuple[object, ...]]:
+        ego = after(roads, out, gap - RHO)
+        script = [[ego if 10 <= k < 10 + stays else away(roads), inside if k else came] for k in range(90)]
+        problem = case(roads, 2, [roads.intersections[v]], goal_time=3.0, exit_time=99.0, **rules)
+        return [entry for entry in said(judged(problem, script)) if entry[0] == "E6"]
+
+    assert found(0.8 - EPS, 0) == [("E6", 1, 31, 1)]
+    assert found(0.8 - EPS, 15) == [("E6", 1, 46, 1)]
+    assert found(0.8 - EPS, 80) == []
+    assert found(0.8 + EASED, 15) == [("E6", 1, 46, 1)]
+    assert found(0.8 + 2 * EPS, 15) == [("E6", 1, 31, 1)]
+    assert found(0.8 - EPS, 15, goal_gap=0.3) == [("E6", 1, 31, 1)]
+
+
+def test_e6_names_who_has_been_there_longest_of_those_who_relieve_each_other() -> None:
+    lane = STAR.arms(STAR.vertex((1, 1)))[0]
+    length, goal = float(STAR.lengths[lane // 2]), STAR.intersections[STAR.lane_ends(lane)[1]]
+    inside, outside = on_lane(STAR, lane, length - 0.5, -0.3), on_lane(STAR, lane, length - 1.5, -0.3)
+    ego = on_lane(STAR, lanes_star(), 2.0, -0.3)
+    script = [[ego, inside if k < 20 else outside, inside if k >= 15 else outside] for k in range(40)]
+    found = judged(case(STAR, 3, [goal], goal_time=3.0), script)
+    assert said(found) == [("E6", 2, 30, 0)]
+    assert found[0].vertex == STAR.vertex(goal)
+    gap = [[ego, inside if k != 20 else outside, outside] for k in range(45)]
+    assert [
+        entry for entry in said(judged(case(STAR, 3, [goal], goal_time=3.0), gap)) if entry[0] == "E6"
+    ] == []
