@@ -27,6 +27,7 @@ from benchmarks.table import Row, show
 from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.protocols import End
 
 DURATION = 120.0
 SEED = 2016
@@ -45,6 +46,11 @@ class Oddity:
     own: tuple[str, ...]
     others: tuple[str, ...]
     moved: float
+
+    @property
+    def counts(self) -> bool:
+        """Whether the ego was clean for all of the trial."""
+        return not self.own and self.end == str(End.DURATION)
 
 
 def kind_of(number: int) -> int:
@@ -118,11 +124,11 @@ def bars(found: Sequence[Oddity]) -> list[Row]:
     rows: list[Row] = []
     for name in NAMES:
         own = [one for one in found if one.kind == name]
-        counted = [one for one in own if not one.own]
+        counted = [one for one in own if one.counts]
         broke = sum(1 for one in counted if one.others)
         words = f"{name}, {len(own)} trials, {len(own) - len(counted)} not clean: in which an e-agent breaks a rule"
         rows.append(Row(words, str(broke), "0", broke == 0))
-    counted = [one for one in found if not one.own]
+    counted = [one for one in found if one.counts]
     broke = sum(1 for one in counted if one.others)
     rows.append(Row(f"all {len(counted)} clean trials", str(broke), "0", broke == 0))
     unclean = len(found) - len(counted)
@@ -136,7 +142,7 @@ def trials(count: int = TRIALS, jobs: int = 2, first: int = 0, seconds: float = 
     with ProcessPoolExecutor(jobs) as pool:
         for one in pool.map(partial(trial, seconds=seconds), range(first, first + count)):
             found.append(one)
-            if one.own or one.others:
+            if one.others or not one.counts:
                 print(one, flush=True)
     return found
 

@@ -18,7 +18,7 @@ def test_every_kind_of_ego_is_in_the_sample() -> None:
 
 
 def test_odd_egos_are_clean(odd: list[Oddity]) -> None:
-    assert [(one.number, one.own) for one in odd if one.own] == []
+    assert [(one.number, one.own, one.end) for one in odd if not one.counts] == []
 
 
 def test_no_odd_ego_brings_a_lawful_car_to_a_breach(odd: list[Oddity]) -> None:

@@ -43,7 +43,7 @@ def test_the_shipped_configuration_of_2016_is_the_original() -> None:
 def test_demo_is_the_same_with_three_trials_of_a_minute() -> None:
     original = load_config("mc-small-4grid-agents2").to_document()
     assert load_config("demo").to_document() == original | {"number_trials": 3, "duration_bounds": [60, 60]}
-    assert {"demo", "mc-small-4grid-agents2", "town"} <= set(shipped_names())
+    assert {"demo", "mc-small-4grid-agents2", "town", "wanderers"} <= set(shipped_names())
 
 
 @pytest.mark.parametrize("name", shipped_names())

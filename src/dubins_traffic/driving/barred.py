@@ -16,7 +16,17 @@ from dubins_traffic.driving.law_tables import (
     ROUNDING,
     Drivers,
 )
-from dubins_traffic.driving.passing import BACK, BERTH, BESIDE, EDGE, NARROWS, SLIP, TURNING, stop_line
+from dubins_traffic.driving.passing import (
+    BACK,
+    BERTH,
+    BESIDE,
+    EDGE,
+    NARROWS,
+    SLIP,
+    TURNING,
+    offset_in_lane,
+    stop_line,
+)
 from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.driving.turn_arcs import on_way, way_between
 from dubins_traffic.kernels.compile import jit
@@ -45,7 +55,7 @@ def is_barred(
             return False
         done = end + 1e-6
         own = begin - build[REACH] - QUEUE_GAP
-        if low - wide - BESIDE >= EDGE - build[MIDDLE] and own >= LATE * build[DISC]:
+        if offset_in_lane(low, offset, build) != 0.0 and own >= LATE * build[DISC]:
             continue
         if own < build[DISC] + build[REACH] + EDGE:
             return True

@@ -49,7 +49,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off_right, keep_passing
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing, within_lane
 from dubins_traffic.driving.room import is_pressed
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
@@ -324,9 +324,9 @@ def pass_what_stands(
     if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
         ints[MOOD] &= ~LEFT_SIDE
     if who < -1 and part == BEFORE and floats[ASIDE] == 0.0 and offset == 0.0:
-        keep_off_right(b, n, way, state, labels, obstacles, drivers, desk)
+        keep_off(b, n, way, state, labels, obstacles, drivers, desk)
     if not outside:
-        there = part == BEFORE and floats[ASIDE] < 0.0
+        there = part == BEFORE and within_lane(floats[ASIDE], build)
         floats[ASIDE] = offset = floats[ASIDE] if there else 0.0
     elif floats[ASIDE] != 0.0:
         speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, desk)

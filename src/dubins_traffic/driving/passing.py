@@ -56,7 +56,7 @@ FOLLOWED = 1.5
 OVERTAKEN = 2.0
 """Who comes from behind on the left within this is let past first, metres."""
 TINY = 0.002
-"""Who passes on the right is this far right of its way at least, metres."""
+"""Who passes within its lane is this far beside its way at least, metres."""
 NARROWS = 1.5
 """What stands so near behind what is passed is passed with it, metres."""
 EDGE = 0.05
@@ -168,18 +168,30 @@ def find_way_past(
 
 
 @jit
-def keep_off_right(
+def keep_off(
     b: int, n: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
     desk: Desk,
 ) -> None:  # fmt: skip
-    """Begin to pass obstacles ahead on the right, if there is room on the road: nobody can come there."""
+    """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there."""
     build = drivers.build[b]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
-    low -= BESIDE + build[HALF_WIDTH] + build[ROUNDING]
-    if end >= own and low >= EDGE - build[MIDDLE]:
-        drivers.floats[b, n, ASIDE] = min(low, -TINY)
+    end, high, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    offset = offset_in_lane(low, high, build)
+    if end >= own and offset != 0.0:
+        drivers.floats[b, n, ASIDE] = offset
         drivers.floats[b, n, UNTIL] = end + SLIP + 2.0 * build[HALF_LENGTH]
+
+
+@jit
+def offset_in_lane(low: float, high: float, build: Any) -> float:
+    """Return how far left of the middle of its lane a car passes what reaches from `low` to `high`, 0 if it can't.
+
+    It stays clear of the centre line, or passes on the right with its centre on the road; all are metres to the left.
+    """
+    wide = BESIDE + build[HALF_WIDTH] + build[ROUNDING]
+    if low - wide >= EDGE - build[MIDDLE]:
+        return min(low - wide, -TINY)
+    return max(high + wide, TINY) if within_lane(high + wide, build) else 0.0
 
 
 @jit

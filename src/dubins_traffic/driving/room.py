@@ -19,7 +19,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import BESIDE, EDGE
+from dubins_traffic.driving.passing import offset_in_lane
 from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
@@ -110,14 +110,15 @@ def is_free(b: int, n: int, out: int, state: State, roads: RoadTable, drivers: D
 def before_obstacles(
     b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
 ) -> float:
-    """Return how far along a lane a car can drive before an obstacle that can't be passed on the right, metres."""
+    """Return how far along a lane a car can drive before an obstacle that can't be passed in the lane, metres."""
     build = drivers.build[b]
     free = INFINITE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         along, aside = lane_coordinates(roads, drivers.net[b], lane, row[0], row[1])
         wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
-        if aside - row[7] - build[HALF_WIDTH] - build[ROUNDING] - BESIDE >= EDGE - 2.0 * build[MIDDLE]:
+        left = aside + build[MIDDLE]
+        if offset_in_lane(left - row[7], left + row[7], build) != 0.0:
             continue
         if abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]:
             free = min(free, along - row[7] - build[REACH] - QUEUE_GAP)
