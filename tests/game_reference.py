@@ -206,10 +206,10 @@ class Reference:
             return self.enters
         if self.arrives == "never" or self.met_by_ego(state, node):
             return False
-        if self.arrives == "way_out":
-            passing = self.leaves == "unmet" and self.met_by_others(state, node)
-            return not self.closed(state, node) and not passing
-        return not (self.closed(state, node) and state[0][0] in self.exits(node))
+        if self.arrives == "moves_up":
+            return not (self.closed(state, node) and state[0][0] in self.exits(node))
+        passing = self.leaves == "unmet" and self.met_by_others(state, node)
+        return not self.closed(state, node) and not passing
 
     def must_leave(self, state: State, car: int) -> bool:
         """E4."""

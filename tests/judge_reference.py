@@ -71,9 +71,21 @@ class Judge:
 
     def exits(self, v: int, came: int) -> list[tuple[int, int]]:
         """The lanes out of v for a car that came by the lane `came`: at a bend not the way back."""
-        arms = self.arms(v)
-        bend = len(arms) >= 2 and not self.reference.crossing(v)
-        return [arm for arm in arms if not (bend and came >= 0 and arm[0] == came // 2)]
+        return [arm for arm in self.arms(v) if not (self.bend(v) and came >= 0 and arm[0] == came // 2)]
+
+    def bend(self, v: int) -> bool:
+        return len(self.arms(v)) >= 2 and not self.reference.crossing(v)
+
+    def contends(self, k: int, other: int, v: int, came: int) -> bool:
+        """Whether who is in the disc of v may be in the way of a car that came by `came`, by being nearer to an exit.
+
+        At a bend only the ego may, and who started there or came by the same segment.
+        """
+        its = self.came_by(k, other)
+        if other == 0 or its < 0 or not self.bend(v) or (came >= 0 and its // 2 == came // 2):
+            return True
+        self.fired["passes by"] += 1
+        return False
 
     def mouth(self, arm: tuple[int, int], spot: tuple[float, float]) -> float:
         s, lateral = self.reference.coordinates(arm, *spot)
@@ -87,13 +99,15 @@ class Judge:
         inside = -self.reference.w2 <= lateral <= 0 and s > 0 and facts["segment"] == arm[0]
         return facts["at"] != v and inside and far <= gap
 
-    def free(self, k: int, n: int, v: int, arm: tuple[int, int]) -> bool:
+    def free(self, k: int, n: int, v: int, arm: tuple[int, int], came: int) -> bool:
+        """Whether a lane out of v is free for n, which came there by the lane `came` or is to."""
         facts = self.past[k]
         own = self.mouth(arm, facts[n]["spot"])
         for other in self.cars:
             if other == n:
                 continue
-            if facts[other]["at"] == v and self.mouth(arm, facts[other]["spot"]) < own:
+            nearer = facts[other]["at"] == v and self.mouth(arm, facts[other]["spot"]) < own
+            if nearer and self.contends(k, other, v, came):
                 self.fired["nearer"] += 1
                 return False
             if self.takes(k, other, v, arm, self.rules.exit_gap):
@@ -112,8 +126,8 @@ class Judge:
         if v < 0:
             return False
         came = self.came_by(k, n)
-        found = any(self.free(k, n, v, arm) for arm in self.exits(v, came))
-        if not found and any(self.free(k, n, v, arm) for arm in self.arms(v)):
+        found = any(self.free(k, n, v, arm, came) for arm in self.exits(v, came))
+        if not found and any(self.free(k, n, v, arm, came) for arm in self.arms(v)):
             self.fired["way back"] += 1
         return found
 
@@ -163,7 +177,7 @@ class Judge:
             if self.came_by(k, other) == lane:
                 self.fired["one in the bend"] += 1
                 return False
-        found = any(self.free(k, n, v, arm) for arm in self.exits(v, lane))
+        found = any(self.free(k, n, v, arm, lane) for arm in self.exits(v, lane))
         self.fired["full bend"] += not found
         return found
 
@@ -173,8 +187,9 @@ class Judge:
         for n in self.cars:
             if n == 0 or self.past[k][n]["at"] != v:
                 continue
-            for arm in self.exits(v, self.came_by(k, n)):
-                if self.free(k, n, v, arm):
+            came = self.came_by(k, n)
+            for arm in self.exits(v, came):
+                if self.free(k, n, v, arm, came):
                     return False
                 away = self.mouth(arm, self.past[k][0]["spot"])
                 gap = self.rules.goal_gap

@@ -4,9 +4,9 @@ Standard input: {"following": cells that each cell leads to, "nodes": how many c
 each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered": whether crossings
 keep the order of arrival, "enters": nodes that are to be entered, "crossings": nodes that are such, "opposite": the
 other half of each bend or -1, "beside": lanes near the exits of each node, "leaves", "frees": what is assumed, "unmet",
-"way_out": whether E4 and E5 are weak}. Standard output: {"seconds", "valid", "winning"}, the latter two as numbers of
-labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the cars, ego
-first, and pairs (i, j) such that i is before j if they wait together.
+"moves_up": whether E4 is weak and E5 strict}. Standard output: {"seconds", "valid", "winning"}, the latter two as
+numbers of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the
+cars, ego first, and pairs (i, j) such that i is before j if they wait together.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class Game:
         for v in self.request["enters"]:
             owed = [f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)})", self.unmet(v)]
             if v not in self.request["crossings"]:
-                closed = f"({self.open(v)} \\/ ~ {self.ego_among(self.following[v])})"
-                owed.append(self.open(v) if self.request["way_out"] else closed)
+                up = f"({self.exits_free(v)} \\/ ~ {self.ego_among(self.following[v])})"
+                owed.append(up if self.request["moves_up"] else self.open(v))
             found.append(all_of(owed))
         return any_of(found)
 

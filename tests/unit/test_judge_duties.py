@@ -161,6 +161,32 @@ def test_e4_the_way_back_is_no_exit_of_a_bend(roads: RoadNetwork) -> None:
     assert found(came, last=after(roads, out, 0.4, 0.3)) == [("E4", 1, 51, 1)]
 
 
+@both
+def test_e4_in_a_bend_who_comes_the_other_way_closes_no_exit(roads: RoadNetwork) -> None:
+    """Two are in a bend, each nearer to the way by which the other came; or both came by one segment, or began there.
+
+    The ego, in the disc before the agent, is in its way whence ever it came.
+    """
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+
+    def found(*places: tuple[tuple[float, ...], ...]) -> list[tuple[object, ...]]:
+        """Each car is for a frame at each of its places, and stays at the last."""
+        script = [[own[min(k, len(own) - 1)] for own in places] for k in range(60)]
+        return [entry for entry in said(judged(case(roads, len(places)), script)) if entry[0] == "E4"]
+
+    by_one, by_two = (before(roads, lane ^ 1, 0.3) for lane in (one, two))
+    at_one, at_two = (on_lane(roads, lane, 0.7, -0.3) for lane in (one, two))
+    gone, passes = (away(roads),), on_lane(roads, two, 0.7, 0.3)
+    assert found(gone, (by_one, at_one), (by_two, at_two)) == [("E4", 1, 51, 1), ("E4", 2, 51, 1)]
+    assert found((by_two, at_two), (by_one, by_one, at_one)) == []
+    assert found((at_two,), (by_one, at_one)) == []
+    assert found((by_two, at_one), (by_one, by_one, at_two)) == [("E4", 1, 52, 2)]
+    assert found(gone, (by_one, at_one), (by_one, at_two)) == [("E4", 2, 51, 1)]
+    assert found(gone, (by_one, at_one), (at_two,)) == [("E4", 2, 50, 0)]
+    assert found(gone, (passes,), (by_two, at_two)) == [("E4", 1, 50, 0), ("E4", 2, 51, 1)]
+
+
 def test_e4_in_a_dead_end_who_is_nearer_to_the_way_out_leaves_first() -> None:
     out = STAR.arms(STAR.vertex((0, 1)))[0]
     deep, near = on_lane(STAR, out, 0.1, -0.3), on_lane(STAR, out, 0.6, -0.3)
@@ -252,6 +278,26 @@ def test_e5_a_bend_is_no_free_way_that_is_full_or_has_the_ego_in_it(roads: RoadN
 
 
 @both
+def test_e5_who_comes_the_other_way_through_a_bend_closes_no_exit(roads: RoadNetwork) -> None:
+    """The other is nearer to the agent's exit, having come by it, or having begun there."""
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+    waits, by_two, at_two = (
+        before(roads, one ^ 1, 0.4),
+        before(roads, two ^ 1, 0.3),
+        on_lane(roads, two, 0.7, -0.3),
+    )
+    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+
+    def found(start: tuple[float, ...]) -> list[tuple[object, ...]]:
+        script = [[away(roads), waits, start if k == 0 else at_two] for k in range(22)]
+        return [entry for entry in said(judged(case(roads, 3, **rules), script)) if entry[:2] == ("E5", 1)]
+
+    assert found(by_two) == [("E5", 1, 20, 10)]
+    assert found(at_two) == []
+
+
+@both
 def test_e5_one_of_the_same_lane_in_the_bend_has_to_leave_it_first(roads: RoadNetwork) -> None:
     v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
     one, two = roads.arms(v)
@@ -321,6 +367,23 @@ def test_e6_time_does_not_count_in_which_the_ego_is_at_the_last_exit(roads: Road
     assert found(0.8 + EASED, 15) == [("E6", 1, 46, 1)]
     assert found(0.8 + 2 * EPS, 15) == [("E6", 1, 31, 1)]
     assert found(0.8 - EPS, 15, goal_gap=0.3) == [("E6", 1, 31, 1)]
+
+
+@both
+def test_e6_time_counts_while_only_who_comes_the_other_way_is_nearer_to_an_exit(roads: RoadNetwork) -> None:
+    """Two are at a goal in a bend, each nearer to the other's exit, and the ego beside one; or one and the ego."""
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+    by_one, by_two = (before(roads, lane ^ 1, 0.1) for lane in (one, two))
+    at_one, at_two = (on_lane(roads, lane, 0.7, -0.3) for lane in (one, two))
+
+    def found(ego: tuple[float, ...], other: tuple[float, ...]) -> list[tuple[object, ...]]:
+        script = [[ego, *((by_one, by_two) if k == 0 else (at_one, other))] for k in range(60)]
+        problem = case(roads, 3, [roads.intersections[v]], goal_time=3.0, exit_time=99.0)
+        return [entry for entry in said(judged(problem, script)) if entry[0] == "E6"]
+
+    assert found(after(roads, two, 0.3, 0.3), at_two) == [("E6", 1, 31, 1)]
+    assert found(at_two, away(roads)) == []
 
 
 def test_e6_names_who_has_been_there_longest_of_those_who_relieve_each_other() -> None:

@@ -43,26 +43,31 @@ def solved_pan(others: int, goals: Sequence[int], assumed: str = ALL) -> Solutio
 
 
 def test_bounds_of_an_ego_on_shortest_routes() -> None:
+    up = Assumption.parse(["E1", "E2", "E3", "E4", "E5:moves-up"])
     bounds = {
-        (rows, columns, degree): route_bound(board(rows, columns, 1, ALL, degree).arena, Assumption())
+        (rows, columns, degree): [
+            route_bound(board(rows, columns, 1, ALL, degree).arena, assumed) for assumed in (Assumption(), up)
+        ]
         for rows, columns, degree in ((2, 2, 1), (3, 4, 1), (2, 2, 3), (3, 4, 3))
     }
-    assert bounds == {(2, 2, 1): 9, (3, 4, 1): 41, (2, 2, 3): 5, (3, 4, 3): 42}
+    assert bounds == {(2, 2, 1): [9, 9], (3, 4, 1): [41, 41], (2, 2, 3): [3, 5], (3, 4, 3): [36, 42]}
     for left_out in ("E1", "E2", "E3", "E4", "E5"):
         parts = [part for part in ALL.split(",") if part != left_out]
         assert route_bound(board(2, 2, 1).arena, Assumption.parse(parts)) == 0
     assert route_bound(board(3, 4, 1, ALL, 4).arena, Assumption()) == 0
-    for weak in ("E1,E2,E3,E4:unmet,E5", "E1,E2,E3,E4,E5:way-out", "E1,E2,E3:forfeits,E4,E5"):
+    for weak in ("E1,E2,E3,E4:unmet,E5", "E1,E2,E3:forfeits,E4,E5"):
         assert route_bound(board(3, 4, 1).arena, Assumption.parse(weak.split(","))) == 0
     once = Assumption.parse(["E1", "E2", "E3:one-forfeit", "E4", "E5"])
     assert route_bound(board(3, 4, 1).arena, once) == 41
 
 
-def test_a_goal_in_a_dead_end_bears_two() -> None:
+def test_a_goal_in_a_dead_end_bears_two_or_one_if_it_is_no_crossing() -> None:
     network = pan(1, [0]).arena.network
     dead_end = network.vertex((2, 1))
     assert route_bound(Arena.of(network, [0, dead_end]), Assumption()) == 2
-    assert route_bound(Arena.of(network, [0, dead_end], 3), Assumption()) == 2
+    assert route_bound(Arena.of(network, [0, dead_end], 3), Assumption()) == 1
+    up = Assumption.parse(["E1", "E2", "E3", "E4", "E5:moves-up"])
+    assert route_bound(Arena.of(network, [0, dead_end], 3), up) == 2
     assert route_bound(Arena.of(network, [0, 3]), Assumption()) > 2
 
 
@@ -72,8 +77,12 @@ def test_the_bound_holds_where_games_can_be_solved() -> None:
     for others in (1, 2):
         assert solved_pan(others, [0, 4], "E1,E2,E3,E4,E5").everywhere
     assert not solved_pan(3, [0, 4], "E1,E2,E3,E4,E5").everywhere
-    assert solved(2, 2, 5, "E1,E2,E3,E4,E5", 3).everywhere
-    assert solve(build(pan(2, [0, 4], "E1,E2,E3,E4,E5", 3))).everywhere
+    assert solved(2, 2, 3, "E1,E2,E3,E4,E5", 3).everywhere
+    assert not solved(2, 2, 4, "E1,E2,E3,E4,E5", 3).everywhere
+    assert solved(2, 2, 5, "E1,E2,E3,E4,E5:moves-up", 3).everywhere
+    for others, assumed in ((1, "E1,E2,E3,E4,E5"), (2, "E1,E2,E3,E4,E5:moves-up")):
+        assert solve(build(pan(others, [0, 4], assumed, 3))).everywhere
+    assert not solve(build(pan(2, [0, 4], "E1,E2,E3,E4,E5", 3))).everywhere
 
 
 def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
@@ -155,6 +164,9 @@ def test_the_smallest_strengthening() -> None:
     ):
         found = smallest(board(2, 2, 3, assumed), everywhere)
         assert [str(assumption) for assumption in found] == better
+    for some in (board(2, 2, 4, ALL, 3), board(2, 2, 4, ALL.replace("E5,", ""), 3)):
+        (found,) = smallest(some, everywhere)
+        assert str(found) == "E1,E2,E3,E4,E5:moves-up,E6"
 
 
 def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
@@ -179,7 +191,8 @@ def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
     ("some", "excuse"),
     [
         (board(2, 2, 2, "E1,E2,E3,E4:unmet,E5,E6", 3), r"e-agent \d is in the same bend"),
-        (pan(2, (0, 4), "E1,E2,E3,E4,E5:way-out", 3), r"e-agent \d is in the way out of \[2, 1\]"),
+        (board(2, 2, 3, "E1,E2,E3,E4:unmet,E5,E6", 3), r"e-agent \d is in the bend before it"),
+        (pan(2, (0, 4), "E1,E2,E3,E4,E5", 3), r"e-agent \d is in the way out of \[2, 1\]"),
         (board(2, 2, 1, "E1,E2,E3,E5,E6"), "E4 is not assumed, so it need not leave"),
         (board(2, 2, 1, "E1,E2,E3,E4,E6", 3), "E5 is not assumed, so it need not enter"),
     ],
@@ -240,7 +253,7 @@ def test_the_command_explains(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_command_refuses_what_is_wrong(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for arguments, message in (
         (["--assume", "E9"], "--assume: not an assumption: got 'E9'; expected some of E1,"),
-        (["--cars", "9"], "proved to win against up to 42 e-agents"),
+        (["--cars", "9"], "proved to win against up to 36 e-agents"),
         (["-o", "won.json"], "--output: not a name of an archive: got 'won.json'; expected NAME.npz"),
         (["--cars", "4", "--memory", "100"], "MiB'; expected at most 100 MiB (--memory)"),
         (["--assume", "nothing", "-o", str(tmp_path / "none.npz")], "a strategy that wins from nowhere"),
@@ -306,4 +319,4 @@ def test_instances_without_goals_are_refused() -> None:
 def test_what_is_said_of_an_instance() -> None:
     found = answer(draw(load_config("demo"), 0, 0), cars=1)
     assert (found.outcome, found.realizable, found.starts) == ("everywhere", True, [])
-    assert found.lines()[-1] == "On shortest routes it is proved to win against up to 42 e-agents."
+    assert found.lines()[-1] == "On shortest routes it is proved to win against up to 36 e-agents."

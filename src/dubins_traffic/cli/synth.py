@@ -42,7 +42,7 @@ def synth(
             "--assume",
             metavar="E1,E2,...",
             help="What is assumed of the e-agents: some of E1 to E6, weaker forms E1:any-order, E3:one-forfeit, "
-            "E3:forfeits, E4:unmet, E5:way-out; or nothing.",
+            "E3:forfeits, E4:unmet, E5:moves-up; or nothing.",
             show_default="as the problem says",
         ),
     ] = None,

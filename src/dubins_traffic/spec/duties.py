@@ -125,7 +125,9 @@ def _judge_exit(
     """
     clock, ego, ago = docket.clock[b, n], docket.clock[b, EGO], terms.whole[b, EXIT_TICKS]
     back = way_back(b, v, clock[CAME_BY], roads, rules)
-    free, again = look_for_exit(b, n, tick, v, back, spacing, state, roads, obstacles, rules, terms, labels)
+    free, again = look_for_exit(
+        b, n, tick, v, back, spacing, state, roads, obstacles, rules, terms, labels, docket
+    )
     paused = False
     if labels.crosses[b, EGO] == v:
         shares = ego[IN_SINCE] == clock[IN_SINCE]
@@ -187,7 +189,9 @@ def has_way(
     vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
     count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
     back = way_back(b, v, lane, roads, rules)
-    return find_exit(b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels)
+    return find_exit(
+        b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, docket
+    )
 
 
 @jit
@@ -282,7 +286,9 @@ def _holds_up(
             continue
         back = way_back(b, v, docket.clock[b, n, CAME_BY], roads, rules)
         count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
-        if find_exit(b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels):
+        if find_exit(
+            b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, docket
+        ):
             return False, tick + 1
         near |= ego_at_exit(b, v, back, state, roads, rules, terms, labels)
     return near, tick + 1

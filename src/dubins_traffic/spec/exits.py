@@ -11,7 +11,16 @@ from dubins_traffic.kernels.compile import jit_inline, jit_inner
 from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.spec.blocking import obstacle_narrows
-from dubins_traffic.spec.docket import EXIT2, EXIT_GAP, GOAL_GAP, LANE_MIDDLE, LONE, Terms
+from dubins_traffic.spec.docket import (
+    CAME_BY,
+    EXIT2,
+    EXIT_GAP,
+    GOAL_GAP,
+    LANE_MIDDLE,
+    LONE,
+    Docket,
+    Terms,
+)
 from dubins_traffic.spec.obstacles import ObstacleLanes
 from dubins_traffic.spec.tables import (
     CROSSING_DEGREE,
@@ -25,10 +34,25 @@ from dubins_traffic.spec.tables import (
 
 
 @jit_inline
+def _is_bend(b: int, v: int, t: RoadTable, rules: RuleTable) -> bool:
+    """Tell whether v is neither a crossing nor a dead end."""
+    return 2 <= t.degree[t.vert_off[rules.whole[b, NET]] + v] < rules.whole[b, CROSSING_DEGREE]
+
+
+@jit_inline
 def way_back(b: int, v: int, came: int, t: RoadTable, rules: RuleTable) -> int:
     """Return the segment that is no exit of v for a car that came by the lane `came` (-1: none): at bends only."""
-    degree = t.degree[t.vert_off[rules.whole[b, NET]] + v]
-    return came // 2 if came >= 0 and 2 <= degree < rules.whole[b, CROSSING_DEGREE] else -1
+    return came // 2 if came >= 0 and _is_bend(b, v, t, rules) else -1
+
+
+@jit_inline
+def _passes_by(b: int, k: int, back: int, docket: Docket) -> bool:
+    """Tell whether car k, in a bend, is an e-agent that came there by another segment than `back`.
+
+    So cars that meet in a bend, each before the other's exit, do not excuse each other.
+    """
+    came = docket.clock[b, k, CAME_BY]
+    return k != EGO and came >= 0 and came // 2 != back
 
 
 @jit_inline
@@ -65,12 +89,15 @@ def find_exit(
     rules: RuleTable,
     terms: Terms,
     labels: Labels,
+    docket: Docket,
 ) -> bool:
     """Tell whether some lane out of v, but for that on segment `back`, is free for car n.
 
-    All that may be near are among the first `count` cars of `crowd`.
+    At a bend `back` is the segment by which n came or comes. All that may be near are among the first `count` cars of
+    `crowd`.
     """
     real = rules.real[b]
+    bend = _is_bend(b, v, t, rules)
     net: int = rules.whole[b, NET]
     row = t.vert_off[net] + v
     vx, vy = t.vert[row, 0], t.vert[row, 1]
@@ -79,12 +106,13 @@ def find_exit(
         k = crowd[i]
         x, y = state.x[b, k], state.y[b, k]
         away2 = (x - vx) * (x - vx) + (y - vy) * (y - vy)
-        if k == n or away2 > terms.real[b, EXIT2]:
+        inside = labels.at[b, k] == v
+        if k == n or away2 > terms.real[b, EXIT2] or (inside and bend and _passes_by(b, k, back, docket)):
             continue
         for arm in range(t.degree[row]):
             lane = t.arms[row, arm]
             along, lateral = lane_coordinates(t, net, lane, x, y)
-            if labels.at[b, k] == v:
+            if inside:
                 own, own_lateral = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
                 own_way = to_mouth(b, own, own_lateral, rules, terms)
                 in_the_way = to_mouth(b, along, lateral, rules, terms) < own_way + GRAIN
@@ -122,6 +150,7 @@ def look_for_exit(
     rules: RuleTable,
     terms: Terms,
     labels: Labels,
+    docket: Docket,
 ) -> tuple[bool, int]:
     """E4: tell whether car n, whose body meets the disc of v, may leave by some lane, and when to ask again.
 
@@ -148,7 +177,8 @@ def look_for_exit(
     if near < t.degree[row] and obstacles.base[b] < 0:
         spare = min(sqrt(nearest2) - rules.real[b, RADIUS], sqrt(beyond2) - sqrt(far2)) - GRAIN
         return True, tick + ticks_within(spare, spacing, b)
-    return find_exit(b, n, v, back, spacing.near, count, state, t, obstacles, rules, terms, labels), tick + 1
+    free = find_exit(b, n, v, back, spacing.near, count, state, t, obstacles, rules, terms, labels, docket)
+    return free, tick + 1
 
 
 @jit_inner

@@ -1,4 +1,4 @@
-"""What the game assumes of the e-agents: E1 to E6, each kept, left out or weakened."""
+"""What the game assumes of the e-agents: E1 to E6, each kept, left out, weakened or made stricter."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ class Arriving(StrEnum):
     """When an e-agent must go on in its lane (E5)."""
 
     OWED = "owed"
-    """Up to the line of a crossing; into a bend or dead end that is clear and that the ego does not meet, unless the
-    ego is in the only way out."""
-    WAY_OUT = "way_out"
-    """Into a bend or dead end, besides, only if a way out of it is free."""
+    """Up to the line of a crossing; into a bend or dead end that is clear and that the ego does not meet, if a way out
+    of it is free."""
+    MOVES_UP = "moves_up"
+    """Into a bend or dead end, besides, though e-agents have taken the ways out of it."""
     NEVER = "never"
 
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """What is assumed of the e-agents; as it stands, all of E1 to E6.
+    """What is assumed of the e-agents; as it stands, all of E1 to E6, as the rules have them.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ WORDS: Final[Mapping[str, Mapping[str, Any]]] = {
     "E4": {"leaves": Leaving.OWED},
     "E4:unmet": {"leaves": Leaving.UNMET},
     "E5": {"arrives": Arriving.OWED},
-    "E5:way-out": {"arrives": Arriving.WAY_OUT},
+    "E5:moves-up": {"arrives": Arriving.MOVES_UP},
     "E6": {"frees": True},
 }
 """What each word assumes."""

@@ -70,7 +70,7 @@ class Tables(NamedTuple):
         Whether the node is a crossing; the other node of a bend, or -1.
     switches : (6,) int64
         Whether E2, E4 and E6 are assumed; number of cells; whether e-agents that meet in a bend excuse each other (E4),
-        and whether a taken way out excuses who does not enter (E5).
+        and whether only the ego, in the way out, excuses who does not enter (E5).
     """
 
     base: Ints
@@ -218,7 +218,7 @@ class Board:
         """Return `Tables.switches`."""
         own = self.assumption
         leaves, meeting = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
-        return own.yields, leaves, own.frees, self.arena.cells, meeting, own.arrives is Arriving.WAY_OUT
+        return own.yields, leaves, own.frees, self.arena.cells, meeting, own.arrives is Arriving.MOVES_UP
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""

@@ -52,8 +52,8 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
     if opposite == EGO + 1:
         return False
     if t.switches[5]:
-        return free and not (t.switches[4] and opposite)
-    return free or ego != 2
+        return free or ego != 2
+    return free and not (t.switches[4] and opposite)
 
 
 @jit_inner

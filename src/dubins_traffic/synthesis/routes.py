@@ -2,8 +2,8 @@
 
 The ego keeps to shortest routes and moves whenever it may. Suppose that it waits in a cell for ever, for the next cell
 of its route. Under E1 to E5 then everything that can be reached from that next cell, except through the ego or by who
-is excused by it, is held for ever by e-agents (`docs/theory.md`). So fewer e-agents than the smallest such region has
-cells can't stop it.
+is excused by it, is held for ever by e-agents (`docs/theory.md`); but bends and dead ends that are no crossings may be
+left empty. So fewer e-agents than the smallest such region has cells can't stop it.
 """
 
 from __future__ import annotations
@@ -23,16 +23,17 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
     arena : Arena
         The cells.
     assumption : Assumption
-        The proof needs E1 to E5, E4 and E5 in full, that forfeits are bounded, and crossings wherever three roads
-        meet; it does not need E6. Without these the bound is 0.
+        The proof needs E1 to E5, E4 in full, that forfeits are bounded, and crossings wherever three roads meet; it
+        does not need E6. Without these the bound is 0.
     """
     kept = [assumption.yields, assumption.enters]
-    kept += [assumption.leaves is Leaving.OWED, assumption.arrives is Arriving.OWED]
+    kept += [assumption.leaves is Leaving.OWED, assumption.arrives is not Arriving.NEVER]
     kept += [node.crossing or len(node.inbound) == 1 for node in arena.nodes]
     if assumption.order is not Order.KEPT or assumption.forfeits is Forfeits.ALWAYS or not all(kept):
         return 0
-    regions = (len(region(arena, ahead, cell)) for cell, ahead in waits(arena))
-    return min(regions, default=arena.cells) - 1
+    full = assumption.arrives is Arriving.MOVES_UP
+    regions = (region(arena, ahead, cell, full=full) for cell, ahead in waits(arena))
+    return min(map(len, regions), default=arena.cells) - 1
 
 
 def waits(arena: Arena) -> set[tuple[int, int]]:
@@ -62,8 +63,12 @@ def distances(arena: Arena, targets: Iterable[int]) -> dict[int, int]:
     return far
 
 
-def region(arena: Arena, first: int, ego: int) -> set[int]:
-    """Return the cells that are held for ever if `first` is, and the ego stays in the cell `ego`."""
+def region(arena: Arena, first: int, ego: int, *, full: bool) -> set[int]:
+    """Return the cells that are held for ever if `first` is, and the ego stays in the cell `ego`.
+
+    `full`: whether who is before a bend or dead end that is clear goes in though its exits are taken, so that these
+    are held too.
+    """
     found = {first}
     waiting = [first]
     while waiting:
@@ -74,7 +79,8 @@ def region(arena: Arena, first: int, ego: int) -> set[int]:
             if ahead != ego and ahead not in found:
                 found.add(ahead)
                 waiting.append(ahead)
-    return found
+    nodes = arena.nodes
+    return {cell for cell in found if full or cell == first or cell >= len(nodes) or nodes[cell].crossing}
 
 
 def _excused(arena: Arena, cell: int, ego: int) -> bool:

@@ -202,12 +202,16 @@ def _excuse_lane(board: Board, cycle: Sequence[Moment], cell: int) -> str:
 def _excuse_bend(board: Board, cycle: Sequence[Moment], node: int) -> str:
     """Return who excuses a car that waits before a bend or dead end, though that is clear; nothing if nobody does."""
     opposite = board.arena.opposite(node)
-    if any(moment.cells[EGO_CAR] == opposite for moment in cycle):
+    met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
+    if EGO_CAR in met:
         return "again and again the ego is in the bend before it"
     exits = board.arena.following(node)
     closing = {moment.cells.index(lane) for moment in cycle for lane in exits if lane in moment.cells}
-    if EGO_CAR in closing or (closing and board.assumption.arrives is Arriving.WAY_OUT):
+    alone = board.assumption.arrives is Arriving.MOVES_UP
+    if EGO_CAR in closing or (closing and not alone):
         return f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.arena.name(node)}"
+    if met and not alone and board.assumption.leaves is Leaving.UNMET:
+        return f"again and again {_cars(met)} {_is(met)} in the bend before it"
     return ""
 
 
