@@ -17,6 +17,7 @@ _ARGUMENTS: Final = {
     "--overwrite-trial-data": "overwrite_data=True",
     "--resume": "resume=True",
     "--trial-data": "data",
+    "--overwrite-trial-data (-F)": "overwrite_data=True",
     "-F": "overwrite_data=True",
     "-f": "data",
     **{

@@ -60,7 +60,7 @@ def test_whatever_was_left_is_taken_up(short: Campaign, tmp_path: Path) -> None:
         assert own.done() == [(0, 8)]
         own.finish()
     assert (whole / "results.parquet").read_bytes() == table
-    assert names(whole) == {".lock", "campaign.json", "manifest.json", "results.parquet", "wall.parquet"}
+    assert names(whole) == {"campaign.json", "manifest.json", "results.parquet", "wall.parquet"}
     assert parquet.read_table(whole / "results.parquet")["number"].to_pylist() == list(range(8))
 
 

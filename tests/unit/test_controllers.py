@@ -163,7 +163,7 @@ def test_what_is_no_controller_is_refused(spec: str, said: str) -> None:
     with pytest.raises(InputError) as caught:
         registry.load(spec)
     assert said in str(caught.value)
-    assert str(caught.value).startswith("--controller: ")
+    assert str(caught.value).startswith("controller: ")
     assert caught.value.value == spec
 
 

@@ -292,4 +292,4 @@ def test_the_command_line_names_its_options(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dubins_traffic.cli", "run", "demo", "--trials", "1", "-f", str(data)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 2
-    assert "-F overwrites" in ran.stderr
+    assert "--overwrite-trial-data (-F) overwrites" in ran.stderr

@@ -149,13 +149,13 @@ def test_files_that_cannot_be_read(make: str, tmp_path: Path, monkeypatch: pytes
         expected = "not UTF-8"
     elif make == "unreadable":
         expected = "no permission to read"
-        monkeypatch.setattr(Path, "read_bytes", _refuse)
+        monkeypatch.setattr(Path, "open", _refuse)
     with pytest.raises(InputError, match=expected) as caught:
         RoadNetwork.read(path)
     assert caught.value.file == str(path)
 
 
-def _refuse(_: Path) -> bytes:
+def _refuse(_: Path, _mode: str) -> bytes:
     raise PermissionError(13, "Permission denied")
 
 

@@ -39,7 +39,7 @@ def test_a_visit_is_an_entry_and_a_start_inside_counts() -> None:
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_between_two_visits_of_a_goal_is_another_disc(size: int) -> None:
     """Swinging over the edge of a disc is no visit; one goal counts as another disc for another."""
-    instance = make_instance(goals=[(0, 0), (2, 1)])
+    instance = make_instance(goals=[(0, 0), (2, 1)], ticks=13)
     path = [A, ROAD, A, ROAD, C, ROAD, ROAD, A, ROAD, A, B, ROAD, B, A]
     frames = make_frames(instance, path)
     metric = Visiting()

@@ -166,7 +166,7 @@ def test_the_rules_in_every_format(
     assert command(town, "--format", format, *part, "-o", str(out)) == ""
     text = out.read_text().replace("\\_", "_")
     assert ("left_ego" in text) == ("--assumption" not in part)
-    assert ("at_fault_wanderer0" in text) == ("--guarantee" not in part)
+    assert ("at_fault_car0" in text) == ("--guarantee" not in part)
     assert text.endswith("\n")
     if format == "tulip":
         ast.parse(text)

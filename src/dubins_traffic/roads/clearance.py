@@ -186,5 +186,5 @@ def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: 
         f"too sharp an angle with segments[{low}] at {list(network.intersections[v])}",
         field=f"segments[{high}]",
         value=round(180.0 * acos(min(max(between, -1.0), 1.0)) / pi, 2),
-        expected=f"more than {180.0 * acos(cosine) / pi:.4g} degrees",
+        expected=f"more than {180.0 * acos(max(cosine, -1.0)) / pi:.4g} degrees",
     )
