@@ -5,6 +5,9 @@ from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial
 
 SECONDS = 60.0
 SAMPLE = tuple(range(28, 28 + len(NAMES)))
+FELL = (135, 686, 990, 998)
+"""Trials in which an e-agent once broke a rule: lawful cars that stood for ever before obstacles which leave room (in
+990 two of them), or came out of a disc on the left, since they had chosen another exit late."""
 
 
 @pytest.fixture(scope="module")
@@ -23,3 +26,10 @@ def test_odd_egos_are_clean(odd: list[Oddity]) -> None:
 
 def test_no_odd_ego_brings_a_lawful_car_to_a_breach(odd: list[Oddity]) -> None:
     assert [(one.number, one.kind, one.others) for one in odd if one.others] == []
+
+
+@pytest.mark.parametrize("number", FELL)
+def test_what_once_was_a_breach_is_none(number: int) -> None:
+    one = trial(number)
+    assert one.counts
+    assert one.others == ()

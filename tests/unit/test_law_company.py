@@ -95,6 +95,22 @@ def test_what_leaves_room_on_the_right_is_passed_there(left: float) -> None:
     assert math.hypot(last.x[-1, 1] - x, last.y[-1, 1] - y) > 2.0
 
 
+def test_a_car_passes_between_two_obstacles() -> None:
+    """One is on the centre line, the other at the edge of the road: the lane's middle is barred, not the lane."""
+    one = car("lawful", "one", turned(1.4, -W))
+    discs: list[dict[str, Any]] = []
+    for along, left, radius in ((3.0, 0.03, 0.08), (3.24, -0.54, 0.06)):
+        x, y, _ = turned(along, left)
+        discs.append({"disc": {"x": x, "y": y, "radius": radius}})
+    watch = Watch()
+    instance = on_grid([one], 30.0, turned(3.0, 12.0 - W), obstacles=discs)
+    score = run_trial(instance, Stands(), sinks=[watch]).score
+    assert breaches(score) == []
+    x, y, _ = turned(3.0, 0.0)
+    last = watch.frames_seen[-1]
+    assert math.hypot(last.x[-1, 1] - x, last.y[-1, 1] - y) > 2.0
+
+
 def test_lawful_cars_start_on_lanes_without_obstacles() -> None:
     x, y, _ = turned(3.0, -W)
     disc = {"disc": {"x": x, "y": y, "radius": 0.15}}

@@ -16,17 +16,8 @@ from dubins_traffic.driving.law_tables import (
     ROUNDING,
     Drivers,
 )
-from dubins_traffic.driving.passing import (
-    BACK,
-    BERTH,
-    BESIDE,
-    EDGE,
-    NARROWS,
-    SLIP,
-    TURNING,
-    offset_in_lane,
-    stop_line,
-)
+from dubins_traffic.driving.narrow import BESIDE, EDGE, offset_in_lane
+from dubins_traffic.driving.passing import BACK, BERTH, NARROWS, SLIP, TURNING, stop_line
 from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.driving.turn_arcs import on_way, way_between
 from dubins_traffic.kernels.compile import jit
@@ -50,12 +41,13 @@ def is_barred(
     wide = build[HALF_WIDTH] + build[ROUNDING]
     done = 0.0
     for _ in range(last - first):
-        begin, end, offset, low = next_narrow(roads, net, lane, done, obstacles, first, last, build)
+        begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, build)
         if begin >= length:
             return False
         done = end + 1e-6
         own = begin - build[REACH] - QUEUE_GAP
-        if offset_in_lane(low, offset, build) != 0.0 and own >= LATE * build[DISC]:
+        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) != 0.0
+        if within and own >= LATE * build[DISC]:
             continue
         if own < build[DISC] + build[REACH] + EDGE:
             return True
@@ -86,11 +78,11 @@ def next_narrow(
     first: int,
     last: int,
     build: Any,
-) -> tuple[float, float, float, float]:
-    """Return (begin, end, left, right) of the next obstacles in the way in a lane, none of which begins before `done`.
+) -> tuple[float, float, float]:
+    """Return (begin, end, left) of the next obstacles in the way in a lane, none of which begins before `done`.
 
     Obstacles that are too near to one another for a car to return in between are passed as one; they reach
-    from `right` to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
+    to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
     """
     begin = INFINITE
     wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
@@ -101,7 +93,6 @@ def next_narrow(
             begin = min(begin, along - size)
     end = begin
     offset = -1.0
-    low = INFINITE
     found = begin != INFINITE
     while found:
         found = False
@@ -114,8 +105,7 @@ def next_narrow(
                 found = True
             if in_way:
                 offset = max(offset, left + build[MIDDLE] + size)
-                low = min(low, left + build[MIDDLE] - size)
-    return begin, end, offset, low
+    return begin, end, offset
 
 
 @jit

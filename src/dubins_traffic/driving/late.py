@@ -30,7 +30,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.steering import ALIGNED, SLANT, slowed, steer
+from dubins_traffic.driving.steering import ALIGNED, ASTRAY, SLANT, slowed, steer
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.spec.propositions import LEFT
@@ -62,7 +62,8 @@ def put_off(
     build = drivers.build[b]
     free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.ints[b, n, KIND] != ROUND
     bound = drivers.floats[b, n, ASIDE] != 0.0 or build[TIGHTEST] > 0.0
-    if not free or bound or np.int64(labels.bits[b, n]) & LEFT != 0:
+    astray = labels.lane[b, n] < 0 and left > ASTRAY
+    if not free or bound or astray or np.int64(labels.bits[b, n]) & LEFT != 0:
         return False
     note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, desk)
     return True

@@ -49,7 +49,8 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing, within_lane
+from dubins_traffic.driving.narrow import within_lane
+from dubins_traffic.driving.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing
 from dubins_traffic.driving.room import is_pressed
 from dubins_traffic.driving.safety import VERGE, leaves_road
 from dubins_traffic.driving.seeing import (
@@ -323,8 +324,11 @@ def pass_what_stands(
     ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
         ints[MOOD] &= ~LEFT_SIDE
-    if who < -1 and part == BEFORE and floats[ASIDE] == 0.0 and offset == 0.0:
-        keep_off(b, n, way, state, labels, obstacles, drivers, desk)
+    idle = floats[ASIDE] == 0.0 or (
+        within_lane(floats[ASIDE], build) and ints[WAITED] > ticks_of(STUCK, build)
+    )
+    if who < -1 and part == BEFORE and idle and offset == 0.0:
+        keep_off(b, n, -2 - who, way, state, labels, obstacles, drivers, desk)
     if not outside:
         there = part == BEFORE and within_lane(floats[ASIDE], build)
         floats[ASIDE] = offset = floats[ASIDE] if there else 0.0

@@ -26,6 +26,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.narrow import BESIDE, EDGE, offset_on_way, within_lane
 from dubins_traffic.driving.turn_arcs import Way
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import INFINITE, lane_end
@@ -37,8 +38,6 @@ PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
 BERTH = 0.12
 """What is kept free beside what stands, metres."""
-BESIDE = 0.06
-"""The least that must be free beside an obstacle on the other side, metres."""
 SLIP = 0.25
 """So far past what stands a car begins to return, metres, beyond the length of a rectangle."""
 BACK = 0.4
@@ -55,12 +54,8 @@ FOLLOWED = 1.5
 """Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
 OVERTAKEN = 2.0
 """Who comes from behind on the left within this is let past first, metres."""
-TINY = 0.002
-"""Who passes within its lane is this far beside its way at least, metres."""
 NARROWS = 1.5
 """What stands so near behind what is passed is passed with it, metres."""
-EDGE = 0.05
-"""What the centre keeps from the edge of the road, metres."""
 
 
 @jit_inline
@@ -89,12 +84,6 @@ def half_width(b: int, j: Any, way: Way, state: State, build: Any) -> float:
         way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
         build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING],
     )  # fmt: skip
-
-
-@jit
-def within_lane(offset: float, build: Any) -> bool:
-    """Tell whether a body so far left of the middle of the right lane does not reach over the centre line."""
-    return offset + build[HALF_WIDTH] + build[ROUNDING] <= build[MIDDLE]
 
 
 @jit
@@ -169,29 +158,26 @@ def find_way_past(
 
 @jit
 def keep_off(
-    b: int, n: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
+    b: int, n: int, p: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
     desk: Desk,
 ) -> None:  # fmt: skip
-    """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there."""
+    """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there.
+
+    All that are near to one another are passed on one line, or else obstacle part p, the first of them, alone.
+    """
     build = drivers.build[b]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, high, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
-    offset = offset_in_lane(low, high, build)
+    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    offset = 0.0
+    if end >= own and low > -INFINITE:
+        offset = offset_on_way(b, way, own, end + SLIP, obstacles, build)
+    if offset == 0.0:
+        row = obstacles.part[p]
+        end = along(way, row[0], row[1]) + row[7] - build[REACH]
+        offset = offset_on_way(b, way, own + build[REACH], end, obstacles, build)
     if end >= own and offset != 0.0:
         drivers.floats[b, n, ASIDE] = offset
         drivers.floats[b, n, UNTIL] = end + SLIP + 2.0 * build[HALF_LENGTH]
-
-
-@jit
-def offset_in_lane(low: float, high: float, build: Any) -> float:
-    """Return how far left of the middle of its lane a car passes what reaches from `low` to `high`, 0 if it can't.
-
-    It stays clear of the centre line, or passes on the right with its centre on the road; all are metres to the left.
-    """
-    wide = BESIDE + build[HALF_WIDTH] + build[ROUNDING]
-    if low - wide >= EDGE - build[MIDDLE]:
-        return min(low - wide, -TINY)
-    return max(high + wide, TINY) if within_lane(high + wide, build) else 0.0
 
 
 @jit

@@ -19,7 +19,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
-from dubins_traffic.driving.passing import offset_in_lane
+from dubins_traffic.driving.narrow import offset_in_lane
 from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
@@ -113,15 +113,16 @@ def before_obstacles(
     """Return how far along a lane a car can drive before an obstacle that can't be passed in the lane, metres."""
     build = drivers.build[b]
     free = INFINITE
-    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+    net, first, last = drivers.net[b], obstacles.off[b], obstacles.off[b + 1]
+    for p in range(first, last):
         row = obstacles.part[p]
-        along, aside = lane_coordinates(roads, drivers.net[b], lane, row[0], row[1])
+        along, aside = lane_coordinates(roads, net, lane, row[0], row[1])
         wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
-        left = aside + build[MIDDLE]
-        if offset_in_lane(left - row[7], left + row[7], build) != 0.0:
+        if not (abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]):
             continue
-        if abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]:
-            free = min(free, along - row[7] - build[REACH] - QUEUE_GAP)
+        begin, end = along - row[7], along + row[7]
+        if offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) == 0.0:
+            free = min(free, begin - build[REACH] - QUEUE_GAP)
     return free
 
 

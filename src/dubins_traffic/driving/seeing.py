@@ -208,6 +208,8 @@ def see_obstacles(
         aside = row[7] - build[HALF_WIDTH] - build[ROUNDING] + NARROW - SIDE
         if there < part or (there == part and its_key <= key):
             continue
+        if there > part and abs(its_left) > wide + SIDE + aside:
+            continue
         if its_left < low - aside or its_left > high + aside:
             continue
         if floats[ASIDE] > 0.0 and its_left < floats[ASIDE] - wide - aside:

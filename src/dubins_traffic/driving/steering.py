@@ -33,8 +33,11 @@ from dubins_traffic.spec.propositions import LEFT
 
 HURRY = 0.25
 """Metres in which a car returns to its way."""
-SLANT, STEEP = 0.7, 0.9
-"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return."""
+SLANT, STEEP, ABRUPT = 0.7, 0.9, 0.8
+"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return, and when it
+is astray in a disc, where it has chosen another exit late."""
+ASTRAY = 0.18
+"""Who is this far left of its way in a disc is astray, metres."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 GAIN = 8.0
@@ -52,6 +55,8 @@ def move(
     c, s, limit = state.c[b, n], state.s[b, n], build[YAW_MOST]
     passes = drivers.floats[b, n, ASIDE] != 0.0
     steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
+    if not outside and left - offset > ASTRAY:
+        steep = ABRUPT
     aligned = NIMBLE if passes and left < offset else ALIGNED
     allowed = slowed(allowed, bend, limit)
     speed, yaw_rate = steer(
