@@ -5,9 +5,12 @@ from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial
 
 SECONDS = 60.0
 SAMPLE = tuple(range(28, 28 + len(NAMES)))
-FELL = (135, 686, 990, 998)
-"""Trials in which an e-agent once broke a rule: lawful cars that stood for ever before obstacles which leave room (in
-990 two of them), or came out of a disc on the left, since they had chosen another exit late."""
+FELL = (135, 560, 686, 990, 998)
+"""Trials in which an e-agent once broke a rule.
+
+Lawful cars stood for ever before obstacles which leave room (in 990 two of them), chose another exit late for one who
+only passed an obstacle in his own lane (560), or came out of a disc on the left after such a choice (998).
+"""
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,7 @@ from dubins_traffic.driving.law_tables import (
     ROLLING,
     ROUND,
     ROUNDING,
+    TAILGATING,
     TURN,
     Desk,
     Drivers,
@@ -77,7 +78,8 @@ def mind_gate(
     bits = np.int64(labels.bits[b, n])
     its_turn = count_turn(bits, drivers.way[b, n], ints)
     line = to_line(left, x, y, way, build)
-    behind = n != EGO and is_behind_ego(b, n, x, y, way, state, labels, drivers)
+    minds = n != EGO and ints[MOOD] & TAILGATING == 0
+    behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
     if behind and drivers.way[b, n, CROSSING] != 0.0:
         line -= build[APPROACHES]
         its_turn = False

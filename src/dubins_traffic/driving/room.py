@@ -24,12 +24,15 @@ from dubins_traffic.driving.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import STANDS
+from dubins_traffic.spec.propositions import LEFT, STANDS
 
 MARGIN = 0.02
 """What a car keeps from a disc that it may not enter, metres."""
 BRISK = 0.3
 """A car that leaves the crossing at this speed will make room, m/s."""
+OVER, WITHIN = 0.05, 0.01
+"""Who is less than this beyond the centre line of a lane still counts as in it; so much of the body of who comes on
+the other side, and is not left, may lie over it: he passes an obstacle within his lane, metres."""
 PRESSED = 0.4
 """Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 
@@ -73,7 +76,9 @@ def room_in(
         j = desk.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-            there = aside < build[HALF_WIDTH] + build[ROUNDING] + 0.05 and along > build[DISC]
+            oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
+            over = -WITHIN if oncoming else OVER
+            there = aside < build[HALF_WIDTH] + build[ROUNDING] + over and along > build[DISC]
             if j != n and there and labels.crosses[b, j] != start:
                 if look == 1:
                     last -= pitch if along < wall else 0.0
