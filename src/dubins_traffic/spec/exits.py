@@ -36,7 +36,8 @@ from dubins_traffic.spec.tables import (
 @jit_inline
 def _is_bend(b: int, v: int, t: RoadTable, rules: RuleTable) -> bool:
     """Tell whether v is neither a crossing nor a dead end."""
-    return 2 <= t.degree[t.vert_off[rules.whole[b, NET]] + v] < rules.whole[b, CROSSING_DEGREE]
+    degree = t.degree[t.vert_off[rules.whole[b, NET]] + v]
+    return bool(2 <= degree < rules.whole[b, CROSSING_DEGREE])
 
 
 @jit_inline
