@@ -30,9 +30,9 @@ MARGIN = 0.02
 """What a car keeps from a disc that it may not enter, metres."""
 BRISK = 0.3
 """A car that leaves the crossing at this speed will make room, m/s."""
-OVER, WITHIN = 0.05, 0.01
-"""Who is less than this beyond the centre line of a lane still counts as in it; so much of the body of who comes on
-the other side, and is not left, may lie over it: he passes an obstacle within his lane, metres."""
+OVER = 0.05
+"""Who is less than this beyond the centre line of a lane still counts as in it, metres, unless he drives on the other
+side and is not left: he passes an obstacle within his lane, or sways."""
 PRESSED = 0.4
 """Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 
@@ -77,9 +77,8 @@ def room_in(
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
             oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
-            over = -WITHIN if oncoming else OVER
-            there = aside < build[HALF_WIDTH] + build[ROUNDING] + over and along > build[DISC]
-            if j != n and there and labels.crosses[b, j] != start:
+            there = aside < build[HALF_WIDTH] + build[ROUNDING] + OVER and along > build[DISC]
+            if j != n and there and not oncoming and labels.crosses[b, j] != start:
                 if look == 1:
                     last -= pitch if along < wall else 0.0
                     j = desk.link[j]
