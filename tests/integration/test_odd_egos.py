@@ -5,11 +5,12 @@ from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial
 
 SECONDS = 60.0
 SAMPLE = tuple(range(28, 28 + len(NAMES)))
-FELL = (135, 560, 686, 990, 998, 1403)
+FELL = (135, 560, 686, 990, 998, 1403, 1573, 1581)
 """Trials in which an e-agent once broke a rule.
 
 Lawful cars stood for ever before obstacles which leave room (in 990 two of them), chose another exit late for one who
-only passed an obstacle or swayed in his own lane (560, 1403), or came out of a disc on the left after that (998).
+only passed an obstacle or swayed in his own lane (560, 1403, 1573, 1581), or came out of a
+disc on the left after that (998).
 """
 
 
