@@ -8,10 +8,10 @@ BIN := .venv/bin
 WORKERS ?= 2
 SETUP := pyproject.toml constraints.txt scripts/setup.sh
 
-.PHONY: help setup demo test check format bench clean
+.PHONY: help setup demo test test-all golden check format bench clean
 
 help: ## show this text
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
 
 setup: .venv/.installed-dev ## install the package and everything that developers need into .venv
 
@@ -24,6 +24,14 @@ test: .venv/.installed-dev ## all checks, then all tests
 	@scripts/gazebo.sh
 	@$(MAKE) --no-print-directory check
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+
+test-all: test ## all tests, then those of which the suite runs a part, in full: hours
+	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
+	$(BIN)/python -m tests.judge_trials 500
+	$(BIN)/python -m benchmarks verify odd_egos rules
+
+golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json
+	$(BIN)/python -m tests.golden.hashes
 
 check: .venv/.installed-dev ## format, lint, types and layers
 	$(BIN)/ruff format --check .

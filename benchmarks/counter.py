@@ -23,12 +23,17 @@ CONTROLLERS: Final = ("rules", "synthesized")
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A grid, how many e-agents, and which of E1 to E6 are assumed of them."""
+    """A grid, how many e-agents, which of E1 to E6 are assumed of them, and which of these fall with what is not.
+
+    On the road E5 binds who is first at a clear crossing, too: who stays first for ever, which is what a missing E3
+    allows, lingers with a free way.
+    """
 
     rows: int
     columns: int
     cars: int
     assumed: tuple[str, ...]
+    falls_too: frozenset[str] = frozenset()
 
     @property
     def name(self) -> str:
@@ -38,7 +43,7 @@ class Case:
 CASES: Final = (
     Case(3, 4, 1, ("E2", "E6")),
     Case(3, 4, 1, ("E1", "E2", "E3", "E5", "E6")),
-    Case(3, 4, 2, ("E1", "E2", "E4", "E5", "E6")),
+    Case(3, 4, 2, ("E1", "E2", "E4", "E5", "E6"), frozenset({"E5"})),
 )
 """Lost with the rules' crossings: fairness alone; without E4; without E3."""
 
@@ -94,7 +99,8 @@ def measure() -> list[Row]:
         for controller in CONTROLLERS:
             found = [drive(case, controller, seed) for seed in SEEDS]
             least = min(one.gap for one in found)
-            fair = all(not one.own and one.others.isdisjoint(case.assumed) for one in found)
+            kept = set(case.assumed) - case.falls_too
+            fair = all(not one.own and one.others.isdisjoint(kept) for one in found)
             rows.append(
                 Row(
                     f"{case.name}; {controller}: least time without a goal",
