@@ -15,6 +15,8 @@ from dubins_traffic_msgs.srv import MMode, MModeRequest
 from geometry_msgs.msg import Twist
 from integrator_chains_msgs.msg import ProblemInstanceJSON
 
+from with_parent import end_with_parent
+
 instance = threading.Event()
 over = threading.Event()
 
@@ -28,6 +30,7 @@ def learn(message):
         over.set()
 
 
+end_with_parent()
 rospy.init_node("simple")
 commands = rospy.Publisher("mobile_base/commands/velocity", Twist, queue_size=10)
 rospy.Subscriber("/dubins_traffic_maestro/probleminstance_JSON", ProblemInstanceJSON, learn)

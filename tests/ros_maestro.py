@@ -16,6 +16,8 @@ from gazebo_msgs.msg import ModelState
 from integrator_chains_msgs.msg import ProblemInstanceJSON
 from std_srvs.srv import Empty
 
+from with_parent import end_with_parent
+
 READY, RUNNING, BUSY = "ready", "running", "busy"
 
 
@@ -76,6 +78,7 @@ class Maestro:
         print(json.dumps({"goals": problem["goals"], "seconds": time.time() - began}), flush=True)
 
 
+end_with_parent()
 rospy.init_node("dubins_traffic_maestro")
 maestro = Maestro()
 rospy.Service("~mode", MMode, maestro.answer)
