@@ -186,7 +186,7 @@ class Reference:
         if self.tick < ago:
             return False
         (x, y), (px, py) = car.places[-1], car.places[-1 - ago]
-        return math.hypot(x - px, y - py) <= self.rules["still_speed"] * duration
+        return math.hypot(x - px, y - py) <= self.rules["still_speed"] * duration + 1e-9
 
     def clear(self, car: Car | None, v: int) -> bool:
         return not any(other is not car and other.crosses == v for other in self.cars)
@@ -281,7 +281,7 @@ class Reference:
         if ago < begun:
             return False
         grown = max(car.ways[begun:]) - max(car.ways[begun : ago + 1])
-        return grown < self.rules["linger_distance"]
+        return grown < self.rules["linger_distance"] - 1e-9
 
     def narrows(self, low: float, high: float) -> bool:
         if high <= -self.w2 or low >= 0:

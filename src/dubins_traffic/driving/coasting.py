@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.driving.gates import GOES_NOW, count_turn, faces_gate, to_line
+from dubins_traffic.driving.gates import GOES_NOW, count_turn, faces_gate, is_behind_ego, to_line
 from dubins_traffic.driving.kept_ways import kept_way
 from dubins_traffic.driving.late import note
 from dubins_traffic.driving.law_tables import (
     ALONE,
+    APPROACHES,
     COAST_BEND,
     COAST_CROSSES,
     COAST_HIGH,
@@ -48,7 +49,7 @@ from dubins_traffic.driving.law_tables import (
 from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.driving.safety import VERGE
 from dubins_traffic.driving.seeing import meets_nobody, way_to_go
-from dubins_traffic.driving.steering import slowed
+from dubins_traffic.driving.steering import ASTRAY, slowed
 from dubins_traffic.driving.turn_arcs import AFTER, THROUGH, Way, in_arc, on_lane
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.roads.lookup import CERTAIN
@@ -86,6 +87,8 @@ def coast(
         part, key, left, px, py = on_lane(way, x, y)
     else:
         part, key, left, px, py = in_arc(way, dx, dy)
+    if row[COAST_LANE] < 0.0 and left > ASTRAY:
+        return False
     if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.build[b]):
         return False
     note(b, n, row[COAST_SPEED], left, px, py, bend, state, desk)
@@ -120,6 +123,10 @@ def drive_on(
     speed = cruise(False, labels.crosses[b, n] >= 0, build, drivers.floats[b, n])
     bend = way.bend if part == THROUGH else 0.0
     gated = faces_gate(b, n, part, labels, roads, drivers)
+    if labels.lane[b, n] < 0 and left > ASTRAY:
+        return False
+    if gated and ints[KIND] != ROUND and is_behind_ego(b, n, x, y, way, state, labels, drivers):
+        return False
     line = to_line(left, x, y, way, build) if gated else EVERYWHERE
     if line < speed * build[PERIOD]:
         if row[CROSSING] == 0.0 or bits & GOES_NOW == GOES_NOW or ints[MOOD] & ROLLING != 0:
@@ -141,8 +148,8 @@ def keep_course(
 ) -> None:  # fmt: skip
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
 
-    The stretch ends before the line at which the car may have to stop. Without lane state it also ends where the arc
-    does: there the part of the way changes, or the lane.
+    The stretch ends before the line at which the car may have to stop, for an e-agent that behind the ego. Without lane
+    state it also ends where the arc does: there the part of the way changes, or the lane.
     """
     build = drivers.build[b]
     row = drivers.way[b, n]
@@ -153,6 +160,8 @@ def keep_course(
     if gated:
         along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
         edge = build[DISC] + build[REACH] + MARGIN
+        if drivers.ints[b, n, KIND] != ROUND:
+            edge += build[APPROACHES]
         spare = -way_to_go(way, x, y) - edge - speed * build[PERIOD] - CERTAIN
         row[COAST_HIGH] = min(row[COAST_HIGH], along + spare)
     row[COAST_SPEED] = slowed(speed, bend, build[YAW_MOST])

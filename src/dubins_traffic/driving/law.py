@@ -214,7 +214,9 @@ def drive(
     outside = labels.lane[b, n] == ints[LANE]
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    free = company != CROWDED and just_drives(ints, floats)
+    leaves = ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE])
+    chooses = leaves and drivers.way[b, n, CROSSING] != 0.0
+    free = company != CROWDED and not chooses and just_drives(ints, floats)
     if free and company != ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, build)
     if free and drive_on(b, n, part, left, px, py, outside, way, state, labels, roads, drivers, desk):
@@ -238,7 +240,7 @@ def drive(
     speed, offset = pass_what_stands(
         b, n, speed, gap, kept, who, part, outside, way, near, state, labels, roads, obstacles, drivers, desk
     )
-    if ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
+    if leaves:
         find_way_out(b, n, tick, part, state, labels, roads, obstacles, drivers, desk)
     bend = way.bend if part == THROUGH else 0.0
     if put_off(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, desk):

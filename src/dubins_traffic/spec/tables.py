@@ -93,7 +93,11 @@ TOP_THEN, LINGERS_FROM, WAS_LINGERING = range(30, 33)
 CALM: Final = 33
 
 GRAIN = 1e-9
-"""Metres by which limits that a judgement compares are eased for the car that would be in breach (RULES, *Ground*)."""
+"""Metres by which limits that a judgement compares are eased for the car that would be in breach (RULES, *Ground*).
+
+Added to the distance of `still`, and taken from that of `lingers`, too: cars often go exactly that far, and rounding
+must not decide.
+"""
 NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
 
@@ -212,7 +216,7 @@ def pack_rules(
         approach = cross + own.approach_distance
         queue = cross + own.queue_distance + GRAIN
         stop = own.still_speed * own.stop_time + GRAIN
-        stand = own.still_speed * own.stand_time
+        stand = own.still_speed * own.stand_time + GRAIN
         linger = ticks(own.linger_time, rate)
         real[b, RADIUS] = radius
         real[b, HALF_LENGTH] = cars.half_length[b]
@@ -233,7 +237,7 @@ def pack_rules(
         real[b, BLOCKED_AHEAD] = own.blocked_ahead
         real[b, OVERTAKING_BEHIND] = own.overtaking_behind
         real[b, OVERTAKING_AHEAD] = own.overtaking_ahead
-        real[b, LINGER_GROWTH] = own.linger_distance if linger > 0 else NEVER_AGAIN * own.linger_distance
+        real[b, LINGER_GROWTH] = (own.linger_distance - GRAIN) * (1.0 if linger > 0 else NEVER_AGAIN)
         whole[b, STOP_TICKS] = ticks(own.stop_time, rate)
         whole[b, STAND_TICKS] = ticks(own.stand_time, rate)
         whole[b, GROUP_TICKS] = ticks(own.group_time, rate)
