@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from dubins_traffic.kernels.sources import PACKAGE, imported, kernel_files
 from dubins_traffic.kernels.store import SUFFIX, KernelFiles
 
 CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5), len(sincos.stats.cache_hits))"
@@ -82,3 +83,8 @@ def test_what_is_saved_is_found_by_its_key_alone(tmp_path) -> None:
     files.flush()
     assert files.load(("a", 1)) is None
     assert not list(tmp_path.iterdir())
+
+
+def test_how_kernels_are_put_together_decides_what_is_compiled() -> None:
+    for file in kernel_files():
+        assert PACKAGE / "kernels" / "linking.py" in imported(file)

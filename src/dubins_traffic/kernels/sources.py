@@ -58,8 +58,10 @@ def kernel_files() -> list[Path]:
 
 @cache
 def _imports(file: Path) -> frozenset[Path]:
-    names = _IMPORT.findall(file.read_bytes())
-    files = (PACKAGE.joinpath(*name.decode().split(".")) for name in names)
-    return frozenset(
-        path for name in files for path in (name.with_suffix(".py"), name / "__init__.py") if path.is_file()
-    )
+    """Return the modules that a file imports; of a package from which it imports anything, all modules in it."""
+    found: set[Path] = set()
+    for name in _IMPORT.findall(file.read_bytes()):
+        place = PACKAGE.joinpath(*name.decode().split("."))
+        module = place.with_suffix(".py")
+        found.update([module] if module.is_file() else place.glob("*.py"))
+    return frozenset(found)
