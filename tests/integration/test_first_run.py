@@ -1,60 +1,66 @@
-"""The first run on a machine, with an empty cache of kernels: the same bytes as any other, and nobody left behind."""
+"""The first run on a machine, with an empty cache of kernels: at once, and the same bytes as any other."""
 
 import os
-import signal
 import subprocess
 import sys
+from pathlib import Path
+from time import sleep
 
-from dubins_traffic.campaign import warm
-from dubins_traffic.kernels import compile
+import pytest
 
-
-def run(folder, record_folder):
-    arguments = ["run", "mc-small-4grid-agents2", "--seed", "3", "--records", str(record_folder)]
-    subprocess.run(
-        [sys.executable, "-m", "dubins_traffic.cli", *arguments],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(folder)},
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
-    return (record_folder / "trial-0000.mcap").read_bytes()
+COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
+RUN = ["run", "mc-small-4grid-agents2", "--controller", "simple", "--seed", "3"]
+BESIDE = "compiled in the background"
 
 
-def test_a_first_run_gives_the_bytes_of_later_ones(tmp_path) -> None:
-    first = run(tmp_path / "cache", tmp_path / "first")
-    kernels = len(list((tmp_path / "cache").rglob("*.kernel")))
-    assert kernels > 50
-    assert run(tmp_path / "cache", tmp_path / "second") == first
-    assert len(list((tmp_path / "cache").rglob("*.kernel"))) == kernels
-    assert not list((tmp_path / "cache").rglob("*.tmp*"))
-
-
-COMPANION = """
-from dubins_traffic.campaign.warm import companion
-with companion() as process:
-    process.wait()
-with companion() as second:
-    print(process.returncode, second)
-"""
-
-
-def test_a_companion_works_only_where_nothing_is_compiled(tmp_path) -> None:
-    variables = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+def run(cache: Path, records: Path, tier: str, arguments=RUN) -> tuple[bytes, str]:
     ran = subprocess.run(
-        [sys.executable, "-c", COMPANION], env=variables, check=True, capture_output=True, text=True
+        [*COMMAND, *arguments, "--records", str(records)],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), "DUBINS_TRAFFIC_KERNELS": tier},
+        check=True,
+        capture_output=True,
+        text=True,
     )
-    assert ran.stdout == "0 None\n"
-    assert len(list(tmp_path.rglob("*.kernel"))) > 50
+    return (records / "trial-0000.mcap").read_bytes(), ran.stderr
 
 
-def test_a_companion_is_ended_with_the_first_run(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(compile, "cache_folder", lambda: tmp_path)
-    with warm.companion() as process:
-        assert process is not None
-        assert process.poll() is None
-    assert process.poll() == -signal.SIGTERM
+def kernels(cache: Path) -> set[str]:
+    return {path.name for path in cache.rglob("*.kernel")}
 
 
-def test_a_cache_that_cannot_be_looked_into_asks_for_no_companion(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(compile, "cache_folder", lambda: tmp_path / "missing")
-    assert not compile.nothing_compiled()
+def asked(cache: Path) -> set[str]:
+    return {path.name for path in cache.rglob("asked/*")}
+
+
+def wait_for_companion(cache: Path) -> None:
+    """Wait until all that has been asked for is compiled."""
+    while asked(cache):
+        assert not [path.read_text() for path in cache.rglob("asked/*.failed")]
+        sleep(0.1)
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory) -> tuple[Path, bytes, str]:
+    """Return a cache that a first run has begun, what it recorded, and what it said."""
+    cache = tmp_path_factory.mktemp("first") / "cache"
+    return cache, *run(cache, cache.parent / "records", "auto")
+
+
+def test_a_first_run_is_interpreted_and_says_so_in_one_line(first) -> None:
+    cache, _, said = first
+    assert said.count("dubins-traffic: ") == said.count(BESIDE) == 1
+    assert asked(cache) | kernels(cache)
+
+
+def test_later_runs_give_the_same_bytes_and_compile_nothing(first, tmp_path) -> None:
+    cache, recorded, _ = first
+    wait_for_companion(cache)
+    made = kernels(cache)
+    assert len(made) >= 6
+    for tier in ("auto", "compiled", "interpreted"):
+        again, said = run(cache, tmp_path / tier, tier)
+        assert again == recorded
+        assert "dubins-traffic: " not in said
+    assert kernels(cache) == made
+    assert not asked(cache)
+    assert not list(cache.rglob("*.tmp*"))

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.single import Result, run_trial
-from dubins_traffic.campaign.warm import companion
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import DubinsTrafficError, WorkerLostError
 from dubins_traffic.files import locked
@@ -118,9 +117,8 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
         if workers > 1 and len(jobs) > 1:
             yield from _in_processes(jobs, workers)
             return
-        with companion():
-            for job in jobs:
-                yield job.run()
+        for job in jobs:
+            yield job.run()
 
 
 def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:

@@ -1,13 +1,13 @@
-"""Calls of compiled kernels, tick after tick, with the same arrays.
-
-Numba looks at the type of every argument of every call, and copies many arrays given one after another once more: of
-a call with forty arrays that is most of the time. `bound` looks at them once.
-"""
+"""Calls of kernels, tick after tick, with the same arrays: what has to be known of the arrays is found out once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
+
+from dubins_traffic.kernels.compile import Kernel
+from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
+from dubins_traffic.kernels.machine import Code, address
 
 R = TypeVar("R")
 
@@ -21,15 +21,64 @@ def bound(kernel: Callable[..., R], leading: Sequence[Any], arrays: Sequence[Any
         A function made by `kernels.compile.jit`, whose last parameter takes any number of arrays.
     leading
         Leading arguments as those of the calls to come: an integer where they have integers, and so on. Arrays among
-        them have to be the same in every call, or of the same type for certain.
+        them may be others in each call, of the same type.
     arrays
         The arrays.
     """
     after = tuple(arrays)
-    if not hasattr(kernel, "py_func"):
+    if not isinstance(kernel, Kernel):
         return lambda *first: kernel(*first, *after)
-    import numba  # pyright: ignore[reportMissingTypeStubs]
+    own = cast("Kernel[..., R]", kernel)
+    try:
+        kinds = tuple(kind_of(value) for value in (*leading, after))
+    except UnfitError:
+        plain = own.interpreted
+        return lambda *first: plain(*first, *after)
+    code = own.code(kinds)
+    return _Later(own, kinds, after) if code is None else _compiled(code, after)
 
-    kind = cast(Any, numba).typeof
-    entry = cast(Any, kernel).compile((*(kind(value) for value in leading), kind(after)))
-    return lambda *first: entry(*first, after)
+
+class _Later(Generic[R]):
+    """Calls that are interpreted until there is machine code."""
+
+    def __init__(self, kernel: Kernel[..., R], kinds: tuple[Kind, ...], after: tuple[Any, ...]) -> None:
+        self._kernel, self._kinds, self._after = kernel, kinds, after
+        self._call: Callable[..., R] | None = None
+
+    def __call__(self, *first: Any) -> R:
+        if self._call is not None:
+            return self._call(*first)
+        code = self._kernel.code(self._kinds)
+        if code is None:
+            return self._kernel.interpreted(*first, *self._after)
+        self._call = _compiled(code, self._after)
+        return self._call(*first)
+
+
+def _compiled(code: Code, after: tuple[Any, ...]) -> Callable[..., Any]:
+    """Return a function that calls machine code with leading arguments and the same arrays after them."""
+    kinds = code.kinds[:-1]
+    kept: list[Any] = []
+    last = address(after, code.kinds[-1], kept)
+    pack, function, read, room = code.pack, code.function, code.read, code.room()
+    changing = [k for k, kind in enumerate(kinds) if kind[0] != "number"]
+    known: dict[int, tuple[Any, int, list[Any]]] = {k: (kept, 0, []) for k in changing}
+
+    def call(*first: Any) -> Any:
+        values = first
+        if changing:
+            own = list(first)
+            for k in changing:
+                value = first[k]
+                seen = known[k]
+                if seen[0] is not value:
+                    blocks: list[Any] = []
+                    seen = known[k] = (value, address(value, kinds[k], blocks), blocks)
+                own[k] = seen[1]
+            values = own
+        if function(pack(*values, last), room):
+            raise RuntimeError("a kernel has failed")
+        return None if room is None else read(room)
+
+    call.kept = kept  # pyright: ignore[reportFunctionMemberAccess]  # as long as the calls
+    return call

@@ -1,74 +1,58 @@
-"""The compiler's settings, and where compiled kernels are kept.
+"""Kernels: functions that run interpreted until their machine code is there, with the same bits.
 
-The cache folder is named by the versions of the compiler; each folder in it by a module and a hash of its text and of
-all that it imports (`kernels.sources`). What is compiled depends on the functions that a kernel calls and the constants
-that it reads, wherever they stand.
+A function that `jit` has taken runs as it is while its machine code is not in the cache; a companion compiles it
+beside, and a later call goes over to machine code. `DUBINS_TRAFFIC_KERNELS` says ``auto`` for that, ``compiled`` for
+waiting until it is there, ``interpreted`` for never compiling, as ``NUMBA_DISABLE_JIT=1`` does.
 """
 
 from __future__ import annotations
 
+import inspect
 import os
-import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cached_property, update_wrapper
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from types import FunctionType
+from typing import Any, Generic, ParamSpec, Protocol, TypeVar, cast
 
-import numba
-from platformdirs import user_cache_path
+import numpy as np
 
-from dubins_traffic.kernels import linking
-from dubins_traffic.kernels.sources import PACKAGE, kernel_files, source_hash, versions_hash
-from dubins_traffic.kernels.store import KernelCache
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels import asking, machine, store
+from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
+from dubins_traffic.kernels.machine import Code
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-
-@cache
-def cache_folder() -> Path:
-    """Return a folder for compiled kernels that can be written: the user's cache, else a temporary one."""
-    root = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(root) if root else user_cache_path("dubins-traffic") / "kernels"
-    folder = base / versions_hash()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError:
-        folder = Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / versions_hash()
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+TIER = "DUBINS_TRAFFIC_KERNELS"
+"""The environment variable that says how kernels run."""
+TIERS = ("auto", "compiled", "interpreted")
+BESIDE = (
+    "kernels are being compiled in the background; until they are there, trials run interpreted, slower and with "
+    "the same results"
+)
 
 
-def nothing_compiled() -> bool:
-    """Whether the cache can be looked into, holds no kernel of these sources yet, and kernels are to be compiled."""
-    if cast(Any, numba).config.DISABLE_JIT:
-        return False
-    try:
-        present = {path.name for path in cache_folder().iterdir()}
-    except OSError:
-        return False
-    return present.isdisjoint(module_folder(file).name for file in kernel_files())
+class Maker(Protocol):
+    """How the companion makes a kernel."""
+
+    def __call__(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:
+        """Return what can be compiled."""
+        ...
 
 
-def module_folder(file: Path) -> Path:
-    """Return the folder for the compiled kernels of a file, of this package or another."""
-    name = ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
-    return cache_folder() / f"{name}-{source_hash(file)}"
+companion: Maker | None = None
+"""Set in the companion alone, which compiles."""
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` on first use, without fast-math and without exceptions on division.
+    """Compile `function`, without fast-math and without exceptions on division, for calls from Python and kernels.
 
-    The compiled code is cached on disk. With ``NUMBA_DISABLE_JIT=1`` the function is returned as it is. Kernels
-    don't allocate, so references to arrays are not counted (`_nrt`): each call would else count every array of
-    the tables it is given up and down, which takes longer than most kernels do.
-
-    A kernel whose name begins with an underscore can be called from other kernels only: the code that would unpack
-    Python's arguments often takes longer to compile than the kernel.
+    The machine code is kept on disk. Kernels don't allocate, so references to arrays are not counted: each call would
+    else count every array of the tables it is given up and down, which takes longer than most kernels do.
     """
-    return _compiled(function)
+    return _made(function)
 
 
 def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
@@ -76,38 +60,139 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
 
     Handing over a table of arrays costs more than the few operations of such a function.
     """
-    return _compiled(function, inlined=True)
+    return _made(function, inlined=True)
 
 
 def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile as `jit` does a kernel whose name begins with an underscore: only other kernels can call it."""
-    return _compiled(function, inner=True)
+    """Compile as `jit` does a kernel that only other kernels call."""
+    return _made(function)
 
 
 def jit_wide(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `jit` does, and make the same steps for several cars one instruction: the compiler takes longer."""
-    return _compiled(function, wide=True)
+    return _made(function, wide=True)
 
 
-def _compiled(
-    function: Callable[P, R], *, inlined: bool = False, inner: bool = False, wide: bool = False
-) -> Callable[P, R]:
-    library = cast(Any, numba)
-    linking.install()
-    inner = inner or function.__name__.startswith("_")
-    if inner or inlined:
-        linking.mark_inner(function.__module__, function.__qualname__)
-    if wide:
-        linking.mark_wide(function.__module__, function.__qualname__)
-    compiler = library.njit(
-        error_model="numpy",
-        nogil=True,
-        forceinline=inlined,
-        _nrt=False,
-        no_cfunc_wrapper=True,
-        no_cpython_wrapper=inner,
-    )
-    compiled = compiler(function)
-    if not library.config.DISABLE_JIT:
-        compiled._cache = KernelCache(function, module_folder(Path(function.__code__.co_filename)))
-    return cast(Callable[P, R], compiled)
+def _made(function: Callable[P, R], *, inlined: bool = False, wide: bool = False) -> Callable[P, R]:
+    if companion is not None:
+        return companion(function, inlined=inlined, wide=wide)
+    if never_compiled():
+        return function
+    return Kernel(function)
+
+
+def never_compiled() -> bool:
+    """Whether kernels stay plain functions for ever."""
+    off = os.environ.get("NUMBA_DISABLE_JIT", "").strip()
+    return off not in ("", "0") or os.environ.get(TIER) == "interpreted"
+
+
+def waits() -> bool:
+    """Whether a call waits until its kernel is compiled.
+
+    Raises
+    ------
+    InputError
+        If the environment variable that says so says something else.
+    """
+    tier = os.environ.get(TIER) or TIERS[0]
+    if tier not in TIERS:
+        raise InputError("no such tier", file=TIER, value=tier, expected=" or ".join(TIERS))
+    return tier == "compiled"
+
+
+class Kernel(Generic[P, R]):
+    """A function that runs interpreted or as machine code.
+
+    Parameters
+    ----------
+    function : callable
+        The function, on arrays, tuples of them, and numbers.
+    """
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        update_wrapper(self, function)
+        self._function = cast(FunctionType, function)
+        self._known: dict[tuple[Kind, ...], Code | asking.Waiting | None] = {}
+
+    def __call__(self, *args: P.args, **named: P.kwargs) -> R:
+        """Run the kernel."""
+        whole = self._whole(args, named)
+        try:
+            code = self.code(tuple([kind_of(value) for value in whole]))
+        except UnfitError:
+            code = None
+        if code is None:
+            return self.interpreted(*args, **named)
+        return code.call(whole)
+
+    def interpreted(self, *args: P.args, **named: P.kwargs) -> R:
+        """Run the function interpreted, as silent about numbers that are not finite as machine code is."""
+        with np.errstate(all="ignore"):
+            return self.py_func(*args, **named)
+
+    def __reduce__(self) -> str:
+        return self._function.__qualname__
+
+    @cached_property
+    def py_func(self) -> Callable[P, R]:
+        """The function interpreted, with all that it calls."""
+        own = self._function
+        plain = FunctionType(own.__code__, _plain_names(own), own.__name__, own.__defaults__, own.__closure__)
+        plain.__kwdefaults__ = own.__kwdefaults__
+        return cast("Callable[P, R]", plain)
+
+    def code(self, kinds: tuple[Kind, ...]) -> Code | None:
+        """Return the machine code for arguments of some kinds; None while there is none, and then see to it."""
+        try:
+            found = self._known[kinds]
+        except KeyError:
+            found = self._known[kinds] = self._sought(kinds)
+        if isinstance(found, asking.Waiting):
+            if found.wait() if found.waits else found.is_there():
+                found = self._known[kinds] = self._sought(kinds)
+            elif found.failure:
+                asking.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
+                found = self._known[kinds] = None
+        return found if isinstance(found, Code) else None
+
+    def _sought(self, kinds: tuple[Kind, ...]) -> Code | asking.Waiting | None:
+        own = self._function
+        file = Path(own.__code__.co_filename)
+        if own.__module__ == "__main__" or "<locals>" in own.__qualname__ or not file.is_file():
+            return None
+        path = store.kernel_file(file, own.__qualname__, kinds, machine.processor())
+        found = store.load(path)
+        if found is not None:
+            return Code(kinds, found[0], machine.load(found[1], store.symbol(path)))
+        if not waits():
+            asking.say(BESIDE)
+        return asking.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waits())
+
+    def _whole(self, args: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
+        """Return all arguments in order, those that take any number of them as one tuple."""
+        count, starred = self._shape
+        if named or len(args) < count:
+            filled = inspect.signature(self._function).bind(*args, **named)
+            filled.apply_defaults()
+            return tuple(filled.arguments.values())
+        return (*args[:count], args[count:]) if starred else args
+
+    @cached_property
+    def _shape(self) -> tuple[int, bool]:
+        code = self._function.__code__
+        return code.co_argcount, bool(code.co_flags & inspect.CO_VARARGS)
+
+
+def _plain_names(function: FunctionType) -> dict[str, Any]:
+    """Return the names that a kernel's function knows, with the interpreted functions for kernels."""
+    own = function.__globals__
+    known = _plain.get(id(own))
+    if known is None:
+        known = _plain[id(own)] = {}
+        known.update(own)
+        known.update({name: value.py_func for name, value in own.items() if isinstance(value, Kernel)})
+    return known
+
+
+_plain: dict[int, dict[str, Any]] = {}

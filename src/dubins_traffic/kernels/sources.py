@@ -6,24 +6,26 @@ import hashlib
 import re
 import sys
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-
-import llvmlite  # pyright: ignore[reportMissingTypeStubs]
-import numba
-import numpy as np
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
+
+LIBRARIES = ("numba", "llvmlite", "numpy")
+"""What compiles kernels."""
 
 _IMPORT = re.compile(rb"^\s*from dubins_traffic\.([\w.]+) import ", re.MULTILINE)
 
 
 @cache
 def versions_hash() -> str:
-    """Return a hash of the versions of what compiles kernels."""
-    digest = hashlib.sha256()
-    for part in (sys.version, numba.__version__, llvmlite.__version__, np.__version__):
-        digest.update(part.encode())
+    """Return a hash of the versions of what compiles kernels, and of how it is done here."""
+    digest = hashlib.sha256(sys.version.encode())
+    for name in LIBRARIES:
+        digest.update(_version(name).encode())
+    for file in sorted((PACKAGE / "kernels").glob("*.py")):
+        digest.update(_text_of(file)[0])
     return digest.hexdigest()[:16]
 
 
@@ -34,7 +36,7 @@ def source_hash(file: Path) -> str:
     for source in sorted(imported(file)):
         inside = PACKAGE in source.parents
         digest.update(str(source.relative_to(PACKAGE) if inside else source.name).encode())
-        digest.update(source.read_bytes())
+        digest.update(_text_of(source)[0])
     return digest.hexdigest()[:16]
 
 
@@ -50,17 +52,25 @@ def imported(file: Path) -> set[Path]:
     return found
 
 
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
+
+
 @cache
-def kernel_files() -> list[Path]:
-    """Return the files of the package that hold kernels, in order."""
-    return sorted(file for file in PACKAGE.rglob("*.py") if b"\n@jit" in file.read_bytes())
+def _text_of(file: Path) -> tuple[bytes, tuple[bytes, ...]]:
+    """Return a hash of a file, and the names that it imports of the package."""
+    data = file.read_bytes()
+    return hashlib.sha256(data).digest(), tuple(_IMPORT.findall(data))
 
 
 @cache
 def _imports(file: Path) -> frozenset[Path]:
     """Return the modules that a file imports; of a package from which it imports anything, all modules in it."""
     found: set[Path] = set()
-    for name in _IMPORT.findall(file.read_bytes()):
+    for name in _text_of(file)[1]:
         place = PACKAGE.joinpath(*name.decode().split("."))
         module = place.with_suffix(".py")
         found.update([module] if module.is_file() else place.glob("*.py"))

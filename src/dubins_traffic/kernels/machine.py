@@ -1,0 +1,125 @@
+"""Machine code: compiled kernels are loaded into this process and called. Numba is not needed for that."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import struct
+from collections.abc import Iterator, Sequence
+from functools import cache
+from importlib import import_module
+from threading import Lock
+from typing import Any, cast
+
+from dubins_traffic.kernels.kinds import NONE, Kind, is_number, letters, packed
+
+CPU = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
+"""Environment variables by which Numba is told for which processor it compiles."""
+
+
+class Loader:
+    """What loads machine code into this process; kept for ever, like all that it has loaded."""
+
+    def __init__(self) -> None:
+        from llvmlite import binding  # pyright: ignore[reportMissingTypeStubs]
+
+        self._llvm = cast(Any, binding)
+        self._llvm.initialize_native_target()
+        self._llvm.initialize_native_asmprinter()
+        target = self._llvm.Target.from_triple(self._llvm.get_process_triple())
+        machine = target.create_target_machine(jit=True)
+        self._engine = self._llvm.create_mcjit_compiler(self._llvm.parse_assembly(""), machine)
+
+    def load(self, code: bytes, symbol: str) -> Any:
+        """Return the function `symbol` of an object file, to be called with the frame and a block for the answer."""
+        self._engine.add_object_file(self._llvm.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+        address = self._engine.get_function_address(symbol)
+        return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p, ctypes.c_void_p)(address)
+
+
+_lock = Lock()
+
+
+@cache
+def _loader() -> Loader:
+    return Loader()
+
+
+def load(code: bytes, symbol: str) -> Any:
+    """Load an object file into this process and return its function `symbol`, as `Loader.load` does."""
+    with _lock:
+        return _loader().load(code, symbol)
+
+
+@cache
+def processor() -> tuple[str, ...]:
+    """Return for which processor code is made: its name and what it can do."""
+    from llvmlite import binding  # pyright: ignore[reportMissingTypeStubs]
+
+    llvm = cast(Any, binding)
+    told = [os.environ.get(name, "") for name in CPU]
+    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *told
+
+
+class Code:
+    """Machine code of a kernel for arguments of some kinds.
+
+    Parameters
+    ----------
+    kinds : sequence of Kind
+        Those of its arguments.
+    answer : Kind
+        That of what it returns.
+    function : callable
+        What `load` returns.
+    """
+
+    def __init__(self, kinds: Sequence[Kind], answer: Kind, function: Any) -> None:
+        self.kinds = tuple(kinds)
+        self.pack = struct.Struct(
+            "@" + "".join("q" if not is_number(kind) else letters(kind) for kind in kinds)
+        ).pack
+        self.function = function
+        self._answer = answer
+        self._read = struct.Struct("@" + letters(answer))
+
+    def call(self, whole: Sequence[Any]) -> Any:
+        """Call it with all arguments."""
+        kept: list[Any] = []
+        values: list[Any] = []
+        for value, kind in zip(whole, self.kinds, strict=True):
+            values.append(value if is_number(kind) else address(value, kind, kept))
+        out = self.room()
+        if self.function(self.pack(*values), out):
+            raise RuntimeError("a kernel has failed")
+        return self.read(out)
+
+    def room(self) -> ctypes.Array[ctypes.c_char] | None:
+        """Return room for an answer, None where there is none."""
+        return ctypes.create_string_buffer(self._read.size) if self._read.size else None
+
+    def read(self, room: ctypes.Array[ctypes.c_char] | None) -> Any:
+        """Return the answer in its room."""
+        if room is None:
+            return _built(self._answer, iter(()))
+        values = self._read.unpack(room)
+        return values[0] if is_number(self._answer) else _built(self._answer, iter(values))
+
+
+def address(value: object, kind: Kind, kept: list[Any]) -> int:
+    """Return the address of a new block for an array or tuple; the block is appended to what is to be kept."""
+    if kind == NONE:
+        return 0
+    block = packed(value, kind)
+    kept.append((value, block))
+    return ctypes.addressof(block)
+
+
+def _built(kind: Kind, values: Iterator[Any]) -> Any:
+    if is_number(kind):
+        return next(values)
+    if kind == NONE:
+        return None
+    parts = [_built(part, values) for part in kind[-1]]
+    return tuple(parts) if kind[0] == "tuple" else getattr(import_module(kind[1]), kind[2])(*parts)

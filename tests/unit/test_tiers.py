@@ -1,0 +1,269 @@
+"""Kernels interpreted and compiled: the companion, its lock, and going over from one to the other."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+
+from dubins_traffic.kernels import asking, compile, store
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.compile import Kernel, jit
+from dubins_traffic.kernels.kinds import UnfitError, dtype_of, kind_of
+from dubins_traffic.kernels.machine import Code
+from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.trial.buffer import all_finite
+
+PATIENCE = 300.0
+
+
+def environment(cache: Path, tier: str) -> dict[str, str]:
+    return {**os.environ, "NUMBA_CACHE_DIR": str(cache), "DUBINS_TRAFFIC_KERNELS": tier}
+
+
+def begin(cache: Path, code: str, tier: str = "auto") -> subprocess.Popen[str]:
+    pipe = subprocess.PIPE
+    around = environment(cache, tier)
+    return subprocess.Popen([sys.executable, "-c", code], env=around, stdout=pipe, stderr=pipe, text=True)
+
+
+def python(cache: Path, code: str, tier: str = "auto") -> tuple[str, str]:
+    process = begin(cache, code, tier)
+    told, said = process.communicate()
+    assert process.returncode == 0, said
+    return told, said
+
+
+def companions(cache: Path) -> list[int]:
+    """Return the companions that work for a cache."""
+    found: list[int] = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            around = (folder / "environ").read_bytes().split(b"\0")
+            ours = f"NUMBA_CACHE_DIR={cache}".encode() in around
+            if ours and b"kernels.companion" in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+    return found
+
+
+def end_companions(cache: Path) -> None:
+    for process in companions(cache):
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+    until(lambda: not companions(cache))
+
+
+def until(fact) -> None:
+    """Wait for something."""
+    latest = monotonic() + PATIENCE
+    while not fact():
+        assert monotonic() < latest
+        sleep(0.05)
+
+
+def kernels(cache: Path) -> list[Path]:
+    return sorted(cache.rglob("*.kernel"))
+
+
+def asked(cache: Path) -> list[Path]:
+    return sorted(cache.rglob("asked/*.json"))
+
+
+@pytest.fixture
+def cache(tmp_path):
+    yield tmp_path / "cache"
+    end_companions(tmp_path / "cache")
+
+
+SWITCH = """
+from dubins_traffic.kernels.compile import Kernel
+from dubins_traffic.kernels.machine import Code
+from dubins_traffic.kernels.trig import sincos
+answers = set()
+while not any(isinstance(found, Code) for found in sincos._known.values()):
+    answers.add(sincos(0.5))
+answers.add(sincos(0.5))
+print(answers, "numba" in __import__("sys").modules)
+"""
+
+
+def test_calls_go_over_to_machine_code_when_it_is_there(cache) -> None:
+    told, said = python(cache, SWITCH)
+    assert told == f"{ {sincos(0.5)} } False\n"
+    assert said.count("\n") == 1
+    assert "in the background" in said
+    assert len(kernels(cache)) == 1
+    assert python(cache, SWITCH) == (told, "")
+
+
+CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5))"
+
+
+def test_what_a_killed_companion_was_asked_for_is_compiled_by_the_next(cache) -> None:
+    python(cache, CALL)
+    until(lambda: companions(cache) or kernels(cache))
+    end_companions(cache)
+    for path in kernels(cache):
+        path.unlink()  # as if it had been killed earlier
+    assert python(cache, CALL, "compiled") == (f"{sincos(0.5)}\n", "")
+    assert len(kernels(cache)) == 1
+    until(lambda: not asked(cache))
+
+
+def test_a_companion_killed_while_it_is_waited_for_is_begun_again(cache) -> None:
+    waiting = begin(cache, CALL, "compiled")
+    until(lambda: companions(cache) or waiting.poll() is not None)
+    end_companions(cache)
+    assert waiting.communicate() == (f"{sincos(0.5)}\n", "")
+
+
+def test_processes_at_once_have_one_companion(cache) -> None:
+    several = [begin(cache, CALL, "compiled") for _ in range(4)]
+    assert [process.communicate()[0] for process in several] == [f"{sincos(0.5)}\n"] * 4
+    times = [path.stat().st_mtime_ns for path in kernels(cache)]
+    assert len(times) == 1
+    until(lambda: len(companions(cache)) <= 1)
+
+
+def test_one_companion_alone_holds_the_lock(cache, monkeypatch) -> None:
+    monkeypatch.setattr(store, "cache_folder", lambda: cache)
+    cache.mkdir()
+    with asking.locked() as first, asking.locked() as second:
+        assert (first, second) == (True, False)
+        command = [sys.executable, "-m", "dubins_traffic.kernels.companion"]
+        assert (
+            subprocess.run(command, env=environment(cache, "auto"), check=False, timeout=PATIENCE).returncode
+            == 0
+        )
+    with asking.locked() as free:
+        assert free
+
+
+def test_a_companion_takes_no_notice_of_notes_it_cannot_use(cache) -> None:
+    python(cache, CALL, "compiled")
+    end_companions(cache)
+    kernel = kernels(cache)[0]
+    folder = kernel.parents[1] / asking.ASKED
+    folder.mkdir(exist_ok=True)
+    (folder / "torn.json").write_text('{"module": "dub')
+    (folder / "other.json").write_text('["of", "another", "version"]')
+    note = {"module": "dubins_traffic.kernels.trig", "name": "sincos", "file": "/gone", "kinds": "()"}
+    (folder / "gone.json").write_text(json.dumps({**note, "target": str(kernel.with_name("x.kernel"))}))
+    kernel.unlink()
+    python(cache, CALL, "compiled")
+    assert kernels(cache) == [kernel]
+    until(lambda: not asked(cache))
+
+
+INTERRUPTED = """
+import _thread, threading
+from dubins_traffic.kernels.trig import sincos
+threading.Timer(0.2, _thread.interrupt_main).start()
+try:
+    print(sincos(0.5))
+    while True:
+        pass
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_waiting_can_be_interrupted_and_what_is_compiled_is_kept(cache) -> None:
+    told, _ = python(cache, INTERRUPTED, "compiled")
+    assert told.endswith("interrupted\n")
+    until(lambda: kernels(cache) and not asked(cache))
+
+
+@pytest.mark.parametrize("tier", ["auto", "compiled"])
+def test_where_nothing_can_be_kept_kernels_run_interpreted(tmp_path, tier) -> None:
+    code = (
+        "import dubins_traffic.kernels.store as store, pathlib\n"
+        "store.cache_folder = lambda: pathlib.Path('/proc/nowhere')\n" + CALL
+    )
+    told, said = python(tmp_path, code, tier)
+    assert told == f"{sincos(0.5)}\n"
+    assert "stays interpreted" in said or tier == "auto"
+    assert not companions(tmp_path)
+
+
+def test_kernels_that_are_never_compiled_are_plain_functions(tmp_path) -> None:
+    code = "from dubins_traffic.kernels.trig import sincos; print(type(sincos).__name__, sincos(0.5))"
+    assert python(tmp_path, code, "interpreted") == (f"function {sincos(0.5)}\n", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_tier_is_refused_by_name(monkeypatch) -> None:
+    monkeypatch.setenv("DUBINS_TRAFFIC_KERNELS", "quick")
+    with pytest.raises(Exception, match=r"DUBINS_TRAFFIC_KERNELS: .*'quick'.*auto or compiled"):
+        compile.waits()
+
+
+def test_kinds_can_be_read_back() -> None:
+    rows = np.dtype([("x", "f8"), ("lane", "i4", (3,)), ("bits", "u1")], align=True)
+    for dtype in (np.dtype("f8"), np.dtype("u4"), np.dtype("b1"), rows):
+        kind = kind_of(np.zeros((2, 3), dtype))
+        assert dtype_of(kind[1]) == dtype
+        assert dtype_of(kind[1]).isalignedstruct == dtype.isalignedstruct
+        assert kind[2:] == (2, "C", True)
+    assert kind_of(np.zeros((2, 3)).T)[3] == "F"
+    assert kind_of(np.zeros((4, 4))[::2, ::2])[3] == "A"
+    assert kind_of(2**63) == kind_of(np.uint64(1)) != kind_of(1) == kind_of(np.int64(1))
+    assert kind_of((1, (2.0, None))) == ("tuple", (kind_of(1), ("tuple", (kind_of(1.0), ("none",)))))
+    for unfit in ("text", [1], np.zeros(2, object), np.zeros(2, ">f8")):
+        with pytest.raises(UnfitError):
+            kind_of(unfit)
+
+
+def test_machine_code_takes_and_returns_what_the_function_does() -> None:
+    assert isinstance(all_finite, Kernel)
+    for commands in (np.zeros((1, 3, 2)), np.full((1, 1, 2), np.inf), np.zeros((1, 2, 4))[:, :, ::2]):
+        assert all_finite(commands) is bool(all_finite.interpreted(commands))
+    assert {type(found) for found in all_finite._known.values()} == {Code}
+
+
+def test_bound_calls_see_other_arrays_in_front() -> None:
+    call = bound(add, (0, np.zeros(2)), (np.array([1.0, 2.0]), np.array([10.0])))
+    first, second = np.zeros(2), np.zeros(2)
+    assert call(1, first) == 13.0
+    assert call(2, second) == 26.0
+    assert call(1, first) == 13.0
+    assert first.tolist() == [2.0, 0.0]
+    assert second.tolist() == [2.0, 0.0]
+
+
+@jit
+def add(times, into, *arrays):
+    """Add up arrays and count calls."""
+    total = 0.0
+    for array in arrays:
+        for k in range(array.shape[0]):
+            total += array[k]
+    into[0] += times
+    return total * times
+
+
+def test_a_kernel_of_a_users_module_is_compiled_where_it_stands(cache, tmp_path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from dubins_traffic.kernels.compile import jit\n@jit\ndef double(x):\n    return 2 * x\n"
+    )
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\nfrom mine import double\nprint(double(3), double(0.25))"
+    assert python(cache, code, "compiled") == ("6 0.5\n", "")
+    assert [path.parent.name.partition("-")[0] for path in kernels(cache)] == ["mine", "mine"]
+
+
+def test_a_kernel_that_cannot_be_compiled_stays_interpreted_and_says_so(cache, tmp_path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from dubins_traffic.kernels.compile import jit\n@jit\ndef listed(x):\n    return [x, open]\n"
+    )
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\nfrom mine import listed\nprint(len(listed(3)))"
+    )
+    told, said = python(cache, code, "compiled")
+    assert told == "2\n"
+    assert "listed stays interpreted: " in said
