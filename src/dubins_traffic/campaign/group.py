@@ -36,6 +36,8 @@ from dubins_traffic.driving.law_tables import FIRST, KIND, PLACE, ROUND, desk
 from dubins_traffic.driving.law_tables import LAST as LAST_STAGE
 from dubins_traffic.driving.rounds import stages
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import steady
+from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
@@ -132,6 +134,7 @@ class Group:
         self._contacts: list[list[Contact]] = [[] for _ in instances]
         self._breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
+        self._take = steady(run_trials)
         self._run(self.active, 1)
         self._aim()
 
@@ -157,9 +160,13 @@ class Group:
             self._run(active, most)
 
     def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
-        """Run all trials to their ends, about `WORK` steps of cars at a time; stop in between when `cancelled`."""
+        """Run all trials to their ends, about `WORK` steps of cars at a time; stop in between when `cancelled`.
+
+        Interpreted it is a hundredth of that at a time, and between two times kernels may go over to machine code.
+        """
         while len(active := self.active) and not cancelled():
-            self._run(active, max(1, WORK // (len(active) * self.state.x.shape[1])))
+            work = WORK if is_quick(run_trials) else WORK // 100
+            self._run(active, max(1, work // (len(active) * self.state.x.shape[1])))
 
     def end(self, b: int, end: End, detail: str = "") -> None:
         """End trial b for a reason of its driver's."""
@@ -212,7 +219,7 @@ class Group:
         goal = self.ticks[active] + most
         while len(active):
             left = int((goal - self.ticks[active]).max())
-            run_trials(active, left, 1.0 / self._rate, self.commands, self._world)
+            self._take(active, left, 1.0 / self._rate, self.commands, self._world)
             self._drain()
             self._mind(active)
             going = self._going[active] & (self.ticks[active] < goal)

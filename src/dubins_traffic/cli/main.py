@@ -30,6 +30,7 @@ from dubins_traffic.cli import (
     spec,
     synth,
     verify,
+    warm,
 )
 
 app = typer.Typer(
@@ -82,6 +83,7 @@ app.add_typer(gazebo.app, name="gazebo")
 app.add_typer(lcm.app, name="lcm")
 app.add_typer(ros2.app, name="ros2")
 app.add_typer(lines.app, name="lines")
+app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

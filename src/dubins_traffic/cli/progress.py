@@ -7,8 +7,10 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(trials: int | None = None, *, hidden: bool = False) -> Generator[Callable[[int, int], object]]:
-    """Show how many of the trials are done, on standard error and only to people.
+def progress(
+    trials: int | None = None, *, hidden: bool = False, what: str = "trials"
+) -> Generator[Callable[[int, int], object]]:
+    """Show how many of the trials, or of `what` else, are done, on standard error and only to people.
 
     Yields what is to be told (trials done, trials in all); `trials` is how many there are, if that is known before.
     `hidden`: nothing is shown, since someone else draws there.
@@ -26,7 +28,7 @@ def progress(trials: int | None = None, *, hidden: bool = False) -> Generator[Ca
     console = Console(stderr=True)
     columns = (
         SpinnerColumn(),
-        "trials",
+        what,
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -35,5 +37,5 @@ def progress(trials: int | None = None, *, hidden: bool = False) -> Generator[Ca
     with Progress(
         *columns, console=console, transient=True, disable=hidden or not console.is_terminal
     ) as shown:
-        task = shown.add_task("trials", total=trials)
+        task = shown.add_task(what, total=trials)
         yield lambda done, total: shown.update(task, completed=done, total=total)

@@ -30,6 +30,10 @@ FAILED = ".failed"
 """Ending of the file that says why a kernel could not be compiled."""
 PAUSE = 0.25
 """Seconds between two looks for a kernel that is wanted."""
+HURRY = "hurry"
+"""The file in the cache folder that asks a companion that stands back, and gets little done, to make room."""
+LONG = 10.0
+"""Seconds of interpreted work after which what is wanted is worth a processor of its own."""
 STARTS = 3
 """So often is a companion begun for one kernel, at most."""
 
@@ -61,6 +65,10 @@ class Wish:
         return self.note.with_suffix(FAILED)
 
 
+wanted: list[Waiting] = []
+"""What this process has asked for."""
+
+
 class Waiting:
     """A kernel that has been asked for and is not there yet.
 
@@ -85,11 +93,13 @@ class Waiting:
         self.wish = Wish(module, name, str(file), repr(tuple(kinds)), str(target), paths)
         self.failure = ""
         self.waits = waits
+        self._long = monotonic() + (0.0 if waits else LONG)
         self._left = STARTS
         self._next = 0.0
         with contextlib.suppress(OSError):
             self.wish.failure.unlink(missing_ok=True)
         self._ask()
+        wanted.append(self)
 
     def is_there(self) -> bool:
         """Tell, at most every `PAUSE` seconds, whether the kernel has been compiled; else see that it will be."""
@@ -97,7 +107,13 @@ class Waiting:
         if now < self._next or self.failure:
             return False
         self._next = now + PAUSE
+        self.waits = self.waits or now > self._long
         return self._look()
+
+    def withdraw(self) -> None:
+        """Want it no more."""
+        with contextlib.suppress(OSError):
+            self.wish.note.unlink(missing_ok=True)
 
     def wait(self) -> bool:
         """Wait for the kernel; return whether it has been compiled."""
@@ -117,7 +133,15 @@ class Waiting:
             if self.wish.path.exists():
                 return True
             self._ask()
+        elif self.waits and monotonic() > self._long:
+            self._long = monotonic() + LONG
+            self._hurry()
         return False
+
+    def _hurry(self) -> None:
+        """Ask a companion that stands back and gets little done to make room for one that does not."""
+        with contextlib.suppress(OSError):
+            (store.cache_folder() / HURRY).touch()
 
     def _ask(self) -> None:
         if self._left == 0:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar, cast
 
+import numpy as np
+
 from dubins_traffic.kernels.compile import Kernel
 from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
 from dubins_traffic.kernels.machine import Code, address
@@ -53,6 +55,59 @@ class _Later(Generic[R]):
             return self._kernel.interpreted(*first, *self._after)
         self._call = _compiled(code, self._after)
         return self._call(*first)
+
+
+def steady(kernel: Callable[..., R]) -> Callable[..., R]:
+    """Return a kernel that is to be called often, with arrays and tables most of which are those of the call before.
+
+    Parameters
+    ----------
+    kernel
+        A function made by `kernels.compile.jit`, without a parameter that takes any number of arguments. Numbers among
+        its arguments have to be of the same kind in every call.
+    """
+    return _Steady(cast("Kernel[..., R]", kernel)) if isinstance(kernel, Kernel) else kernel
+
+
+class _Steady(Generic[R]):
+    """Calls that look only at the arguments that are others than before."""
+
+    def __init__(self, kernel: Kernel[..., R]) -> None:
+        self._kernel = kernel
+        self._code: Code | None = None
+        self._kinds: tuple[Kind, ...] = ()
+        self._seen: dict[int, tuple[Any, Kind, int, list[Any]]] = {}
+
+    def __call__(self, *args: Any) -> R:
+        values: list[Any] = []
+        same = self._code is not None
+        for k, value in enumerate(args):
+            if not _is_table(value):
+                values.append(value)
+                continue
+            seen = self._seen.get(k)
+            if seen is None or seen[0] is not value:
+                kept: list[Any] = []
+                kind = kind_of(value)
+                same = same and seen is not None and seen[1] == kind
+                seen = self._seen[k] = (value, kind, address(value, kind, kept), kept)
+            values.append(seen[2])
+        if not same:
+            self._kinds = tuple(
+                self._seen[k][1] if k in self._seen else kind_of(v) for k, v in enumerate(args)
+            )
+            self._code = self._kernel.code(self._kinds)
+        code = self._code
+        if code is None:
+            return self._kernel.interpreted(*args)
+        room = code.room()
+        if code.function(code.pack(*values), room):
+            raise RuntimeError("a kernel has failed")
+        return code.read(room)
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, np.ndarray | tuple)
 
 
 def _compiled(code: Code, after: tuple[Any, ...]) -> Callable[..., Any]:

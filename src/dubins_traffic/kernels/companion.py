@@ -15,7 +15,8 @@ import os
 import sys
 import traceback
 from pathlib import Path
-from time import monotonic, sleep
+from threading import Thread
+from time import monotonic, process_time, sleep
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.kernels import asking, store
@@ -32,12 +33,17 @@ LONGEST = 600.0
 SETTLE = 1.0
 """Seconds for which it tries to be the only one: others look into the lock for a moment."""
 PAUSE = 0.05
+LOOK = 1.0
+"""Seconds between two looks for whether somebody is in a hurry."""
+SHARE = 0.6
+"""The part of a processor that is little, for a process that always has something to do."""
 
 
 def main() -> None:
     """Compile until nothing is asked for, if no other companion is at work."""
     if "--behind" in sys.argv[1:]:
         os.nice(NICE)
+        Thread(target=_make_room, daemon=True).start()
     began = monotonic()
     while monotonic() < began + SETTLE:
         with asking.locked() as free:
@@ -47,7 +53,18 @@ def main() -> None:
         sleep(PAUSE)
 
 
+def _make_room() -> None:
+    """End this process when another is in a hurry and this one, behind all others, gets little done."""
+    hurry = store.cache_folder() / asking.HURRY
+    while True:
+        clock, used = monotonic(), process_time()
+        sleep(LOOK)
+        if hurry.exists() and process_time() - used < SHARE * (monotonic() - clock):
+            os._exit(0)  # what it was at is still asked for
+
+
 def _work(began: float) -> None:
+    (store.cache_folder() / asking.HURRY).unlink(missing_ok=True)
     compiler: Compiler | None = None
     latest = monotonic()
     while monotonic() < min(latest + LINGER, began + LONGEST):

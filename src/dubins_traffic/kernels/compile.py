@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from functools import cached_property, update_wrapper
 from pathlib import Path
 from types import FunctionType
@@ -73,12 +74,24 @@ def jit_wide(function: Callable[P, R]) -> Callable[P, R]:
     return _made(function, wide=True)
 
 
-def _made(function: Callable[P, R], *, inlined: bool = False, wide: bool = False) -> Callable[P, R]:
+def jit_long(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `jit` does a kernel of which one call may take minutes interpreted: calls wait for machine code."""
+    return _made(function, patient=True)
+
+
+def _made(
+    function: Callable[P, R], *, inlined: bool = False, wide: bool = False, patient: bool = False
+) -> Callable[P, R]:
     if companion is not None:
         return companion(function, inlined=inlined, wide=wide)
     if never_compiled():
         return function
-    return Kernel(function)
+    return Kernel(function, patient=patient)
+
+
+def is_quick(kernel: Callable[..., Any]) -> bool:
+    """Tell whether calls of a kernel have gone over to machine code."""
+    return isinstance(kernel, Kernel) and kernel.is_quick
 
 
 def never_compiled() -> bool:
@@ -101,6 +114,19 @@ def waits() -> bool:
     return tier == "compiled"
 
 
+@contextmanager
+def rehearsal() -> Generator[None]:
+    """Ask for all kernels that are called in the body, and run them interpreted."""
+    _rehearsing.append(None)
+    try:
+        yield
+    finally:
+        _rehearsing.pop()
+
+
+_rehearsing: list[None] = []
+
+
 class Kernel(Generic[P, R]):
     """A function that runs interpreted or as machine code.
 
@@ -108,10 +134,19 @@ class Kernel(Generic[P, R]):
     ----------
     function : callable
         The function, on arrays, tuples of them, and numbers.
+    patient : bool
+        Whether calls wait until there is machine code.
+
+    Attributes
+    ----------
+    is_quick : bool
+        Whether calls have gone over to machine code.
     """
 
-    def __init__(self, function: Callable[P, R]) -> None:
+    def __init__(self, function: Callable[P, R], *, patient: bool = False) -> None:
         update_wrapper(self, function)
+        self.is_quick = False
+        self._patient = patient
         self._function = cast(FunctionType, function)
         self._known: dict[tuple[Kind, ...], Code | asking.Waiting | None] = {}
 
@@ -149,7 +184,7 @@ class Kernel(Generic[P, R]):
         except KeyError:
             found = self._known[kinds] = self._sought(kinds)
         if isinstance(found, asking.Waiting):
-            if found.wait() if found.waits else found.is_there():
+            if found.wait() if not _rehearsing and (self._patient or waits()) else found.is_there():
                 found = self._known[kinds] = self._sought(kinds)
             elif found.failure:
                 asking.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
@@ -164,10 +199,12 @@ class Kernel(Generic[P, R]):
         path = store.kernel_file(file, own.__qualname__, kinds, machine.processor())
         found = store.load(path)
         if found is not None:
+            self.is_quick = True
             return Code(kinds, found[0], machine.load(found[1], store.symbol(path)))
-        if not waits():
+        waiting = self._patient or waits() or bool(_rehearsing)
+        if not waiting:
             asking.say(BESIDE)
-        return asking.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waits())
+        return asking.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waiting)
 
     def _whole(self, args: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
         """Return all arguments in order, those that take any number of them as one tuple."""

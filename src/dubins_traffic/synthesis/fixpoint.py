@@ -13,7 +13,7 @@ The rank of a position is the step in which it came into Y. Ranks of one layer (
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit_inner, jit_long
 from dubins_traffic.synthesis.arrays import Bytes, Flags
 from dubins_traffic.synthesis.moves import environment
 from dubins_traffic.synthesis.positions import unrank
@@ -43,7 +43,7 @@ def _turns(g: Graph, position: int) -> tuple[int, int]:
     return 0, int(g.out.used[0])
 
 
-@jit
+@jit_long
 def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
     """Set `found` (N,) to Cpre(`safe`); `ready` (N+1,) is room."""
     count = safe.shape[0]
@@ -281,7 +281,7 @@ def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
     return False
 
 
-@jit
+@jit_long
 def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: Search) -> None:
     """Rank all positions from which the ego can reach a target.
 

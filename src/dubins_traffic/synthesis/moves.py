@@ -8,7 +8,7 @@ one turn take their places in an order that the environment chooses.
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit_inner, jit_long
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.debts import owe
 from dubins_traffic.synthesis.positions import (
@@ -257,7 +257,7 @@ def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
     return cell
 
 
-@jit
+@jit_long
 def expand(
     t: Tables, others: int, positions: int, first: int, last: int, work: Work, out: Moves, begun: int
 ) -> int:
@@ -297,7 +297,7 @@ def expand(
     return last
 
 
-@jit
+@jit_long
 def list_moves(t: Tables, others: int, positions: int, position: int, work: Work, out: Moves) -> None:
     """Write the moves of both sides from one position, the one as if the environment were to move, the other the ego.
 

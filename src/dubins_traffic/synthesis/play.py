@@ -10,7 +10,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit_inner, jit_long
 from dubins_traffic.kernels.random import below
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Tables
@@ -202,7 +202,7 @@ def _worst(
     return picked
 
 
-@jit
+@jit_long
 def play_turns(
     t: Tables,
     size: tuple[int, int],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.synthesis.arrays import Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Board, Tables
 from dubins_traffic.synthesis.queues import SLOTS
@@ -132,7 +132,7 @@ def rank(t: Tables, others: int, scenes: Ints) -> int:
     return total
 
 
-@jit
+@jit_long
 def list_scenes(t: Tables, others: int, scenes: Ints, found: Numbers) -> None:
     """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
     for position in range(found.shape[0]):

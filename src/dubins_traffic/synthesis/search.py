@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit_long
 from dubins_traffic.synthesis.arrays import Bytes, Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import Moves, Work
@@ -122,7 +122,7 @@ class Search(NamedTuple):
         )
 
 
-@jit
+@jit_long
 def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
     """Turn moves round.
 
@@ -146,7 +146,7 @@ def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
             back[back_at[to[e]]] = position
 
 
-@jit
+@jit_long
 def own(owed_at: Ints, owner: Numbers) -> None:
     """Set the position (O,) of each debt."""
     for position in range(owed_at.shape[0] - 1):
