@@ -42,6 +42,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
@@ -104,6 +105,7 @@ class Fleet:
 
     def _gather(self) -> None:
         self._arrays = (*self._roads, *self._obstacles, *self._agents, *self._work)
+        self._state: State | None = None
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of the e-agents for [t_k, t_k+1) into `commands` (B, N, 2)."""
@@ -121,7 +123,10 @@ class Fleet:
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
         while done < commands.shape[0]:
-            reached = decide(tick, done, commands, *state, *self._arrays)
+            if state is not self._state:
+                self._state = state
+                self._call = bound(decide, (0, 0, commands), (*state, *self._arrays))
+            reached = self._call(tick, done, commands)
             done = reached
             if reached < 0:
                 done = -1 - reached

@@ -19,6 +19,7 @@ from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, S
 from dubins_traffic.driving.paths import FIELDS, LANE, LENGTH, PathMaker
 from dubins_traffic.driving.tours import LaneGraph, Round, find_round
 from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
+from dubins_traffic.kernels.calls import steady
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import pack
 
@@ -66,6 +67,7 @@ class Lanes:
         self._round = self._find_round()
         self._roads = pack([problem.network], [2.0 * problem.car.w])
         self._desk = None
+        self._decide = steady(decide)
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -82,7 +84,7 @@ class Lanes:
         for car in observation.others:
             others[car.index - 1, :O_STILL] = (*car.pose, *car.twist)
             others[car.index - 1, O_SEEN] = 1.0
-        decide(desk, self._roads)
+        self._decide(desk, self._roads)
         if desk.blocker[0] != NOBODY:
             self._detour(observation, int(desk.blocker[0]))
         speed, yaw_rate = desk.command[0].tolist()

@@ -10,6 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
 from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
+from dubins_traffic.kernels.calls import steady
 from dubins_traffic.protocols import Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
 from dubins_traffic.spec.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
@@ -70,6 +71,7 @@ class Trial:
         self._buffer = FrameBuffer(instance, sinks)
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0
+        self._all_finite = steady(all_finite)
         self._tellers = [agent for agent in self._agents if isinstance(agent, Reports)]
         self._note_agents()
         self._observation: Observation | None = None
@@ -117,7 +119,7 @@ class Trial:
         self._note_agents()
         commands[0, EGO, 0] = speed
         commands[0, EGO, 1] = yaw
-        if not all_finite(commands):
+        if not self._all_finite(commands):
             return self._agent_fault()
         with WHOLE:
             contacts = self._simulator.step(commands)
