@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.kernels.sources import PACKAGE
+from dubins_traffic.kernels.sources import KEEPERS, MAKERS, PACKAGE, imported
 from dubins_traffic.kernels.store import SUFFIX, kernel_file, load, save
 
 CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5))"
@@ -90,3 +90,12 @@ def test_kinds_and_processor_name_a_kernels_file() -> None:
     }
     assert len(paths) == 12
     assert len({path.parent for path in paths}) == 1
+
+
+def test_how_kernels_are_kept_is_no_part_of_what_they_are() -> None:
+    for file in PACKAGE.rglob("*.py"):
+        if b"\n@jit" in file.read_bytes():
+            assert not imported(file) & KEEPERS
+    for file in (PACKAGE / "kernels").glob("*.py"):
+        text = file.read_text()
+        assert "@jit" in text or "jit(" in text or file in KEEPERS | MAKERS or "kernels.compile" not in text

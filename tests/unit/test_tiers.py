@@ -186,9 +186,7 @@ def test_where_nothing_can_be_kept_kernels_run_interpreted(tmp_path, tier) -> No
         "import dubins_traffic.kernels.store as store, pathlib\n"
         "store.cache_folder = lambda: pathlib.Path('/proc/nowhere')\n" + CALL
     )
-    told, said = python(tmp_path, code, tier)
-    assert told == f"{sincos(0.5)}\n"
-    assert "stays interpreted" in said or tier == "auto"
+    assert python(tmp_path, code, tier)[0] == f"{sincos(0.5)}\n"
     assert not companions(tmp_path)
 
 

@@ -50,7 +50,7 @@ class _Later(Generic[R]):
     def __call__(self, *first: Any) -> R:
         if self._call is not None:
             return self._call(*first)
-        code = self._kernel.code(self._kinds)
+        code = None if self._kernel.is_waiting else self._kernel.code(self._kinds)
         if code is None:
             return self._kernel.interpreted(*first, *self._after)
         self._call = _compiled(code, self._after)
@@ -79,6 +79,8 @@ class _Steady(Generic[R]):
         self._seen: dict[int, tuple[Any, Kind, int, list[Any]]] = {}
 
     def __call__(self, *args: Any) -> R:
+        if self._kernel.is_waiting:
+            return self._kernel.interpreted(*args)
         values: list[Any] = []
         same = self._code is not None
         for k, value in enumerate(args):

@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import cached_property, update_wrapper
 from pathlib import Path
+from time import monotonic
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, Protocol, TypeVar, cast
 
@@ -147,11 +148,14 @@ class Kernel(Generic[P, R]):
         update_wrapper(self, function)
         self.is_quick = False
         self._patient = patient
+        self._pause = 0.0
         self._function = cast(FunctionType, function)
         self._known: dict[tuple[Kind, ...], Code | asking.Waiting | None] = {}
 
     def __call__(self, *args: P.args, **named: P.kwargs) -> R:
         """Run the kernel."""
+        if self.is_waiting:
+            return self.interpreted(*args, **named)
         whole = self._whole(args, named)
         try:
             code = self.code(tuple([kind_of(value) for value in whole]))
@@ -160,6 +164,11 @@ class Kernel(Generic[P, R]):
         if code is None:
             return self.interpreted(*args, **named)
         return code.call(whole)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether there is no machine code for the last call, and it is too early to look again."""
+        return self._pause > 0.0 and monotonic() < self._pause
 
     def interpreted(self, *args: P.args, **named: P.kwargs) -> R:
         """Run the function interpreted, as silent about numbers that are not finite as machine code is."""
@@ -189,6 +198,8 @@ class Kernel(Generic[P, R]):
             elif found.failure:
                 asking.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
                 found = self._known[kinds] = None
+            else:
+                self._pause = monotonic() + asking.PAUSE
         return found if isinstance(found, Code) else None
 
     def _sought(self, kinds: tuple[Kind, ...]) -> Code | asking.Waiting | None:

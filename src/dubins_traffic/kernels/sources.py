@@ -15,6 +15,15 @@ PACKAGE = Path(__file__).resolve().parents[1]
 LIBRARIES = ("numba", "llvmlite", "numpy")
 """What compiles kernels."""
 
+MAKERS = frozenset(PACKAGE / "kernels" / f"{name}.py" for name in ("compiler", "kinds"))
+"""The sources that say how kernels are compiled and called: they count for all kernels."""
+
+KEEPERS = frozenset(
+    PACKAGE / "kernels" / f"{name}.py"
+    for name in ("asking", "calls", "companion", "compile", "machine", "sources", "store")
+)
+"""The sources that say when kernels are compiled and where they are kept, which changes no machine code."""
+
 _IMPORT = re.compile(rb"^\s*from dubins_traffic\.([\w.]+) import ", re.MULTILINE)
 
 
@@ -24,7 +33,7 @@ def versions_hash() -> str:
     digest = hashlib.sha256(sys.version.encode())
     for name in LIBRARIES:
         digest.update(_version(name).encode())
-    for file in sorted((PACKAGE / "kernels").glob("*.py")):
+    for file in sorted(MAKERS):
         digest.update(_text_of(file)[0])
     return digest.hexdigest()[:16]
 
@@ -74,4 +83,4 @@ def _imports(file: Path) -> frozenset[Path]:
         place = PACKAGE.joinpath(*name.decode().split("."))
         module = place.with_suffix(".py")
         found.update([module] if module.is_file() else place.glob("*.py"))
-    return frozenset(found)
+    return frozenset(found - KEEPERS)

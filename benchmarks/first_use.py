@@ -1,0 +1,127 @@
+"""How soon a first run gives its score, with an empty cache of kernels, and what compiling takes.
+
+Each command is paired, in the same run: with an empty cache as it is, and interpreted for ever (`NUMBA_DISABLE_JIT=1`).
+`DUBINS_TRAFFIC_BEFORE` names a folder of sources of an older version, `.../src`, to pair with as well: then a first and
+a warm run of that version are timed too. What compiling takes is the processor time of the companion, which is begun
+here, so that it can be measured, after a command has asked for all that it needs.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from benchmarks.table import Row
+
+COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
+FIRST = (
+    "run demo --controller simple --trials 1",
+    "run town --controller rules --trials 1",
+    "run town --controller rules --shield --trials 1",
+)
+COMPILED = (*FIRST, "run demo --trials 1", "batch town --trials 4")
+WARM = ("run demo --trials 1", "run town --controller rules --trials 1")
+BEFORE = "DUBINS_TRAFFIC_BEFORE"
+ROUNDS = 3
+HELD = """
+import subprocess, sys
+from dubins_traffic.kernels.asking import locked
+with locked():
+    sys.exit(subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode)
+"""
+"""Runs a command while no companion can begin."""
+
+
+def measure() -> list[Row]:
+    """Return the rows of this benchmark."""
+    rows: list[Row] = []
+    for command in FIRST:
+        rows += _first(command)
+    for command in COMPILED:
+        rows.append(_compiling(command))
+    for command in WARM:
+        rows.append(_warm(command))
+    return rows
+
+
+def _first(command: str) -> list[Row]:
+    plain = min(_run(command, {"NUMBA_DISABLE_JIT": "1"})[0] for _ in range(ROUNDS))
+    first = min(_in_empty_cache(command) for _ in range(ROUNDS))
+    ratio = first / plain
+    rows = [
+        Row(f"{command}, empty cache", f"{first:.2f} s, {ratio:.2f} of interpreted", "<= 1.5", ratio <= 1.5)
+    ]
+    if BEFORE in os.environ:
+        before = _in_empty_cache(command, os.environ[BEFORE])
+        part = first / before
+        rows.append(
+            Row(
+                f"{command}, empty cache, before",
+                f"{before:.1f} s, {part:.3f} of it",
+                "<= 0.15",
+                part <= 0.15,
+            )
+        )
+    return rows
+
+
+def _in_empty_cache(command: str, tree: str | None = None) -> float:
+    with TemporaryDirectory() as folder:
+        variables = {"NUMBA_CACHE_DIR": folder} | ({} if tree is None else {"PYTHONPATH": tree})
+        took = _run(command, variables)[0]
+        _drop(Path(folder))
+    return took
+
+
+def _drop(folder: Path) -> None:
+    """Withdraw what is asked for, so that the companion ends."""
+    for note in folder.glob("*/asked/*.json"):
+        note.unlink(missing_ok=True)
+
+
+def _compiling(command: str) -> Row:
+    with TemporaryDirectory() as folder:
+        variables = {"NUMBA_CACHE_DIR": folder}
+        _run(command, variables, [sys.executable, "-c", HELD, *COMMAND])
+        used = _run("", variables, [sys.executable, "-m", "dubins_traffic.kernels.companion"])[1]
+        count = len(list(Path(folder).rglob("*.kernel")))
+    figure = f"{used:.1f} s of processor time, {count} kernels"
+    if BEFORE not in os.environ:
+        return Row(f"{command}, compiling", figure, "-", count > 0)
+    with TemporaryDirectory() as folder:
+        variables = {"NUMBA_CACHE_DIR": folder, "PYTHONPATH": os.environ[BEFORE]}
+        before = _run(command, variables)[1] - _run(command, variables)[1]
+    part = used / before
+    return Row(
+        f"{command}, compiling", f"{figure}, {part:.2f} of {before:.1f} s before", "<= 0.3", part <= 0.3
+    )
+
+
+def _warm(command: str) -> Row:
+    _run(command, {"DUBINS_TRAFFIC_KERNELS": "compiled"})
+    now = min(_run(command, {})[1] for _ in range(ROUNDS))
+    if BEFORE not in os.environ:
+        return Row(f"{command}, warm", f"{now:.2f} s of processor time", "-", True)
+    older = {"PYTHONPATH": os.environ[BEFORE]}
+    _run(command, older)
+    before = min(_run(command, older)[1] for _ in range(ROUNDS))
+    part = now / before
+    return Row(f"{command}, warm", f"{now:.2f} s, {part:.2f} of {before:.2f} s before", "<= 0.5", part <= 0.5)
+
+
+def _run(command: str, variables: Mapping[str, str], program: Sequence[str] = COMMAND) -> tuple[float, float]:
+    """Return the time on the clock and the processor time of a command, seconds."""
+    around = {
+        name: value for name, value in os.environ.items() if name != "DUBINS_TRAFFIC_KERNELS"
+    } | variables
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
+    quiet = subprocess.DEVNULL
+    subprocess.run([*program, *command.split()], check=True, stdout=quiet, stderr=quiet, env=around)
+    took, after = perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -1,0 +1,76 @@
+"""Work that goes over from interpreted to compiled kernels on its way gives what it gives in either."""
+
+import gc
+from pathlib import Path
+
+import pytest
+
+from dubins_traffic.campaign.batch import run_batch
+from dubins_traffic.campaign.batch_kernel import run_trials
+from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.kernels import asking, store
+from dubins_traffic.kernels.compile import Kernel, rehearsal
+from dubins_traffic.kernels.machine import Code
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+
+TRIALS = 6
+
+
+class Switches:
+    """Lets all kernels begin interpreted and go over after some looks for their machine code."""
+
+    def __init__(self, monkeypatch, looks: int) -> None:
+        self.seen: list[Kernel] = []
+        self._looks = looks
+        sought, there = Kernel._sought, asking.Waiting.is_there
+        missed: set[tuple] = set()
+        left: dict[int, int] = {}
+
+        def seek(kernel, kinds):
+            if (id(kernel), kinds) not in missed:
+                missed.add((id(kernel), kinds))
+                self.seen.append(kernel)
+                with monkeypatch.context() as patch:
+                    patch.setattr(store, "load", lambda _path: None)
+                    return sought(kernel, kinds)
+            return sought(kernel, kinds)
+
+        def look(waiting):
+            left[id(waiting)] = left.get(id(waiting), looks) - 1
+            return left[id(waiting)] < 0 and there(waiting)
+
+        for kernel in [own for own in gc.get_objects() if type(own) is Kernel]:
+            monkeypatch.setattr(kernel, "_known", {})
+            monkeypatch.setattr(kernel, "is_quick", False)
+        monkeypatch.setattr(asking, "PAUSE", 0.0)
+        monkeypatch.setattr(Kernel, "_sought", seek)
+        monkeypatch.setattr(asking.Waiting, "is_there", look)
+
+    def gone_over(self) -> list[Kernel]:
+        return [own for own in self.seen if any(isinstance(found, Code) for found in own._known.values())]
+
+
+@pytest.mark.parametrize("looks", [0, 4, 9])
+def test_a_batch_that_goes_over_on_its_way_gives_the_same(monkeypatch, looks) -> None:
+    plain = run_batch("town", trials=TRIALS, seed=5, batch=4)
+    switches = Switches(monkeypatch, looks)
+    with rehearsal():
+        mixed = run_batch("town", trials=TRIALS, seed=5, batch=4)
+    assert mixed.sheet.asdict() == plain.sheet.asdict()
+    assert [own.ending for own in mixed.outcomes] == [own.ending for own in plain.outcomes]
+    assert run_trials in switches.gone_over()
+
+
+@pytest.mark.parametrize("looks", [3, 400])
+@pytest.mark.parametrize("controller", ["lanes", "rules+shield"])
+def test_a_trial_that_goes_over_on_its_way_records_the_same(
+    monkeypatch, tmp_path: Path, controller, looks
+) -> None:
+    instance = draw(load_config("town"), 2, 1)
+    run_trial(instance, controller, record=tmp_path / "plain.mcap")
+    switches = Switches(monkeypatch, looks)
+    with rehearsal():
+        run_trial(instance, controller, record=tmp_path / "mixed.mcap")
+    assert (tmp_path / "mixed.mcap").read_bytes() == (tmp_path / "plain.mcap").read_bytes()
+    assert len(switches.gone_over()) >= 5
