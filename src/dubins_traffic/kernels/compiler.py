@@ -17,13 +17,14 @@ changed in.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, cast
 
 import llvmlite.binding  # pyright: ignore[reportMissingTypeStubs]
 import llvmlite.ir  # pyright: ignore[reportMissingTypeStubs]
 import numba
-from numba.core import codegen, config, types  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import codegen, config, targetconfig, types  # pyright: ignore[reportMissingTypeStubs]
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
@@ -37,6 +38,9 @@ RESHAPE = "numba_attempt_nocopy_reshape"
 
 FOREIGN = ("numba", "NRT", "Py", "_Py")
 """How the names of functions begin that only a process with Numba or for Python has."""
+
+SELDOM = 200_000
+"""New objects between two searches for rubbish: there is little among what the compiler makes."""
 
 _numba = cast(Any, numba)
 _types = cast(Any, types)
@@ -70,6 +74,8 @@ class Compiler:
         self._codegen._library_class = Library
         self._codegen.set_env = _leave
         _index_plainly()
+        _compare_quickly()
+        gc.set_threshold(SELDOM)
 
     def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:
         """Return what Numba makes of a kernel's function, for others to call and for `machine_code`."""
@@ -304,6 +310,18 @@ def _kind_of(own: Any) -> Kind:
 
 def _leave(_name: str, _environment: Any) -> None:
     """Leave the environment of a function alone: no kernel needs any."""
+
+
+def _compare_quickly() -> None:
+    """Let Numba compare its settings, which are part of many keys, by what has been set: a tenth of its time."""
+    settings = cast(Any, targetconfig).TargetConfig
+    thorough = settings.__eq__
+
+    def is_equal(one: Any, other: Any) -> Any:
+        return (type(one) is type(other) and one._values == other._values) or thorough(one, other)
+
+    settings.__eq__ = is_equal
+    settings.__hash__ = lambda _one: 1
 
 
 def _index_plainly() -> None:
