@@ -11,9 +11,9 @@ from typing import Final
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.driving.guard import Guard
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.spec.propositions import APPROACH, CLEAR, FIRST, LEFT, STOPPED
+from dubins_traffic.rules.propositions import APPROACH, CLEAR, FIRST, LEFT, STOPPED
+from dubins_traffic.shield.filter import Guard
 
 GOES: Final = STOPPED | FIRST | CLEAR
 NEAR: Final = 2.5

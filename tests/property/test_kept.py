@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.group import Group
 from dubins_traffic.cars.near import CELL, list_near
 from dubins_traffic.cars.state import NONE
 from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
@@ -15,9 +15,9 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import nearest_arm, patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
-from dubins_traffic.spec.holding import place
-from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.tables import (
+from dubins_traffic.rules.label_cache import place
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.tables import (
     ALONG_HIGH,
     ALONG_LOW,
     ASIDE_HIGH,

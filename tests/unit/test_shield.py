@@ -14,18 +14,18 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.driving.guard import Guard, Intervention
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.reader import read
 from dubins_traffic.record.sink import Frames
+from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.scoring.score import Score
+from dubins_traffic.shield.filter import Guard, Intervention
+from dubins_traffic.shield.tables import Overtakes
 from tests.unit.test_law import TURN, W, broken, car, on_grid, turned
 
 Act = Callable[[Observation], Any]

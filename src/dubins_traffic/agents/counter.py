@@ -12,9 +12,12 @@ import numpy as np
 from dubins_traffic.agents.lawful import drivers_of
 from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
 from dubins_traffic.cars.tables import pack_obstacles
-from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import (
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.room import MARGIN
+from dubins_traffic.policies.rules.tables import (
     FIRST,
     KIND,
     LANE,
@@ -29,13 +32,10 @@ from dubins_traffic.driving.law_tables import (
     blank,
     desk,
 )
-from dubins_traffic.driving.room import MARGIN
-from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.propositions import CLEAR
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.propositions import CLEAR
 from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy

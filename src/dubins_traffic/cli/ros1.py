@@ -55,7 +55,7 @@ def run(
     ] = None,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
-    from dubins_traffic.campaign.ros1 import run_over_ros1
+    from dubins_traffic.sessions.ros1 import run_over_ros1
 
     _check_remappings(context.args)
     world = _is_world(simulator, poses)

@@ -15,8 +15,8 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.sessions import Pace, Programme
-    from dubins_traffic.campaign.single import Result
+    from dubins_traffic.runs.single import Result
+    from dubins_traffic.sessions.plan import Pace, Programme
 
 Controller = Annotated[
     str | None,
@@ -80,7 +80,7 @@ class Asked:
 
     def programme(self, simulator: str | None = None) -> Programme:
         """Return what the session shall run."""
-        from dubins_traffic.campaign.sessions import programme
+        from dubins_traffic.sessions.plan import programme
 
         todo = programme(
             self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
@@ -91,7 +91,7 @@ class Asked:
 
     def pace(self) -> Pace:
         """Return how drivers are waited for."""
-        from dubins_traffic.campaign.sessions import Pace
+        from dubins_traffic.sessions.plan import Pace
         from dubins_traffic.transports.patience import Patience
 
         patience = Patience(begin=self.begin, silence=self.silence)

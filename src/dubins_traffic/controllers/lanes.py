@@ -1,7 +1,7 @@
 """The controller `lanes`: the shortest round through the goals in the right lane, with regard for other cars.
 
 Planning is plain Python and rare: once at the start, and when the way has been blocked for long. What happens every
-tick is the compiled law `controllers.lanes_law`.
+tick is the compiled law `policies.lanes.policy`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.controllers import lanes_desk as columns
-from dubins_traffic.controllers.lanes_desk import Desk
-from dubins_traffic.controllers.lanes_law import decide
-from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
-from dubins_traffic.driving.paths import FIELDS, LANE, LENGTH, PathMaker
-from dubins_traffic.driving.tours import LaneGraph, Round, find_round
-from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
+from dubins_traffic.policies.lanes import memory as columns
+from dubins_traffic.policies.lanes.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
+from dubins_traffic.policies.lanes.memory import Desk
+from dubins_traffic.policies.lanes.paths import FIELDS, LANE, LENGTH, PathMaker
+from dubins_traffic.policies.lanes.policy import decide
+from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import pack
+from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 
 FOLLOW = 1.3
 """Gap kept behind cars, centre to centre, metres: the e-agent of 2016 stands while the ego is within 1 m."""
@@ -38,7 +38,7 @@ class Lanes:
 
     Notes
     -----
-    The round is the shortest closed route along lanes (`driving.tours.find_round`), in whatever order of the goals
+    The round is the shortest closed route along lanes (`routing.tours.find_round`), in whatever order of the goals
     that needs; goals that the car can't reach on the road, having too large a turning radius, are left out. It is
     joined where that is nearest. Without goals, or if none can be reached, the car stands.
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
-from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.lane_graph import nearest_stage
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import (
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.tables import (
     FIRST,
     KIND,
     LAST,
@@ -25,10 +25,10 @@ from dubins_traffic.driving.law_tables import (
     desk,
     no_ways,
 )
-from dubins_traffic.driving.rounds import stages
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.routing.lane_graph import nearest_stage
+from dubins_traffic.routing.rounds import stages
 
 
 class Rules:
@@ -36,7 +36,7 @@ class Rules:
 
     Notes
     -----
-    The goals are visited in the order of the shortest closed route along lanes (`driving.tours.find_round`), each by
+    The goals are visited in the order of the shortest closed route along lanes (`routing.tours.find_round`), each by
     the lane that this route takes; from wherever the car is, it goes the shortest way there. It enters a crossing when
     it is its turn and there is room behind it; in time it takes another exit if there is none. A last look before
     every tick rules out all motions that could bring about a contact. Without goals that can be reached it stands.

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
-from dubins_traffic.driving.guard import Guard
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.protocols import Closes, Controller, Reports
 from dubins_traffic.record.sink import SHIELD
+from dubins_traffic.shield.filter import Guard
+from dubins_traffic.shield.tables import Overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem

@@ -12,15 +12,15 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import told
-from dubins_traffic.driving.exits import BACK
-from dubins_traffic.driving.guard import Guard
-from dubins_traffic.driving.lane_graph import nearest_stage
-from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
-from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.policies.rules.exits import BACK
+from dubins_traffic.policies.rules.room import MARGIN
+from dubins_traffic.policies.rules.tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
 from dubins_traffic.record.sink import SHIELD
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.routing.lane_graph import nearest_stage
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.shield.filter import Guard
 from dubins_traffic.synthesis.advice import Advice, advise
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build

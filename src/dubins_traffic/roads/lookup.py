@@ -10,7 +10,7 @@ from math import sqrt
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.paving import MIXED, ON
+from dubins_traffic.roads.road_raster import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
 INFINITE = float("inf")

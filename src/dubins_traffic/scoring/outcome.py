@@ -13,6 +13,8 @@ from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach, Running, accused, order
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
@@ -40,8 +42,6 @@ from dubins_traffic.scoring.tally import (
     Tally,
 )
 from dubins_traffic.scoring.verdict import reach_verdict
-from dubins_traffic.spec.judge import Breach, Running, accused, order
-from dubins_traffic.spec.parameters import RuleParameters
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

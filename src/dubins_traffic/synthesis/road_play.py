@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dubins_traffic.spec.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.rules.propositions import FIRST, FORFEITED, STOPPED
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room

@@ -11,7 +11,7 @@ from xmlrpc.client import Error as XmlRpcError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.ros1.desk import Desk, Told
+from dubins_traffic.transports.ros1.maestro_services import Desk, Told
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join
 from dubins_traffic.transports.ros1.world import Topics, World

@@ -10,8 +10,8 @@ from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import Ending, Mailbox, View
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.desk import AT_ONCE, INSTANCE, Desk
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
+from dubins_traffic.transports.ros2.maestro_services import AT_ONCE, INSTANCE, Desk
 from dubins_traffic.transports.ros2.world import World, moment
 from dubins_traffic.transports.stamps import Stamps
 
