@@ -100,8 +100,10 @@ class Buchi:
         done = re.fullmatch(r":: atomic \{ (.*) -> assert\(.*\) \}", line)
         if found is None and done is None:
             return []
-        guard, target = found.groups() if found else (done[1] if done else "", "accept_all")
-        return [(guard.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)]
+        shield_filter, target = found.groups() if found else (done[1] if done else "", "accept_all")
+        return [
+            (shield_filter.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)
+        ]
 
     def accepts(self, word: list[dict[str, bool]], loop: int) -> bool:
         """Say whether the word is accepted whose last `loop` letters go on for ever."""
@@ -111,9 +113,9 @@ class Buchi:
             seen, stack = set[tuple[str, int]](), list(nodes)
             while stack:
                 state, place = stack.pop()
-                for guard, target in self.ways[state]:
+                for shield_filter, target in self.ways[state]:
                     node = target, after[place]
-                    if node not in seen and eval(guard, {}, word[place]):
+                    if node not in seen and eval(shield_filter, {}, word[place]):
                         seen.add(node)
                         stack.append(node)
             return seen

@@ -25,10 +25,6 @@ from dubins_traffic.rules.tables import (
     AXIS_X,
     AXIS_Y,
     CALM,
-    CALM_HIGH_X,
-    CALM_HIGH_Y,
-    CALM_LOW_X,
-    CALM_LOW_Y,
     FORK_SURE,
     FORK_X,
     FORK_Y,
@@ -36,6 +32,10 @@ from dubins_traffic.rules.tables import (
     FROM_Y,
     RING_HIGH,
     RING_LOW,
+    VALID_HIGH_X,
+    VALID_HIGH_Y,
+    VALID_LOW_X,
+    VALID_LOW_Y,
     VERTEX_X,
     VERTEX_Y,
 )
@@ -143,7 +143,7 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
         assert (labels.bits == group.labels.bits).all()
         for n in range(7):
             row = labeller.memory.calm[0, [place(n) + k * BLOCK for k in range(CALM)]]
-            low, high = row[[CALM_LOW_X, CALM_LOW_Y]], row[[CALM_HIGH_X, CALM_HIGH_Y]]
+            low, high = row[[VALID_LOW_X, VALID_LOW_Y]], row[[VALID_HIGH_X, VALID_HIGH_Y]]
             if tick % 10 != n or not (low < high).all():
                 continue
             looked += 1

@@ -22,15 +22,15 @@ from dubins_traffic.policies.rules.tables import (
     KIND,
     LANE,
     LAST,
-    MOOD,
     NEXT,
     PLACE,
     ROLLING,
     ROUND,
     SPEED,
+    VIOLATIONS,
     Drivers,
     blank,
-    desk,
+    scratch,
 )
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
@@ -42,7 +42,7 @@ from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
 from dubins_traffic.synthesis.queues import Scene
-from dubins_traffic.synthesis.road_play import RoadPlay, Terms
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.story import Moment, followed, moment_of, told
@@ -85,7 +85,7 @@ class CounterTeam:
         self._roads = pack([problem.network], [problem.car.lane_width])
         self._obstacles = pack_obstacles([problem.obstacles])
         self._drivers = _drivers(instance)
-        self._desk = desk(state.x.shape[1], len(problem.network.segments))
+        self._scratch = scratch(state.x.shape[1], len(problem.network.segments))
         self._points: list[list[float]] = problem.network.points.tolist()
         rules = RuleParameters.from_mapping(problem.rules)
         self._radius, self._reach = problem.intersection_radius, problem.car.body.reach
@@ -94,8 +94,8 @@ class CounterTeam:
         board = Board(arena_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
         self._strategy = Counterstrategy(solve(build(board)))
-        terms = Terms(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
-        self._play = RoadPlay(board, terms, instance.names)
+        sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
+        self._play = RoadPlay(board, sight, instance.names)
         self._targets = [-1] * len(instance.starts)
         self._scenes: list[Scene] = []
         self._jumps = board.assumption.order is not Order.KEPT
@@ -111,7 +111,7 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._desk)
+        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
         decide(tick, commands, *chain.from_iterable(tables))
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
@@ -153,7 +153,7 @@ class CounterTeam:
         for car in cars[1:]:
             enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
             clear = car.propositions.bits & CLEAR != 0
-            self._drivers.ints[0, car.car, MOOD] = ROLLING if enters and clear else 0
+            self._drivers.ints[0, car.car, VIOLATIONS] = ROLLING if enters and clear else 0
 
     def _send(self, car: Sighting) -> None:
         """Let the law take a car to its target."""

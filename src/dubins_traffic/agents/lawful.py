@@ -33,8 +33,8 @@ from dubins_traffic.policies.rules.tables import (
     Drivers,
     blank,
     build_of,
-    desk,
     no_ways,
+    scratch,
 )
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
@@ -59,7 +59,7 @@ class Lawful:
         )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._drivers = pack_drivers(instances, cars, net)
-        own = desk(cars, int(np.diff(self._roads.seg_off).max()))
+        own = scratch(cars, int(np.diff(self._roads.seg_off).max()))
         self._arrays = (*self._roads, *self._obstacles, *self._drivers, *own)
         self._state: State | None = None
         self._labels: Labels | None = None

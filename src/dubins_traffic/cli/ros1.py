@@ -59,12 +59,12 @@ def run(
 
     _check_remappings(context.args)
     world = _is_world(simulator, poses)
-    todo = asked.programme(None if world else simulator)
+    todo = asked.session_plan(None if world else simulator)
     at = port if master else None
     results = run_over_ros1(
         todo, asked.pace(), master=at, clock=clock, world=world, poses=poses, elsewhere=elsewhere
     )
-    session.conduct(todo, results, json=asked.json)
+    session.run_session(todo, results, json=asked.json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))

@@ -18,12 +18,12 @@ from dubins_traffic.policies.rules.tables import (
     PLACE,
     ROUND,
     SPEED,
-    Desk,
     Drivers,
+    Scratch,
     blank,
     build_of,
-    desk,
     no_ways,
+    scratch,
 )
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
@@ -56,7 +56,7 @@ class Rules:
         self._command = np.zeros((1, cars, 2))
         self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._desk: Desk = desk(cars, len(problem.network.segments))
+        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
         if not len(stage):
             return
         ints[EGO, [KIND, FIRST, LAST]] = (ROUND, 0, len(stage))
@@ -73,7 +73,7 @@ class Rules:
             stage=stage,
             distance=distance,
         )
-        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._desk)
+        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._scratch)
         self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
 
     def act(self, observation: Observation) -> Command:

@@ -22,9 +22,9 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
-from dubins_traffic.policies.rules.tables import Desk, Drivers
+from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.breach_log import JUDGED, OF_CAR, Docket, Terms
+from dubins_traffic.rules.breach_log import JUDGED, OF_CAR, BreachLog, RefereeParameters
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
@@ -37,7 +37,7 @@ finite; there is no room for contacts, for pairs that may meet, for pairs that m
 
 TICK, LAST, STATUS, DECIDED, LAWFUL, OTHERS, ENDS = range(7)
 COURSE = 7
-"""Columns of `Course.ints`.
+"""Columns of `Progress.ints`.
 
 TICK: the present frame, -1 before the first. LAST: the last one. STATUS: as above. DECIDED: 1 if the commands for
 the next tick are chosen already. LAWFUL, OTHERS: whether the law drives some of its cars, and whether other built-in
@@ -45,7 +45,7 @@ drivers do. ENDS: whether a collision of the ego ends it.
 """
 
 
-class Course(NamedTuple):
+class Progress(NamedTuple):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
     `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
@@ -70,16 +70,16 @@ class World(NamedTuple):
     roads: RoadTable
     beside: ObstacleLanes
     rules: RuleTable
-    terms: Terms
+    terms: RefereeParameters
     labels: Labels
     memory: Memory
-    docket: Docket
+    breach_log: BreachLog
     drivers: Drivers
-    desk: Desk
+    scratch: Scratch
     agents: Agents
     space: AgentSpace
     tally: Tally
-    course: Course
+    progress: Progress
     spacing: Spacing
 
 
@@ -102,7 +102,7 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
     """
     for k in range(active.shape[0]):
         b = active[k]
-        own = world.course.ints[b]
+        own = world.progress.ints[b]
         own[STATUS] = RUNNING
         for _ in range(most):
             if own[STATUS] != RUNNING:
@@ -114,7 +114,7 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
 def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> None:
     """Take trial b from its present frame to the next one, or say why not in `own[STATUS]`."""
     tick = own[TICK]
-    if world.docket.filled[0] + _room(b, world) > world.docket.row.shape[0]:
+    if world.breach_log.filled[0] + _room(b, world) > world.breach_log.row.shape[0]:
         own[STATUS] = NO_DOCKET
         return
     ego_hit = False
@@ -164,8 +164,8 @@ def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> Non
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, world.course.sight2[b], spacing.apart[b], lost(spacing, b, tick), world.state, world.labels,
-            world.roads, world.obstacles, world.drivers, world.desk, commands,
+            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world.state, world.labels,
+            world.roads, world.obstacles, world.drivers, world.scratch, commands,
         )  # fmt: skip
     unsound = 0.0
     for n in range(world.state.count[b]):
@@ -183,7 +183,7 @@ def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
     for k in range(first, world.work.found[0]):
         car = int(world.work.contact[k, 1])
         other = int(world.work.contact[k, 2])
-        note = world.course.contact[k]
+        note = world.progress.contact[k]
         note[0] = tick
         note[1] = np.int64(world.labels.bits[b, car])
         note[2] = np.int64(world.labels.bits[b, other]) if other >= 0 else 0
@@ -206,20 +206,20 @@ def _is_sensed(b: int, n: int, world: World) -> int:
 @jit_inline
 def _observe(b: int, tick: int, world: World) -> None:
     """Judge and count a frame that has been labelled."""
-    docket, tally = world.docket, world.tally
+    breach_log, tally = world.breach_log, world.tally
     count_frame(
         b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
     )
     if world.terms.whole[b, JUDGED] == 0:
         return
-    first = docket.filled[0]
+    first = breach_log.filled[0]
     judge_trial(
         b, tick, world.spacing, world.state, world.roads, world.beside,
-        world.rules, world.terms, world.labels, world.memory, docket,
+        world.rules, world.terms, world.labels, world.memory, breach_log,
     )  # fmt: skip
-    for k in range(first, docket.filled[0]):
-        n = docket.row[k, OF_CAR]
-        world.course.place[k, 0] = world.state.x[b, n]
-        world.course.place[k, 1] = world.state.y[b, n]
+    for k in range(first, breach_log.filled[0]):
+        n = breach_log.row[k, OF_CAR]
+        world.progress.place[k, 0] = world.state.x[b, n]
+        world.progress.place[k, 1] = world.state.y[b, n]
         if n == EGO:
             tally.ints[b, SEALED] = 1

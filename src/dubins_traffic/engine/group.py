@@ -27,19 +27,19 @@ from dubins_traffic.engine.batch_kernel import (
     OTHERS,
     STATUS,
     TICK,
-    Course,
+    Progress,
     World,
     run_trials,
 )
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, desk
+from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
 from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import OF_TRIAL, Docket
+from dubins_traffic.rules.breach_log import OF_TRIAL, BreachLog
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
@@ -47,7 +47,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
 from dubins_traffic.rules.tables import NET
 from dubins_traffic.scoring.margins_kernel import margin_table
-from dubins_traffic.scoring.outcome import Tallied
+from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
 from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 FRAMES = 16
-"""For how many frames in which all goes wrong there is room in the docket."""
+"""For how many frames in which all goes wrong there is room in the breach_log."""
 WORK = 500_000
 """Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
 
@@ -108,15 +108,17 @@ class Group:
         net = rules.whole[:, NET].copy()
         cars, obstacles, rows, work = simulator.tables
         terms = terms_of(problems)
-        docket = Docket.empty(trials, places, len(terms.goal))
-        docket = docket._replace(row=np.zeros((FRAMES * (10 * places + 8), docket.row.shape[1]), np.int64))
+        breach_log = BreachLog.empty(trials, places, len(terms.goal))
+        breach_log = breach_log._replace(
+            row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
+        )
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         self._world = World(
             self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
-            labeller.memory, docket, pack_drivers(instances, places, net, rounds), desk(places, segments),
+            labeller.memory, breach_log, pack_drivers(instances, places, net, rounds), scratch(places, segments),
             pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
-            new_tally(instances, net, places), self._course(len(work.contact), len(docket.row)),
+            new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
             spacing(trials, places, rows.far - cars.reach),
         )  # fmt: skip
         kinds, index = kinds_of(problems)
@@ -138,7 +140,7 @@ class Group:
     @property
     def ticks(self) -> Ints:
         """The present frame of each trial, (B,)."""
-        return self._world.course.ints[:, TICK]
+        return self._world.progress.ints[:, TICK]
 
     @property
     def spacing(self) -> Spacing:
@@ -176,17 +178,19 @@ class Group:
         rows = np.array(trials, dtype=np.int64)
         endings = [ending for b in trials if (ending := self.endings[b]) is not None]
         frames = np.array([ending.ticks + 1 for ending in endings])
-        tallied = Tallied(rows, frames, world.tally, self._margins, world.roads, world.cars)
+        scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
         found: list[Outcome] = []
-        for b, ending, hanging in zip(trials, endings, running(rows, world.terms, world.docket), strict=True):
-            score = tallied.score(
+        for b, ending, hanging in zip(
+            trials, endings, running(rows, world.terms, world.breach_log), strict=True
+        ):
+            score = scores.score(
                 self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
                 self._rules[b], name, begin.get(b),
             )  # fmt: skip
             found.append(Outcome(self.instances[b], ending, score))
         return found
 
-    def _course(self, contacts: int, breaches: int) -> Course:
+    def _progress(self, contacts: int, breaches: int) -> Progress:
         ints = np.zeros((len(self.instances), COURSE), dtype=np.int64)
         ints[:, TICK] = -1
         ints[:, LAST] = [max(1, instance.ticks) for instance in self.instances]
@@ -196,13 +200,13 @@ class Group:
         ints[:, OTHERS] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         radii = np.array([instance.problem.sensing_radius for instance in self.instances])
         places = np.zeros((breaches, 2))
-        return Course(ints, radii * radii, np.zeros((contacts, 5), dtype=np.int64), places)
+        return Progress(ints, radii * radii, np.zeros((contacts, 5), dtype=np.int64), places)
 
     def _aim(self) -> None:
         """Let the egos that keep the rules begin with the goal nearest to where they start."""
         world = self._world
         drivers, labels = world.drivers, world.labels
-        world.course.ints[:, LAWFUL] = drivers.active
+        world.progress.ints[:, LAWFUL] = drivers.active
         for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
             own = drivers.ints[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
@@ -220,7 +224,7 @@ class Group:
 
     def _mind(self, active: Ints) -> None:
         """Enlarge what was too small, and write down how trials ended."""
-        status = self._world.course.ints[active, STATUS]
+        status = self._world.progress.ints[active, STATUS]
         if (status == NO_PAIRS).any():
             self._world = self._world._replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
@@ -240,22 +244,22 @@ class Group:
     def _drain(self) -> None:
         """Take over the contacts and breaches that have been found, and make room."""
         world = self._world
-        found, filled = int(world.work.found[0]), int(world.docket.filled[0])
-        notes = zip(world.work.contact[:found].tolist(), world.course.contact[:found].tolist(), strict=True)
+        found, filled = int(world.work.found[0]), int(world.breach_log.filled[0])
+        notes = zip(world.work.contact[:found].tolist(), world.progress.contact[:found].tolist(), strict=True)
         for row, (tick, own, other, own_seen, other_seen) in notes:
             b, contact = int(row[0]), contact_of(row, tick, self._rate)
             self._contacts[b].append(with_fault_by(contact, own, other))
             pair = ((contact.car, own_seen), (contact.other, other_seen))
             self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
-        rows: list[list[int]] = world.docket.row[:filled].tolist()
-        for row, (x, y) in zip(rows, world.course.place[:filled].tolist(), strict=True):
+        rows: list[list[int]] = world.breach_log.row[:filled].tolist()
+        for row, (x, y) in zip(rows, world.progress.place[:filled].tolist(), strict=True):
             b, breach = row[OF_TRIAL], breach_of(row, x, y)
             self._breaches[b].append(breach)
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))
-        world.work.found[0] = world.docket.filled[0] = 0
+        world.work.found[0] = world.breach_log.filled[0] = 0
 
     def _is_seen(self, b: int, breach: Breach) -> bool:
         """Tell whether the car of a breach was within the ego's sensing radius in that frame."""
         dx, dy = self._world.tally.pose[b, breach.tick, :2] - (breach.x, breach.y)
-        return bool(dx * dx + dy * dy <= self._world.course.sight2[b])
+        return bool(dx * dx + dy * dy <= self._world.progress.sight2[b])

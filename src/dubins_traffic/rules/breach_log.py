@@ -90,7 +90,7 @@ ON_LANE: Final = 6
 COLUMNS: Final = 7
 
 
-class Terms(NamedTuple):
+class RefereeParameters(NamedTuple):
     """The terms by which each trial is judged.
 
     Attributes
@@ -115,7 +115,7 @@ class Terms(NamedTuple):
     goal: Ints
 
 
-class Docket(NamedTuple):
+class BreachLog(NamedTuple):
     """What the referee remembers, and what he has found.
 
     Attributes
@@ -156,14 +156,14 @@ class Docket(NamedTuple):
     filled: Ints
 
     @staticmethod
-    def empty(trials: int, cars: int, goals: int, frames: int = 1) -> Docket:
-        """Return the docket of `trials` x `cars` cars before their first frame, with room for `frames` frames."""
+    def empty(trials: int, cars: int, goals: int, frames: int = 1) -> BreachLog:
+        """Return the breach_log of `trials` x `cars` cars before their first frame, with room for `frames` frames."""
         past = np.full((trials, cars, PAST), -1, dtype=np.int64)
         past[:, :, BITS] = 0
         clock = np.full((trials, cars, CLOCKS), -1, dtype=np.int64)
         clock[:, :, OFF_ROAD] = NEVER
         room = (MOST * trials * cars + goals) * frames
-        return Docket(
+        return BreachLog(
             past,
             np.zeros((trials, cars), dtype=np.int64),
             clock,
@@ -188,7 +188,7 @@ def pack_terms(
     rates: Sequence[float],
     cars: CarTable,
 ) -> tuple[Floats, Ints]:
-    """Return `Terms.real` and `Terms.whole` of each trial.
+    """Return `RefereeParameters.real` and `RefereeParameters.whole` of each trial.
 
     Parameters
     ----------

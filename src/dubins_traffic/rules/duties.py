@@ -34,8 +34,8 @@ from dubins_traffic.rules.breach_log import (
     REST_TICKS,
     SHARED_TICKS,
     WAY,
-    Docket,
-    Terms,
+    BreachLog,
+    RefereeParameters,
 )
 from dubins_traffic.rules.breaches import GOES, add, at_goal, judge_queue, run, when_due
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
@@ -70,34 +70,34 @@ def judge_agent(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
     memory: Memory,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> int:
     """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1).
 
     Returns the next tick in which more may be due, if its labels stay as they are.
     """
-    whole, row, filled, clock = terms.whole[b], docket.row, docket.filled, docket.clock[b, n]
+    whole, row, filled, clock = terms.whole[b], breach_log.row, breach_log.filled, breach_log.clock[b, n]
     if bits & STOPPED != 0:
         ahead = lane_end(roads, rules.whole[b, NET], lane)
         judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
     else:
         clock[FIRST_SINCE] = -1
-    if docket.past[b, n, CROSSES] != v or v < 0:
+    if breach_log.past[b, n, CROSSES] != v or v < 0:
         clock[EXIT_SINCE] = -1
         clock[EXIT_COUNTS] = -1
     due = when_due(tick, clock, FIRST_SINCE, whole[ENTER_TICKS])
     if v >= 0:
         again = _judge_exit(
-            b, n, tick, lane, v, spacing, state, roads, obstacles, rules, terms, labels, docket
+            b, n, tick, lane, v, spacing, state, roads, obstacles, rules, terms, labels, breach_log
         )  # fmt: skip
         due = min(due, again)
     free = bits & LINGERS != 0
     if free:
         due = tick + 1
-        free = has_way(b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, docket)
+        free = has_way(b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, breach_log)
     if run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
         add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
     return due
@@ -115,18 +115,18 @@ def _judge_exit(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> int:
     """E4, of an e-agent whose body meets the disc of v; return when to ask again, if its labels stay as they are.
 
     The ticks do not count in which the ego is there that came after it, or, for a while, with it.
     """
-    clock, ego, ago = docket.clock[b, n], docket.clock[b, EGO], terms.whole[b, EXIT_TICKS]
+    clock, ego, ago = breach_log.clock[b, n], breach_log.clock[b, EGO], terms.whole[b, EXIT_TICKS]
     back = way_back(b, v, clock[CAME_BY], roads, rules)
     free, again = look_for_exit(
-        b, n, tick, v, back, spacing, state, roads, obstacles, rules, terms, labels, docket
+        b, n, tick, v, back, spacing, state, roads, obstacles, rules, terms, labels, breach_log
     )
     paused = False
     if labels.crosses[b, EGO] == v:
@@ -139,7 +139,7 @@ def _judge_exit(
     elif paused:
         clock[EXIT_PAUSED] += 1
     if long >= 0 and long - clock[EXIT_PAUSED] == ago and (long == 0 or not paused):
-        add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, docket.row, docket.filled)
+        add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, breach_log.row, breach_log.filled)
     clock[EXIT_COUNTS] = -1 if paused else clock[EXIT_SINCE]
     if paused:
         return tick + 1
@@ -156,10 +156,10 @@ def has_way(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
     memory: Memory,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> bool:
     """E5: tell whether car n is in a lane with a free way ahead."""
     lane = labels.lane[b, n]
@@ -184,13 +184,13 @@ def has_way(
     if roads.degree[row] >= rules.whole[b, CROSSING_DEGREE] or length - real[RADIUS] - own > reach:
         return True
     for k in range(state.count[b]):
-        if k != n and labels.crosses[b, k] == v and (k == EGO or docket.clock[b, k, CAME_BY] == lane):
+        if k != n and labels.crosses[b, k] == v and (k == EGO or breach_log.clock[b, k, CAME_BY] == lane):
             return False
     vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
     count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
     back = way_back(b, v, lane, roads, rules)
     return find_exit(
-        b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, docket
+        b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, breach_log
     )
 
 
@@ -202,17 +202,17 @@ def find_ways(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
     memory: Memory,
-    docket: Docket,
+    breach_log: BreachLog,
     found: Any,
 ) -> None:
     """Write down which cars of a frame that has been judged are in a lane with a free way ahead, (B, N)."""
     for b in range(state.count.shape[0]):
         for n in range(state.count[b]):
             found[b, n] = has_way(
-                b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, docket
+                b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, breach_log
             )
 
 
@@ -226,31 +226,31 @@ def judge_goals(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> None:
     """E6: no goal is taken for too long; find when one will be, or has to be looked at, if no car comes or goes."""
     ago = terms.whole[b, GOAL_TICKS]
-    clock, ticks_paused = docket.goal_clock, docket.goal_paused
+    clock, ticks_paused = breach_log.goal_clock, breach_log.goal_paused
     due = NEVER_DUE
     for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
-        who = at_goal(terms.goal[g], cars, labels.at[b], docket.clock[b])
+        who = at_goal(terms.goal[g], cars, labels.at[b], breach_log.clock[b])
         long = run(who >= 0, tick, clock, g)
         if long < 0:
             continue
         paused, again = _holds_up(
-            b, terms.goal[g], tick, cars, spacing, state, roads, obstacles, rules, terms, labels, docket
+            b, terms.goal[g], tick, cars, spacing, state, roads, obstacles, rules, terms, labels, breach_log
         )
         if long == 0:
             ticks_paused[g] = 0
         elif paused:
             ticks_paused[g] += 1
         if long - ticks_paused[g] == ago and (long == 0 or not paused):
-            add(b, GOAL, who, tick, clock[g], terms.goal[g], -1, docket.row, docket.filled)
+            add(b, GOAL, who, tick, clock[g], terms.goal[g], -1, breach_log.row, breach_log.filled)
         due = min(due, again)
         due = min(due, when_due(tick, clock, g, ago + ticks_paused[g]))
-    docket.goal_due[b] = due
+    breach_log.goal_due[b] = due
 
 
 @jit_inline
@@ -264,9 +264,9 @@ def _holds_up(
     roads: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> tuple[bool, int]:
     """E6: tell whether no exit of the goal v is free, for any e-agent in it, and the ego is near one.
 
@@ -284,10 +284,10 @@ def _holds_up(
     for n in range(1, cars):
         if labels.at[b, n] != v:
             continue
-        back = way_back(b, v, docket.clock[b, n, CAME_BY], roads, rules)
+        back = way_back(b, v, breach_log.clock[b, n, CAME_BY], roads, rules)
         count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
         if find_exit(
-            b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, docket
+            b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, breach_log
         ):
             return False, tick + 1
         near |= ego_at_exit(b, v, back, state, roads, rules, terms, labels)

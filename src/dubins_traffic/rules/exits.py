@@ -18,8 +18,8 @@ from dubins_traffic.rules.breach_log import (
     GOAL_GAP,
     LANE_MIDDLE,
     LONE,
-    Docket,
-    Terms,
+    BreachLog,
+    RefereeParameters,
 )
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.tables import (
@@ -47,12 +47,12 @@ def way_back(b: int, v: int, came: int, t: RoadTable, rules: RuleTable) -> int:
 
 
 @jit_inline
-def _passes_by(b: int, k: int, back: int, docket: Docket) -> bool:
+def _passes_by(b: int, k: int, back: int, breach_log: BreachLog) -> bool:
     """Tell whether car k, in a bend, is an e-agent that came there by another segment than `back`.
 
     So cars that meet in a bend, each before the other's exit, do not excuse each other.
     """
-    came = docket.clock[b, k, CAME_BY]
+    came = breach_log.clock[b, k, CAME_BY]
     return k != EGO and came >= 0 and came // 2 != back
 
 
@@ -70,7 +70,7 @@ def stands_in_exit(
 
 
 @jit_inline
-def to_mouth(b: int, along: float, lateral: float, rules: RuleTable, terms: Terms) -> float:
+def to_mouth(b: int, along: float, lateral: float, rules: RuleTable, terms: RefereeParameters) -> float:
     """Return how far (along, lateral) of a lane out of a disc is from where the lane leaves the disc, metres."""
     far, aside = along - rules.real[b, RADIUS], lateral + terms.real[b, LANE_MIDDLE]
     return sqrt(far * far + aside * aside)
@@ -88,9 +88,9 @@ def find_exit(
     t: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> bool:
     """Tell whether some lane out of v, but for that on segment `back`, is free for car n.
 
@@ -108,7 +108,7 @@ def find_exit(
         x, y = state.x[b, k], state.y[b, k]
         away2 = (x - vx) * (x - vx) + (y - vy) * (y - vy)
         inside = labels.at[b, k] == v
-        if k == n or away2 > terms.real[b, EXIT2] or (inside and bend and _passes_by(b, k, back, docket)):
+        if k == n or away2 > terms.real[b, EXIT2] or (inside and bend and _passes_by(b, k, back, breach_log)):
             continue
         for arm in range(t.degree[row]):
             lane = t.arms[row, arm]
@@ -149,9 +149,9 @@ def look_for_exit(
     t: RoadTable,
     obstacles: ObstacleLanes,
     rules: RuleTable,
-    terms: Terms,
+    terms: RefereeParameters,
     labels: Labels,
-    docket: Docket,
+    breach_log: BreachLog,
 ) -> tuple[bool, int]:
     """E4: tell whether car n, whose body meets the disc of v, may leave by some lane, and when to ask again.
 
@@ -178,13 +178,22 @@ def look_for_exit(
     if near < t.degree[row] and obstacles.base[b] < 0:
         spare = min(sqrt(nearest2) - rules.real[b, RADIUS], sqrt(beyond2) - sqrt(far2)) - GRAIN
         return True, tick + ticks_within(spare, spacing, b)
-    free = find_exit(b, n, v, back, spacing.near, count, state, t, obstacles, rules, terms, labels, docket)
+    free = find_exit(
+        b, n, v, back, spacing.near, count, state, t, obstacles, rules, terms, labels, breach_log
+    )
     return free, tick + 1
 
 
 @jit_inner
 def ego_at_exit(
-    b: int, v: int, back: int, state: State, t: RoadTable, rules: RuleTable, terms: Terms, labels: Labels
+    b: int,
+    v: int,
+    back: int,
+    state: State,
+    t: RoadTable,
+    rules: RuleTable,
+    terms: RefereeParameters,
+    labels: Labels,
 ) -> bool:
     """E6: tell whether the ego is near an exit of v, of which that on segment `back` is none.
 

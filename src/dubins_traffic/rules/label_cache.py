@@ -4,7 +4,7 @@ Cars move a little in a tick. So with its labels a rectangle about a car is kept
 strip of its lane, in which the labels are the same for certain; there only its progress and whether it was still are
 found anew.
 
-What is kept stands in `Memory.calm`, in columns a fixed number of cars apart, and nothing in the loop over the cars is
+What is kept stands in `Memory.kept`, in columns a fixed number of cars apart, and nothing in the loop over the cars is
 a branch: so the compiler sees that several may be taken at once.
 """
 
@@ -39,10 +39,6 @@ from dubins_traffic.rules.tables import (
     AXIS_Y,
     BASE,
     CALM,
-    CALM_HIGH_X,
-    CALM_HIGH_Y,
-    CALM_LOW_X,
-    CALM_LOW_Y,
     CROSS2,
     FORK_SURE,
     FORK_X,
@@ -61,11 +57,6 @@ from dubins_traffic.rules.tables import (
     NET,
     NEVER_AGAIN,
     NOW,
-    PATCH_HIGH_X,
-    PATCH_HIGH_Y,
-    PATCH_LOW_X,
-    PATCH_LOW_Y,
-    PATCH_VERTEX,
     PROGRESS,
     QUEUE2,
     RADIUS,
@@ -82,6 +73,15 @@ from dubins_traffic.rules.tables import (
     TOP_SO_FAR,
     TOP_THEN,
     TURN_BACK,
+    VALID_CELL_HIGH_X,
+    VALID_CELL_HIGH_Y,
+    VALID_CELL_LOW_X,
+    VALID_CELL_LOW_Y,
+    VALID_CELL_VERTEX,
+    VALID_HIGH_X,
+    VALID_HIGH_Y,
+    VALID_LOW_X,
+    VALID_LOW_Y,
     VERTEX_X,
     VERTEX_Y,
     WAS_LINGERING,
@@ -104,7 +104,7 @@ HUGE = 1e300
 
 @jit_inline
 def place(n: int) -> int:
-    """Return where car n stands in the first column of a row of `Memory.calm`; column k is k * BLOCK farther."""
+    """Return where car n stands in the first column of a row of `Memory.kept`; column k is k * BLOCK farther."""
     return (n & -BLOCK) * CALM + (n & (BLOCK - 1))
 
 
@@ -120,44 +120,44 @@ def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Me
     still2 = real[STAND_MOVE2] if tick >= rules.whole[b, STAND_TICKS] else -1.0
     least, now = real[LINGER_GROWTH], float(tick)
     growth = memory.growth[b, growth_row(b, tick, rules)]
-    calm = memory.calm[b]
+    kept = memory.kept[b]
     for first in range(0, state.count[b], BLOCK):
         begin = first * CALM
         here = min(state.count[b] - first, BLOCK)
         for k in range(begin, begin + ((here + WIDE - 1) & -WIDE)):
-            x = calm[k + BLOCK * HERE_X]
-            y = calm[k + BLOCK * HERE_Y]
-            inside = (calm[k + BLOCK * CALM_LOW_X] < x) & (x < calm[k + BLOCK * CALM_HIGH_X])
-            inside &= (calm[k + BLOCK * CALM_LOW_Y] < y) & (y < calm[k + BLOCK * CALM_HIGH_Y])
-            rx = x - calm[k + BLOCK * VERTEX_X]
-            ry = y - calm[k + BLOCK * VERTEX_Y]
+            x = kept[k + BLOCK * HERE_X]
+            y = kept[k + BLOCK * HERE_Y]
+            inside = (kept[k + BLOCK * VALID_LOW_X] < x) & (x < kept[k + BLOCK * VALID_HIGH_X])
+            inside &= (kept[k + BLOCK * VALID_LOW_Y] < y) & (y < kept[k + BLOCK * VALID_HIGH_Y])
+            rx = x - kept[k + BLOCK * VERTEX_X]
+            ry = y - kept[k + BLOCK * VERTEX_Y]
             away2 = rx * rx + ry * ry
-            inside &= (calm[k + BLOCK * RING_LOW] < away2) & (away2 < calm[k + BLOCK * RING_HIGH])
-            rx = x - calm[k + BLOCK * FROM_X]
-            ry = y - calm[k + BLOCK * FROM_Y]
-            along = rx * calm[k + BLOCK * AXIS_X] + ry * calm[k + BLOCK * AXIS_Y]
-            progress = calm[k + BLOCK * BASE] + calm[k + BLOCK * SIGN] * along
-            top = calm[k + BLOCK * TOP_SO_FAR]
-            inside &= (top - progress < back) & (calm[k + BLOCK * ALONG_LOW] < along)
-            inside &= along < calm[k + BLOCK * ALONG_HIGH]
-            aside = calm[k + BLOCK * AXIS_X] * ry - calm[k + BLOCK * AXIS_Y] * rx
-            inside &= (calm[k + BLOCK * ASIDE_LOW] < aside) & (aside < calm[k + BLOCK * ASIDE_HIGH])
-            half = calm[k + BLOCK * FORK_SURE]
-            rx = x - calm[k + BLOCK * THEN_X]
-            ry = y - calm[k + BLOCK * THEN_Y]
-            calm[k + BLOCK * AWAY2] = away2
-            calm[k + BLOCK * WAY_SO_FAR] = progress
+            inside &= (kept[k + BLOCK * RING_LOW] < away2) & (away2 < kept[k + BLOCK * RING_HIGH])
+            rx = x - kept[k + BLOCK * FROM_X]
+            ry = y - kept[k + BLOCK * FROM_Y]
+            along = rx * kept[k + BLOCK * AXIS_X] + ry * kept[k + BLOCK * AXIS_Y]
+            progress = kept[k + BLOCK * BASE] + kept[k + BLOCK * SIGN] * along
+            top = kept[k + BLOCK * TOP_SO_FAR]
+            inside &= (top - progress < back) & (kept[k + BLOCK * ALONG_LOW] < along)
+            inside &= along < kept[k + BLOCK * ALONG_HIGH]
+            aside = kept[k + BLOCK * AXIS_X] * ry - kept[k + BLOCK * AXIS_Y] * rx
+            inside &= (kept[k + BLOCK * ASIDE_LOW] < aside) & (aside < kept[k + BLOCK * ASIDE_HIGH])
+            half = kept[k + BLOCK * FORK_SURE]
+            rx = x - kept[k + BLOCK * THEN_X]
+            ry = y - kept[k + BLOCK * THEN_Y]
+            kept[k + BLOCK * AWAY2] = away2
+            kept[k + BLOCK * WAY_SO_FAR] = progress
             top = max(top, progress)
-            calm[k + BLOCK * TOP_SO_FAR] = top
+            kept[k + BLOCK * TOP_SO_FAR] = top
             then = growth[first + k - begin]
             growth[first + k - begin] = top
-            calm[k + BLOCK * TOP_THEN] = then
-            little = (now >= calm[k + BLOCK * LINGERS_FROM]) & (top - then < least)
-            calm[k + BLOCK * WAS_LINGERING] = 1.0 if little else 0.0
-            sure = (abs(x - calm[k + BLOCK * FORK_X]) < half) & (abs(y - calm[k + BLOCK * FORK_Y]) < half)
+            kept[k + BLOCK * TOP_THEN] = then
+            little = (now >= kept[k + BLOCK * LINGERS_FROM]) & (top - then < least)
+            kept[k + BLOCK * WAS_LINGERING] = 1.0 if little else 0.0
+            sure = (abs(x - kept[k + BLOCK * FORK_X]) < half) & (abs(y - kept[k + BLOCK * FORK_Y]) < half)
             holds = 1.0 if sure else IF_NEAREST
-            calm[k + BLOCK * HOLDS] = holds if inside else 0.0
-            calm[k + BLOCK * WAS_STILL] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
+            kept[k + BLOCK * HOLDS] = holds if inside else 0.0
+            kept[k + BLOCK * WAS_STILL] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
 
 
 @jit_inline
@@ -167,24 +167,24 @@ def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) ->
     now = tick % depth
     then = (now + depth - rules.whole[b, STAND_TICKS]) % depth
     memory.head[b, 0, NOW] = now
-    calm = memory.calm[b]
+    kept = memory.kept[b]
     x, y, present, past = state.x[b], state.y[b], memory.trail[b, now], memory.trail[b, then]
     if places % TOGETHER == 0:
         for n in range(0, places, TOGETHER):
             k = place(n)
-            _copy(past[0], n, calm, k + BLOCK * THEN_X)
-            _copy(past[1], n, calm, k + BLOCK * THEN_Y)
-            _copy(x, n, calm, k + BLOCK * HERE_X)
-            _copy(y, n, calm, k + BLOCK * HERE_Y)
+            _copy(past[0], n, kept, k + BLOCK * THEN_X)
+            _copy(past[1], n, kept, k + BLOCK * THEN_Y)
+            _copy(x, n, kept, k + BLOCK * HERE_X)
+            _copy(y, n, kept, k + BLOCK * HERE_Y)
             _copy(x, n, present[0], n)
             _copy(y, n, present[1], n)
         return
     for n in range(places):
         k = place(n)
-        calm[k + BLOCK * THEN_X] = past[0, n]
-        calm[k + BLOCK * THEN_Y] = past[1, n]
-        calm[k + BLOCK * HERE_X] = present[0, n] = x[n]
-        calm[k + BLOCK * HERE_Y] = present[1, n] = y[n]
+        kept[k + BLOCK * THEN_X] = past[0, n]
+        kept[k + BLOCK * THEN_Y] = past[1, n]
+        kept[k + BLOCK * HERE_X] = present[0, n] = x[n]
+        kept[k + BLOCK * HERE_Y] = present[1, n] = y[n]
 
 
 @jit_inline
@@ -203,13 +203,13 @@ def _copy(source: Floats, n: int, target: Floats, k: int) -> None:
 @jit_inline
 def still(b: int, n: int, memory: Memory) -> int:
     """Return STILL if car n is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
-    return STILL if memory.calm[b, place(n) + BLOCK * WAS_STILL] != 0.0 else 0
+    return STILL if memory.kept[b, place(n) + BLOCK * WAS_STILL] != 0.0 else 0
 
 
 @jit_inline
 def lingers(b: int, n: int, memory: Memory) -> int:
     """Return LINGERS if car n lingers, else 0; after `look_who_holds`, or `note_growth` for who doesn't hold on."""
-    return LINGERS if memory.calm[b, place(n) + BLOCK * WAS_LINGERING] != 0.0 else 0
+    return LINGERS if memory.kept[b, place(n) + BLOCK * WAS_LINGERING] != 0.0 else 0
 
 
 @jit_inline
@@ -217,15 +217,15 @@ def note_growth(
     b: int, n: int, tick: int, lane: int, fresh: bool, top: float, rules: RuleTable, memory: Memory
 ) -> None:
     """Find whether a car lingers that has been located in `lane` (-1: none), which was set in this frame if `fresh`."""
-    calm = memory.calm[b]
+    kept = memory.kept[b]
     k = place(n)
     if lane < 0:
-        calm[k + BLOCK * LINGERS_FROM] = NEVER_AGAIN
+        kept[k + BLOCK * LINGERS_FROM] = NEVER_AGAIN
     elif fresh:
-        calm[k + BLOCK * LINGERS_FROM] = float(tick + rules.whole[b, LINGER_TICKS])
-    long = tick >= calm[k + BLOCK * LINGERS_FROM]
-    little = top - calm[k + BLOCK * TOP_THEN] < rules.real[b, LINGER_GROWTH]
-    calm[k + BLOCK * WAS_LINGERING] = 1.0 if long and little else 0.0
+        kept[k + BLOCK * LINGERS_FROM] = float(tick + rules.whole[b, LINGER_TICKS])
+    long = tick >= kept[k + BLOCK * LINGERS_FROM]
+    little = top - kept[k + BLOCK * TOP_THEN] < rules.real[b, LINGER_GROWTH]
+    kept[k + BLOCK * WAS_LINGERING] = 1.0 if long and little else 0.0
     memory.growth[b, growth_row(b, tick, rules), n] = top
 
 
@@ -235,22 +235,24 @@ def holds_on(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, mem
 
     Returns False, and does nothing that matters, where it is not known. After `look_who_holds`.
     """
-    calm = memory.calm[b]
+    kept = memory.kept[b]
     k = place(n)
-    holds = calm[k + BLOCK * HOLDS]
+    holds = kept[k + BLOCK * HOLDS]
     if holds == 0.0:
         return False
     if holds == IF_NEAREST:
-        x, y = calm[k + BLOCK * HERE_X], calm[k + BLOCK * HERE_Y]
-        segment, _, surely = nearest_arm(t, rules.whole[b, NET], int(memory.patch[b, n, PATCH_VERTEX]), x, y)
+        x, y = kept[k + BLOCK * HERE_X], kept[k + BLOCK * HERE_Y]
+        segment, _, surely = nearest_arm(
+            t, rules.whole[b, NET], int(memory.valid_cell[b, n, VALID_CELL_VERTEX]), x, y
+        )
         if segment != labels.segment[b, n]:
             return False
-        trust_fork(n, x, y, surely, calm)
+        trust_fork(n, x, y, surely, kept)
     measure = memory.measure[b, n]
-    measure[TOP] = calm[k + BLOCK * TOP_SO_FAR]
-    measure[PROGRESS] = calm[k + BLOCK * WAY_SO_FAR]
+    measure[TOP] = kept[k + BLOCK * TOP_SO_FAR]
+    measure[PROGRESS] = kept[k + BLOCK * WAY_SO_FAR]
     if memory.mark[b, n, ZONE] != 0:
-        measure[GAP2] = calm[k + BLOCK * AWAY2]
+        measure[GAP2] = kept[k + BLOCK * AWAY2]
     labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(b, n, memory) | lingers(b, n, memory)
     return True
 
@@ -262,39 +264,39 @@ def hold(
 ) -> None:  # fmt: skip
     """Keep where a car that has been located is sure to hold on to its labels.
 
-    It does while it is less than `spare` metres from (x, y), in the patch, where the squared distance from its vertex
-    compares with all radii that matter as `away2` does, the nearest road is the same, and it is no farther aside in its
-    lane than `_keep_strip` says.
+    It does while it is less than `spare` metres from (x, y), in the valid_cell, where the squared distance from its
+    vertex compares with all radii that matter as `away2` does, the nearest road is the same, and it is no farther
+    aside in its lane than `_keep_strip` says.
     """
     net: int = rules.whole[b, NET]
-    row = memory.patch[b, n]
-    calm = memory.calm[b]
+    row = memory.valid_cell[b, n]
+    kept = memory.kept[b]
     k = place(n)
     half = 0.7 * spare - CERTAIN
-    calm[k + BLOCK * CALM_LOW_X] = max(row[PATCH_LOW_X], x - half)
-    calm[k + BLOCK * CALM_HIGH_X] = min(row[PATCH_HIGH_X], x + half)
-    calm[k + BLOCK * CALM_LOW_Y] = max(row[PATCH_LOW_Y], y - half)
-    calm[k + BLOCK * CALM_HIGH_Y] = min(row[PATCH_HIGH_Y], y + half)
-    vertex = t.vert_off[net] + int(row[PATCH_VERTEX])
-    calm[k + BLOCK * VERTEX_X] = float(t.vert[vertex, 0])
-    calm[k + BLOCK * VERTEX_Y] = float(t.vert[vertex, 1])
-    _keep_ring(k, away2, rules.real[b], calm)
-    _keep_axis(k, net, lane, t, calm)
+    kept[k + BLOCK * VALID_LOW_X] = max(row[VALID_CELL_LOW_X], x - half)
+    kept[k + BLOCK * VALID_HIGH_X] = min(row[VALID_CELL_HIGH_X], x + half)
+    kept[k + BLOCK * VALID_LOW_Y] = max(row[VALID_CELL_LOW_Y], y - half)
+    kept[k + BLOCK * VALID_HIGH_Y] = min(row[VALID_CELL_HIGH_Y], y + half)
+    vertex = t.vert_off[net] + int(row[VALID_CELL_VERTEX])
+    kept[k + BLOCK * VERTEX_X] = float(t.vert[vertex, 0])
+    kept[k + BLOCK * VERTEX_Y] = float(t.vert[vertex, 1])
+    _keep_ring(k, away2, rules.real[b], kept)
+    _keep_axis(k, net, lane, t, kept)
     _keep_strip(b, n, lane, t, rules, memory)
-    calm[k + BLOCK * TOP_SO_FAR] = memory.measure[b, n, TOP]
+    kept[k + BLOCK * TOP_SO_FAR] = memory.measure[b, n, TOP]
 
 
 @jit_inline
-def trust_fork(n: int, x: float, y: float, surely: float, calm: Floats) -> None:
+def trust_fork(n: int, x: float, y: float, surely: float, kept: Floats) -> None:
     """Keep that the nearest road is the same up to `surely` metres from (x, y), along x and along y."""
     k = place(n)
-    calm[k + BLOCK * FORK_X] = x
-    calm[k + BLOCK * FORK_Y] = y
-    calm[k + BLOCK * FORK_SURE] = surely
+    kept[k + BLOCK * FORK_X] = x
+    kept[k + BLOCK * FORK_Y] = y
+    kept[k + BLOCK * FORK_SURE] = surely
 
 
 @jit_inline
-def _keep_ring(k: int, away2: float, real: Floats, calm: Floats) -> None:
+def _keep_ring(k: int, away2: float, real: Floats, kept: Floats) -> None:
     """Keep between which squared distances of its vertex a car is at `away2`: of its discs, and who approaches it."""
     low = -1.0
     high = FARTHEST * FARTHEST
@@ -304,28 +306,28 @@ def _keep_ring(k: int, away2: float, real: Floats, calm: Floats) -> None:
             low = max(low, edge2)
         else:
             high = min(high, edge2)
-    calm[k + BLOCK * RING_LOW] = low
-    calm[k + BLOCK * RING_HIGH] = high
+    kept[k + BLOCK * RING_LOW] = low
+    kept[k + BLOCK * RING_HIGH] = high
 
 
 @jit_inline
-def _keep_axis(k: int, net: int, lane: int, t: RoadTable, calm: Floats) -> None:
+def _keep_axis(k: int, net: int, lane: int, t: RoadTable, kept: Floats) -> None:
     """Keep the segment along which a car makes progress, as `roads.lookup.lane_coordinates` measures it."""
     row = t.seg_off[net] + (max(lane, 0) >> 1)
     back = lane >= 0 and lane & 1 != 0
-    calm[k + BLOCK * FROM_X] = t.seg[row, 0]
-    calm[k + BLOCK * FROM_Y] = t.seg[row, 1]
-    calm[k + BLOCK * AXIS_X] = t.seg[row, 2]
-    calm[k + BLOCK * AXIS_Y] = t.seg[row, 3]
-    calm[k + BLOCK * BASE] = t.seg[row, 4] if back else 0.0
-    calm[k + BLOCK * SIGN] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    kept[k + BLOCK * FROM_X] = t.seg[row, 0]
+    kept[k + BLOCK * FROM_Y] = t.seg[row, 1]
+    kept[k + BLOCK * AXIS_X] = t.seg[row, 2]
+    kept[k + BLOCK * AXIS_Y] = t.seg[row, 3]
+    kept[k + BLOCK * BASE] = t.seg[row, 4] if back else 0.0
+    kept[k + BLOCK * SIGN] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
 
 
 @jit_inline
 def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memory: Memory) -> None:
     """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds."""
     net: int = rules.whole[b, NET]
-    calm = memory.calm[b]
+    kept = memory.kept[b]
     low = begin = -HUGE
     high = end = HUGE
     if lane >= 0:
@@ -350,7 +352,7 @@ def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memor
         begin = CERTAIN
         end = t.seg[t.seg_off[net] + (lane >> 1), 4] - CERTAIN
     k = place(n)
-    calm[k + BLOCK * ASIDE_LOW] = low
-    calm[k + BLOCK * ASIDE_HIGH] = high
-    calm[k + BLOCK * ALONG_LOW] = begin
-    calm[k + BLOCK * ALONG_HIGH] = end
+    kept[k + BLOCK * ASIDE_LOW] = low
+    kept[k + BLOCK * ASIDE_HIGH] = high
+    kept[k + BLOCK * ALONG_LOW] = begin
+    kept[k + BLOCK * ALONG_HIGH] = end

@@ -18,7 +18,7 @@ from dubins_traffic.roads.lookup import (
     lane_direction,
     lane_end,
     nearest_arm,
-    patch,
+    valid_cell,
     vertex_distance2,
 )
 from dubins_traffic.roads.table import RoadTable
@@ -50,12 +50,6 @@ from dubins_traffic.rules.tables import (
     NET,
     NEXT_IN_LANE,
     NOW,
-    PATCH_HIGH_X,
-    PATCH_HIGH_Y,
-    PATCH_LOW_X,
-    PATCH_LOW_Y,
-    PATCH_SEGMENT,
-    PATCH_VERTEX,
     PROGRESS,
     QUEUE2,
     RADIUS,
@@ -64,6 +58,12 @@ from dubins_traffic.rules.tables import (
     STOP2,
     TOP,
     TURN_BACK,
+    VALID_CELL_HIGH_X,
+    VALID_CELL_HIGH_Y,
+    VALID_CELL_LOW_X,
+    VALID_CELL_LOW_Y,
+    VALID_CELL_SEGMENT,
+    VALID_CELL_VERTEX,
     WAIT_SINCE,
     ZONE,
     Memory,
@@ -87,7 +87,7 @@ def locate(
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
     v, segment, off2, surely = _look_up(
-        net, x, y, sqrt(real[b, CROSS2]) + half_length + half_width, t, memory.patch[b, n]
+        net, x, y, sqrt(real[b, CROSS2]) + half_length + half_width, t, memory.valid_cell[b, n]
     )
     away2 = vertex_distance2(t, net, v, x, y)
     at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
@@ -143,7 +143,7 @@ def locate(
     if lane < 0:
         spare = min(spare, abs(sqrt(off2) - t.half_width[net]))
     hold(b, n, x, y, away2, lane, spare, t, rules, memory)
-    trust_fork(n, x, y, surely, memory.calm[b])
+    trust_fork(n, x, y, surely, memory.kept[b])
     return stirs
 
 
@@ -151,15 +151,19 @@ def locate(
 def _look_up(
     net: int, x: float, y: float, radius: float, t: RoadTable, row: Floats
 ) -> tuple[int, int, float, float]:
-    """Return (vertex, segment, off2, surely): the nearest of each, by the patch in `row`, which is renewed if need be.
+    """Return (vertex, segment, off2, surely): the nearest of each, by the valid_cell in `row`, which is renewed if
+    need be.
 
     The vertex is the nearest one if any is within `radius` metres. off2 is the squared distance from the segment, which
-    is the nearest for `surely` metres along x and along y, as long as the patch holds.
+    is the nearest for `surely` metres along x and along y, as long as the valid_cell holds.
     """
-    if not (row[PATCH_LOW_X] < x < row[PATCH_HIGH_X] and row[PATCH_LOW_Y] < y < row[PATCH_HIGH_Y]):
-        patch(t, net, x, y, radius, row)
-    v = int(row[PATCH_VERTEX])
-    segment = int(row[PATCH_SEGMENT])
+    if not (
+        row[VALID_CELL_LOW_X] < x < row[VALID_CELL_HIGH_X]
+        and row[VALID_CELL_LOW_Y] < y < row[VALID_CELL_HIGH_Y]
+    ):
+        valid_cell(t, net, x, y, radius, row)
+    v = int(row[VALID_CELL_VERTEX])
+    segment = int(row[VALID_CELL_SEGMENT])
     if segment >= 0:
         return v, segment, distance2(t, net, segment, x, y), FARTHEST
     segment, off2, surely = nearest_arm(t, net, v, x, y)

@@ -33,8 +33,8 @@ from dubins_traffic.rules.breach_log import (
     REST_SINCE,
     RULES,
     SINCE_TICK,
-    Docket,
-    Terms,
+    BreachLog,
+    RefereeParameters,
     pack_terms,
 )
 from dubins_traffic.rules.duties import find_ways
@@ -86,7 +86,7 @@ class Breach(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Running:
+class Pending:
     """What hangs over the cars after the last frame judged: obligations not met yet, by the rules' names.
 
     `ego` and `others` tell of the ego and of any e-agent which of these rules would be broken if all stayed as it is.
@@ -124,7 +124,7 @@ class Referee:
         if self._own:
             self._labeller.reset(state)
         trials, cars = state.x.shape
-        self._docket = Docket.empty(trials, cars, len(self._terms.goal))
+        self._docket = BreachLog.empty(trials, cars, len(self._terms.goal))
         self._spacing = unknown(trials, cars)
         self._judge(0, state)
         return self._collect(state, [()] * trials)
@@ -175,7 +175,7 @@ class Referee:
         return sorted(breaches, key=order), contacts
 
     @property
-    def running(self) -> Sequence[Running]:
+    def running(self) -> Sequence[Pending]:
         """What hangs over the cars of each trial."""
         return running(np.arange(len(self._judged)), self._terms, self._docket)
 
@@ -249,7 +249,7 @@ class Referee:
         own = self._labeller
         if frames.first == 0:
             self._state = State.zeros(1, cars)
-            self._docket = Docket.empty(1, cars, len(self._terms.goal), _ROOMY)
+            self._docket = BreachLog.empty(1, cars, len(self._terms.goal), _ROOMY)
             self._spacing = unknown(1, cars)
             self._next = 0
             own.begin(1, cars)
@@ -285,14 +285,14 @@ class Referee:
         return before, bits, breaches
 
     def _found(self) -> list[list[int]]:
-        """Empty the docket; return the rows that were in it."""
-        docket = self._docket
-        rows: list[list[int]] = docket.row[: docket.filled[0]].tolist()
-        docket.filled[0] = 0
+        """Empty the breach_log; return the rows that were in it."""
+        breach_log = self._docket
+        rows: list[list[int]] = breach_log.row[: breach_log.filled[0]].tolist()
+        breach_log.filled[0] = 0
         return rows
 
 
-def terms_of(problems: Sequence[WithGoals]) -> Terms:
+def terms_of(problems: Sequence[WithGoals]) -> RefereeParameters:
     """Return the terms by which the trials of some problems are judged."""
     kinds, index = kinds_of(problems)
     real, whole = pack_terms(
@@ -306,15 +306,15 @@ def terms_of(problems: Sequence[WithGoals]) -> Terms:
     for problem in problems:
         goal += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
         goal_off.append(len(goal))
-    return Terms(
+    return RefereeParameters(
         real[index], whole[index], np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64)
     )
 
 
-def running(trials: Ints, terms: Terms, docket: Docket) -> list[Running]:
+def running(trials: Ints, terms: RefereeParameters, breach_log: BreachLog) -> list[Pending]:
     """Return what hangs over the cars of some trials."""
-    runs = docket.clock[trials][:, :, _CLOCKS] >= 0
-    goal: list[bool] = (docket.goal_clock >= 0).tolist()
+    runs = breach_log.clock[trials][:, :, _CLOCKS] >= 0
+    goal: list[bool] = (breach_log.goal_clock >= 0).tolist()
     off: list[int] = terms.goal_off.tolist()
     taken = [any(goal[off[b] : off[b + 1]]) for b in trials.tolist()]
     egos: list[list[bool]] = runs[:, EGO].tolist()
@@ -326,9 +326,9 @@ def running(trials: Ints, terms: Terms, docket: Docket) -> list[Running]:
 
 
 @cache
-def _hanging(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Running:
+def _hanging(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Pending:
     """Return what hangs over the cars whose clocks of `_PENDING` run; the trials of a batch share the few there are."""
-    return Running(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
+    return Pending(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
 
 
 def _named(runs: Sequence[bool]) -> frozenset[str]:
@@ -336,7 +336,7 @@ def _named(runs: Sequence[bool]) -> frozenset[str]:
 
 
 def breach_of(row: Sequence[int], x: float, y: float) -> Breach:
-    """Return the breach in a row of the docket, of a car at (x, y)."""
+    """Return the breach in a row of the breach_log, of a car at (x, y)."""
     return Breach(
         RULES[row[OF_RULE]], row[OF_CAR], row[AT_TICK], row[SINCE_TICK], x, y, row[AT_VERTEX], row[ON_LANE]
     )

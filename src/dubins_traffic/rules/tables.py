@@ -77,15 +77,15 @@ CROSSERS: Final = 3
 NOW: Final = 4
 HEADS: Final = 5
 
-PATCH_LOW_X: Final = 0
-PATCH_HIGH_X: Final = 1
-PATCH_LOW_Y: Final = 2
-PATCH_HIGH_Y: Final = 3
-PATCH_SEGMENT: Final = 4
-PATCH_VERTEX: Final = 5
-PATCH: Final = 6
+VALID_CELL_LOW_X: Final = 0
+VALID_CELL_HIGH_X: Final = 1
+VALID_CELL_LOW_Y: Final = 2
+VALID_CELL_HIGH_Y: Final = 3
+VALID_CELL_SEGMENT: Final = 4
+VALID_CELL_VERTEX: Final = 5
+VALID_CELL: Final = 6
 
-CALM_LOW_X, CALM_HIGH_X, CALM_LOW_Y, CALM_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, RING_HIGH = range(8)
+VALID_LOW_X, VALID_HIGH_X, VALID_LOW_Y, VALID_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, RING_HIGH = range(8)
 FROM_X, FROM_Y, AXIS_X, AXIS_Y, BASE, SIGN, TOP_SO_FAR, FORK_X, FORK_Y, FORK_SURE = range(8, 18)
 ASIDE_LOW, ASIDE_HIGH, ALONG_LOW, ALONG_HIGH = range(18, 22)
 HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(22, 30)
@@ -129,18 +129,18 @@ class Memory(NamedTuple):
         (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none;
         whether it is where cars approach and queue (`ZONE`, else 0); tick of the first stop in this wait
         (`WAIT_SINCE`, -1: none).
-    patch : (B, N, PATCH) float64
+    valid_cell : (B, N, VALID_CELL) float64
         A rectangle about the place where the centre was last looked up, in which nearest segment (-1: one of those
-        that meet in the nearest vertex) and vertex (`PATCH_SEGMENT`, `PATCH_VERTEX`) are the same for certain; empty
-        before.
-    calm : (B, C) float64
-        Columns of BLOCK cars each, see `rules.label_cache.place`. Where all that a place says is the same, as far as the
-        nearest segment is: within a rectangle (`CALM_LOW_X` to `CALM_HIGH_Y`), and at squared distances from a vertex
-        (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and `SIGN`
-        times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far; between
-        which metres to the left of that axis, and along it, it is on the road and not left as it is now. Where the
-        nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y. Of this
-        frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
+        that meet in the nearest vertex) and vertex (`VALID_CELL_SEGMENT`, `VALID_CELL_VERTEX`) are the same for
+        certain; empty before.
+    kept : (B, C) float64
+        Columns of BLOCK cars each, see `rules.label_cache.place`. Where all that a place says is the same, as far as
+        the nearest segment is: within a rectangle (`VALID_LOW_X` to `VALID_HIGH_Y`), and at squared distances from a
+        vertex (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and
+        `SIGN` times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far;
+        between which metres to the left of that axis, and along it, it is on the road and not left as it is now.
+        Where the nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y.
+        Of this frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
         whether it holds on to its labels, and whether it was still. The greatest progress `linger_time` ago
         (`TOP_THEN`), the tick from which on that says whether the car lingers (`LINGERS_FROM`), and whether it does.
     trail : (B, M, 2, N) float64
@@ -158,8 +158,8 @@ class Memory(NamedTuple):
 
     measure: Floats
     mark: Ints
-    patch: Floats
-    calm: Floats
+    valid_cell: Floats
+    kept: Floats
     trail: Floats
     growth: Floats
     link: Ints
@@ -178,7 +178,7 @@ class Memory(NamedTuple):
         return Memory(
             np.zeros((trials, cars, MEASURES)),
             mark,
-            np.zeros((trials, cars, PATCH)),
+            np.zeros((trials, cars, VALID_CELL)),
             np.zeros((trials, -(-cars // BLOCK) * BLOCK * CALM)),
             np.zeros((trials, depth, 2, cars)),
             np.zeros((trials, linger, -(-cars // WIDE) * WIDE)),

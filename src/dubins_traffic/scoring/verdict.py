@@ -25,7 +25,7 @@ from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.nearness import is_near
 
 if TYPE_CHECKING:
-    from dubins_traffic.rules.referee import Breach, Running
+    from dubins_traffic.rules.referee import Breach, Pending
 
 EGO_NAME = "ego"
 """Name of the ego among the cars."""
@@ -272,7 +272,7 @@ def reach_verdict(
     visited_now: Sequence[bool],
     was_sensed: Callable[[int, int, int], bool],
     seen: Callable[[int, int], bool],
-    running: Running,
+    running: Pending,
     margins: dict[str, float | None],
     *,
     whole: bool,
@@ -354,7 +354,7 @@ def _formulas(
     breaches: Sequence[Breach],
     visits: Visits,
     visited_now: Sequence[bool],
-    running: Running,
+    running: Pending,
 ) -> dict[str, Status]:
     found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
     for rule in running.ego.intersection(EGO_RULES):

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dubins_traffic.runs.single import Result
-from dubins_traffic.sessions.plan import Pace, Programme
+from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.transports.lcm.transport import Lcm
 from dubins_traffic.transports.maestro import Maestro
 
 
 def run_over_lcm(
-    programme: Programme, pace: Pace, *, url: str | None = None, wait: bool = False
+    session_plan: SessionPlan, pace: Pace, *, url: str | None = None, wait: bool = False
 ) -> Iterator[Result]:
-    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
     Parameters
     ----------
-    programme : Programme
+    session_plan : SessionPlan
         What is run.
     pace : Pace
         How drivers are waited for.
@@ -37,5 +37,5 @@ def run_over_lcm(
     """
     maestro = Maestro() if wait else None
     transport = Lcm(url, maestro)
-    programme.rehearse()
-    yield from programme.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")
+    session_plan.rehearse()
+    yield from session_plan.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dubins_traffic.runs.single import Result
-from dubins_traffic.sessions.plan import Pace, Programme
+from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.transports.lines import Lines
 
 
-def run_over_lines(programme: Programme, pace: Pace, *, port: int = 0) -> Iterator[Result]:
-    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
+def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> Iterator[Result]:
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
     A trial begins when the one before is over.
 
     Parameters
     ----------
-    programme : Programme
+    session_plan : SessionPlan
         What is run.
     pace : Pace
         How drivers are waited for.
@@ -30,8 +30,8 @@ def run_over_lines(programme: Programme, pace: Pace, *, port: int = 0) -> Iterat
     InputError
         If an instance can't be drawn.
     """
-    programme.rehearse()
+    session_plan.rehearse()
     transport = Lines(port)
-    yield from programme.run(
+    yield from session_plan.run(
         transport, pace, None, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
     )

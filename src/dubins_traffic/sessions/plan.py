@@ -78,7 +78,7 @@ class Pace:
 
 
 @dataclass(frozen=True, slots=True)
-class Programme:
+class SessionPlan:
     """What a session runs: where its instances come from, how many trials, and where things are written.
 
     `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
@@ -157,7 +157,7 @@ class Programme:
         return ScoreSheet(tuple(result.score for result in results))
 
 
-def programme(
+def session_plan(
     source: str | os.PathLike[str],
     controller: str | None = None,
     *,
@@ -171,7 +171,7 @@ def programme(
     records: str | os.PathLike[str] | None = None,
     simulator: str | None = None,
     shield: bool = False,
-) -> Programme:
+) -> SessionPlan:
     """Return what a session shall run, checked as far as can be before anything is opened.
 
     Parameters
@@ -226,7 +226,7 @@ def programme(
             "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
         )
     count = trials or (1 if configuration is None else configuration.number_trials)
-    return Programme(
+    return SessionPlan(
         supply,
         None if endless else count,
         configuration,

@@ -10,7 +10,7 @@ from functools import partial
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import Result
-from dubins_traffic.sessions.plan import Pace, Programme, moved_by
+from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.external import NAME as WORLD
@@ -24,7 +24,7 @@ DEFAULT_URI = "http://localhost:11311/"
 
 
 def run_over_ros1(
-    programme: Programme,
+    session_plan: SessionPlan,
     pace: Pace,
     *,
     master: int | None = None,
@@ -33,11 +33,11 @@ def run_over_ros1(
     poses: str | None = None,
     elsewhere: bool = False,
 ) -> Iterator[Result]:
-    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
     Parameters
     ----------
-    programme : Programme
+    session_plan : SessionPlan
         What is run.
     pace : Pace
         How drivers are waited for.
@@ -67,10 +67,10 @@ def run_over_ros1(
     if elsewhere and (pace.lockstep or pace.factor != 1.0):
         expected = "neither --lockstep nor --factor"
         raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
-    ego = programme.controller is None
+    ego = session_plan.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
-    programme.rehearse()
+    session_plan.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master is not None:
@@ -78,28 +78,28 @@ def run_over_ros1(
             stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
             uri = started.uri
-        programme.say(f"ROS master at {uri}")
+        session_plan.say(f"ROS master at {uri}")
         stack.callback(leave)
         transport = Ros1(
-            uri, maestro=maestro, told=_told(programme), clock=clock, simulated=not world, foreign=foreign
+            uri, maestro=maestro, told=_told(session_plan), clock=clock, simulated=not world, foreign=foreign
         )
         if not world:
-            yield from programme.run(transport, pace, maestro, foreign=foreign)
+            yield from session_plan.run(transport, pace, maestro, foreign=foreign)
             return
-        programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
+        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, WORLD))
         make = partial(_elsewhere, transport, ego, poses)
-        yield from programme.run(transport, pace, maestro, make, foreign=foreign)
+        yield from session_plan.run(transport, pace, maestro, make, foreign=foreign)
 
 
 def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:
     return ExternalWorld(transport.rospy, ego=ego, poses=poses)
 
 
-def _told(programme: Programme) -> Told:
-    settings = None if programme.configuration is None else programme.configuration.settings
+def _told(session_plan: SessionPlan) -> Told:
+    settings = None if session_plan.configuration is None else session_plan.configuration.settings
     return Told(
-        number_trials=programme.trials,
+        number_trials=session_plan.trials,
         duration_bounds=None if settings is None else settings.duration_bounds,
         number_goals_bounds=None if settings is None else settings.number_goals_bounds,
-        results_file=None if programme.data is None else str(programme.data.absolute()),
+        results_file=None if session_plan.data is None else str(session_plan.data.absolute()),
     )

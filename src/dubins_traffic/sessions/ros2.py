@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.runs.single import Result
-from dubins_traffic.sessions.plan import Pace, Programme
+from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.transports.maestro import Maestro
 
 if TYPE_CHECKING:
@@ -32,18 +32,18 @@ def make_transport(
 
 
 def run_over_ros2(
-    programme: Programme,
+    session_plan: SessionPlan,
     pace: Pace,
     *,
     domain: int | None = None,
     here: bool = True,
     clock: bool = False,
 ) -> Iterator[Result]:
-    """Run the trials of `programme` and yield their results; leave nothing behind however it ends.
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
     Parameters
     ----------
-    programme : Programme
+    session_plan : SessionPlan
         What is run.
     pace : Pace
         How drivers are waited for.
@@ -63,8 +63,8 @@ def run_over_ros2(
     InputError
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
-    maestro = Maestro() if programme.controller is None else None
+    maestro = Maestro() if session_plan.controller is None else None
     transport = make_transport(domain, maestro, here=here, clock=clock)
-    programme.rehearse()
+    session_plan.rehearse()
     where = f"DDS domain {transport.domain}{', within this machine' if here else ''}"
-    yield from programme.run(transport, pace, maestro, at=lambda: where)
+    yield from session_plan.run(transport, pace, maestro, at=lambda: where)

@@ -23,8 +23,8 @@ from dubins_traffic.policies.rules.tables import (
     SLOWEST,
     TIGHTEST,
     YAW_MOST,
-    Desk,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.policies.safety import GUARD, may_hit, motion_is_safe
 from dubins_traffic.roads.lookup import (
@@ -83,8 +83,8 @@ def travel_of(build: Any) -> float:
 
 
 @jit_inline
-def gather_close(b: int, state: State, sight2: float, build: Any, desk: Desk) -> int:
-    """List in `desk.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
+def gather_close(b: int, state: State, sight2: float, build: Any, scratch: Scratch) -> int:
+    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
     far = 2.0 * (build[REACH] + 1.2 * travel_of(build)) + GUARD
     far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
     count = 0
@@ -92,7 +92,7 @@ def gather_close(b: int, state: State, sight2: float, build: Any, desk: Desk) ->
         dx = state.x[b, n] - state.x[b, EGO]
         dy = state.y[b, n] - state.y[b, EGO]
         if dx * dx + dy * dy <= far2:
-            desk.near[count] = n
+            scratch.near[count] = n
             count += 1
     return count
 
@@ -100,7 +100,7 @@ def gather_close(b: int, state: State, sight2: float, build: Any, desk: Desk) ->
 @jit
 def may_touch(
     b: int, speed: float, yaw_rate: float, near: int, state: State, obstacles: ObstacleTable, build: Any,
-    desk: Desk,
+    scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
 
@@ -114,7 +114,7 @@ def may_touch(
     own = (abs(speed) + (abs(yaw_rate) * reach if p > 0.0 else 0.0)) * period
     between = max(own / 8.0 - GUARD, 0.0)
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         if not motion_is_safe(
             x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
             state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel + between,
@@ -129,7 +129,7 @@ def may_touch(
 @jit
 def refusal(
     b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> int:  # fmt: skip
     """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
 
@@ -160,7 +160,7 @@ def refusal(
     )  # fmt: skip
     if found != NOTHING:
         return found
-    return CONTACT if may_touch(b, speed, yaw_rate, near, state, obstacles, build, desk) else NOTHING
+    return CONTACT if may_touch(b, speed, yaw_rate, near, state, obstacles, build, scratch) else NOTHING
 
 
 @jit

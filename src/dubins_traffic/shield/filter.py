@@ -9,7 +9,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.policies.rules.tables import Desk, Drivers, desk
+from dubins_traffic.policies.rules.tables import Drivers, Scratch, scratch
 from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
@@ -35,7 +35,7 @@ class Intervention(NamedTuple):
     reason: str
 
 
-class Guard:
+class ShieldFilter:
     """Keeps an ego within rules 1 to 3, whatever it is asked to do (`shield.nearest_command`, docs/shield.md).
 
     Parameters
@@ -46,9 +46,9 @@ class Guard:
 
     Examples
     --------
-    >>> guard = Guard()                                              # doctest: +SKIP
-    >>> guard.start(problem)                                         # doctest: +SKIP
-    >>> command = guard.filter(observation, (0.5, 0.0))              # doctest: +SKIP
+    >>> shield_filter = ShieldFilter()                                              # doctest: +SKIP
+    >>> shield_filter.start(problem)                                         # doctest: +SKIP
+    >>> command = shield_filter.filter(observation, (0.5, 0.0))              # doctest: +SKIP
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Guard:
         self._command = np.zeros((1, cars, 2))
         self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._desk: Desk = desk(cars, len(problem.network.segments))
+        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
         net = np.zeros(1, dtype=np.int64)
         self._drivers: Drivers = egos([problem], cars, net)
         self._guards: Guards = guards([problem], self._roads, net, overtakes=self._overtakes)
@@ -108,5 +108,5 @@ class Guard:
     def _shield(self) -> None:
         shield(
             self._tick, True, self._state, self._labels, self._roads, self._obstacles, self._drivers,
-            self._guards, self._desk, self._command,
+            self._guards, self._scratch, self._command,
         )  # fmt: skip

@@ -3,8 +3,8 @@
 A car that stands breaks nothing and is never at fault. So a command is let through if, after one tick of it, the ego
 can stand for ever (`shield.checks`): then nothing goes wrong whatever the others do within E1 and E2. There is
 one exception: a car that is left of the centre line has to return. So nobody crosses that line but as the law of the
-road does (`policies.rules.policy`), where the way back is sure (`shield.way_back`), and the law drives until the ego is in
-its lane again.
+road does (`policies.rules.policy`), where the way back is sure (`shield.way_back`), and the law drives until the ego
+is in its lane again.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from dubins_traffic.policies.rules.tables import (
     UNTIL,
     WAITED,
     YAW_MOST,
-    Desk,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.roads.lookup import lane_coordinates
@@ -76,7 +76,7 @@ STEPS = 4
 @jit
 def shield(
     tick: Any, sighted: bool, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, desk: Desk, commands: Floats,
+    drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
 ) -> None:  # fmt: skip
     """Put what each ego does in place of what it was asked to do, `commands[:, 0]`.
 
@@ -88,7 +88,7 @@ def shield(
         Whether the ego sees all cars that there are in `state`; else those within the sensing radius.
     state, labels, roads, obstacles
         The trials.
-    drivers, guards, desk
+    drivers, guards, scratch
         `shield_tables.egos`, what the shield remembers, and room to work in.
     commands : (B, N, 2)
         Speed and yaw rate of every car; `guards.mark[:, REASON]` tells why the shield stepped in.
@@ -96,13 +96,15 @@ def shield(
     for b in range(tick.shape[0]):
         if tick[b] >= 0:
             sight2 = -1.0 if sighted else guards.limit[b, SIGHT2]
-            shield_trial(b, tick[b], sight2, state, labels, roads, obstacles, drivers, guards, desk, commands)
+            shield_trial(
+                b, tick[b], sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
+            )
 
 
 @jit_inner
 def shield_trial(
     b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk, commands: Floats,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
 ) -> None:  # fmt: skip
     """Put what the ego of trial b does in place of what it was asked to do."""
     build = drivers.build[b]
@@ -110,20 +112,20 @@ def shield_trial(
     _remember(b, tick, state, labels, roads, drivers, guards)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0
     law, law_yaw = _law(
-        b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, desk, commands
+        b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
     )  # fmt: skip
     if not left:
         guards.mark[b, KEPT] = 0
-    near = gather_close(b, state, sight2, build, desk)
+    near = gather_close(b, state, sight2, build, scratch)
     obeys = _may_obey(
-        b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk
+        b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch
     )
-    near = gather_close(b, state, sight2, build, desk)
+    near = gather_close(b, state, sight2, build, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
     speed, yaw_rate = bounded(asked, asked_yaw, build) if finite else (0.0, 0.0)
     reason = NOTHING if finite else NUMBER
     if finite and not (obeys and speed == law and yaw_rate == law_yaw):
-        reason = refusal(b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, desk)
+        reason = refusal(b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch)
     guards.mark[b, REASON] = reason
     if reason == NOTHING:
         commands[b, EGO, 0] = asked
@@ -134,7 +136,7 @@ def shield_trial(
         else:
             speed, yaw_rate = _nearest(
                 b, speed, yaw_rate, obeys, law, law_yaw, near, state, labels, roads, obstacles, drivers,
-                guards, desk,
+                guards, scratch,
             )  # fmt: skip
         commands[b, EGO, 0] = speed
         commands[b, EGO, 1] = yaw_rate
@@ -148,18 +150,18 @@ def shield_trial(
 @jit_inline
 def _law(
     b: int, tick: int, left: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk, commands: Floats,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
     if left and guards.mark[b, KEPT] != 0:
         copy_memory(b, drivers, guards.alone)
         law, law_yaw = drive_alone(
             b, tick, labels.lane[b, EGO], state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO],
-            roads, obstacles, drivers, guards, desk,
+            roads, obstacles, drivers, guards, scratch,
         )  # fmt: skip
         copy_memory(b, guards.alone, drivers)
         return law, law_yaw
-    drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, desk, commands)
+    drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, scratch, commands)
     return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.build[b])
 
 
@@ -192,23 +194,23 @@ def _remember(
 @jit_inline
 def _may_obey(
     b: int, tick: int, left: bool, sight2: float, law: float, law_yaw: float, near: int, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
-    if may_touch(b, law, law_yaw, near, state, obstacles, drivers.build[b], desk):
+    if may_touch(b, law, law_yaw, near, state, obstacles, drivers.build[b], scratch):
         return False
     if left:
         return True
-    found = refusal(b, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, desk)
+    found = refusal(b, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch)
     if found != LEAVES_LANE:
         return found == NOTHING
     mode = guards.setting[b, MODE]
     if drivers.floats[b, EGO, ASIDE] == 0.0 or mode == NEVER:
         return False
     if mode == LAW:
-        return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, desk)
+        return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, scratch)
     sure = surely_returns(
-        b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, desk
+        b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, scratch
     )  # fmt: skip
     guards.mark[b, KEPT] = 1 if sure else 0
     return sure
@@ -217,7 +219,7 @@ def _may_obey(
 @jit_inline
 def _has_way_back(
     b: int, sight2: float, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, desk: Desk,
+    drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
     floats = drivers.floats[b, EGO]
@@ -227,9 +229,9 @@ def _has_way_back(
     if guards.mark[b, STRAYED] != 0:
         waited = ints[WAITED]
         floats[ASIDE] = 0.0
-        list_cars(b, sight2, state, labels, desk)
-        find_way_past(b, EGO, way, -1, state, labels, roads, obstacles, drivers, desk)
-        unlist_cars(b, state, labels, desk)
+        list_cars(b, sight2, state, labels, scratch)
+        find_way_past(b, EGO, way, -1, state, labels, roads, obstacles, drivers, scratch)
+        unlist_cars(b, state, labels, scratch)
         ints[WAITED] = waited
         if floats[ASIDE] == 0.0:
             return False
@@ -240,7 +242,7 @@ def _has_way_back(
 @jit_inline
 def _nearest(
     b: int, speed: float, yaw_rate: float, obeys: bool, law: float, law_yaw: float, near: int, state: State,
-    labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command nearest to one that is refused, of those that are looked at, for an ego that is not left.
 
@@ -248,7 +250,9 @@ def _nearest(
     """
     build = drivers.build[b]
     fastest = max(build[FASTEST], -build[SLOWEST])
-    best, best_yaw = _slower(b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, desk)
+    best, best_yaw = _slower(
+        b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch
+    )
     least = _apart(speed, yaw_rate, best, best_yaw, fastest, build)
     if obeys and _apart(speed, yaw_rate, law, law_yaw, fastest, build) < least:
         best, best_yaw = law, law_yaw
@@ -263,7 +267,10 @@ def _nearest(
                 far = _apart(speed, yaw_rate, u, w, fastest, build)
                 if far >= least:
                     break
-                if refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, desk) == NOTHING:
+                if (
+                    refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch)
+                    == NOTHING
+                ):
                     best, best_yaw, least = u, w, far
                     break
     return best, best_yaw
@@ -272,7 +279,7 @@ def _nearest(
 @jit_inline
 def _slower(
     b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command with the greatest share of a speed that is refused; (0, 0) if none will do."""
     build = drivers.build[b]
@@ -281,7 +288,7 @@ def _slower(
     share = 0.0
     for _ in range(HALVINGS + 1):
         u, w = bounded(share * speed, yaw_rate, build)
-        if refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, desk) == NOTHING:
+        if refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch) == NOTHING:
             best, best_yaw = u, w
             low = share
         else:

@@ -33,8 +33,8 @@ from dubins_traffic.policies.rules.tables import (
     ROUNDING,
     SLOWEST,
     WAYS,
-    Desk,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.policies.safety import GUARD
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
@@ -64,16 +64,18 @@ ROUNDED = 1e-6
 @jit_inner
 def drive_by_law(
     b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk, commands: Floats,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
 ) -> None:  # fmt: skip
     """Write the command of an ego that the law drives; it goes by the cars within sight (`law.decide_trial`)."""
-    decide_trial(b, tick, sight2, desk.apart, 0.0, state, labels, roads, obstacles, drivers, desk, commands)
+    decide_trial(
+        b, tick, sight2, scratch.apart, 0.0, state, labels, roads, obstacles, drivers, scratch, commands
+    )
 
 
 @jit_inner
 def drive_alone(
     b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command, within bounds, by which the law drives an ego that is left and sees no other car.
 
@@ -94,7 +96,7 @@ def drive_alone(
         alone.way, drivers.stage, drivers.distance,
     )  # fmt: skip
     drive_by_law(
-        b, tick, -1.0, alone.state, alone.labels, roads, obstacles, memory, desk, alone.commands
+        b, tick, -1.0, alone.state, alone.labels, roads, obstacles, memory, scratch, alone.commands
     )  # fmt: skip
     return bounded(alone.commands[b, EGO, 0], alone.commands[b, EGO, 1], drivers.build[b])
 
@@ -113,7 +115,7 @@ def copy_memory(b: int, source: Any, to: Any) -> None:
 @jit_inner
 def surely_returns(
     b: int, tick: int, speed: float, yaw_rate: float, sight2: float, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, desk: Desk,
+    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time."""
     build = drivers.build[b]
@@ -127,7 +129,7 @@ def surely_returns(
     last = int(min(guards.limit[b, LEFT_TIME], LONGEST) / build[PERIOD])
     copy_memory(b, drivers, guards.alone)
     for k in range(1, last + 1):
-        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.state, obstacles, build, desk):
+        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.state, obstacles, build, scratch):
             return False
         x, y, c, s = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
         progress, lateral = lane_coordinates(roads, net, lane, x, y)
@@ -145,7 +147,9 @@ def surely_returns(
         if lateral + half < guards.limit[b, LEFT_RELEASE]:
             return True
         before = progress
-        speed, yaw_rate = drive_alone(b, tick + k, lane, x, y, c, s, roads, obstacles, drivers, guards, desk)
+        speed, yaw_rate = drive_alone(
+            b, tick + k, lane, x, y, c, s, roads, obstacles, drivers, guards, scratch
+        )
     return False
 
 

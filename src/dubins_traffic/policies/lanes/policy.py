@@ -1,7 +1,7 @@
 """The compiled law of the controller `lanes`, over a batch of trials.
 
-It follows a path (`policies.lanes.paths`), keeps behind cars, waits at occupied intersections, backs up from a car that waits
-for it to keep away, passes what stands in its way, and asks for another route when it can't.
+It follows a path (`policies.lanes.paths`), keeps behind cars, waits at occupied intersections, backs up from a car
+that waits for it to keep away, passes what stands in its way, and asks for another route when it can't.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from dubins_traffic.policies.lanes.gaps import (
     offset_at,
     sample_path,
 )
-from dubins_traffic.policies.lanes.memory import (
+from dubins_traffic.policies.lanes.knowledge import (
     AIM,
     BACK_SPEED,
     BACKING,
@@ -68,7 +68,7 @@ from dubins_traffic.policies.lanes.memory import (
     UNTIL,
     WAITED,
     YAW_MOST,
-    Desk,
+    Knowledge,
 )
 from dubins_traffic.policies.lanes.paths import HIGH, LENGTH, LOW, NO_STOP, PIVOT, WAITING_GAP
 from dubins_traffic.policies.lanes.tracking import AHEAD, ahead_on, locate, place_on, steer
@@ -78,48 +78,48 @@ from dubins_traffic.roads.table import RoadTable
 
 
 @jit
-def decide(desk: Desk, roads: RoadTable) -> None:
+def decide(known: Knowledge, roads: RoadTable) -> None:
     """Choose the commands of all trials of a batch."""
-    for b in range(desk.span.shape[0]):
-        desk.blocker[b] = NOBODY
-        near = _watch(desk, b)
-        _find_place(desk, b)
-        speed = desk.car[b, FASTEST]
-        if near or desk.part_off[b + 1] > desk.part_off[b]:
-            speed = _speed_in_traffic(desk, b)
+    for b in range(known.span.shape[0]):
+        known.blocker[b] = NOBODY
+        near = _watch(known, b)
+        _find_place(known, b)
+        speed = known.car[b, FASTEST]
+        if near or known.part_off[b + 1] > known.part_off[b]:
+            speed = _speed_in_traffic(known, b)
         wanted = speed
-        speed, yaw_rate = _follow(desk, b, speed)
-        speed, yaw_rate = _last_look(desk, roads, b, speed, yaw_rate)
-        _note_progress(desk, b, wanted, speed, yaw_rate)
-        desk.command[b, 0] = speed
-        desk.command[b, 1] = yaw_rate
+        speed, yaw_rate = _follow(known, b, speed)
+        speed, yaw_rate = _last_look(known, roads, b, speed, yaw_rate)
+        _note_progress(known, b, wanted, speed, yaw_rate)
+        known.command[b, 0] = speed
+        known.command[b, 1] = yaw_rate
 
 
 @jit
-def _watch(desk: Desk, b: int) -> bool:
+def _watch(known: Knowledge, b: int) -> bool:
     """Count how long each sensed car has stood; return whether there is any."""
     found = False
-    others = desk.others[b]
+    others = known.others[b]
     for n in range(others.shape[0]):
         if others[n, O_SEEN] == 0.0:
             others[n, O_STILL] = 0.0
             continue
         found = True
-        others[n, O_GAP] = gap_now(desk, b, n)
+        others[n, O_GAP] = gap_now(known, b, n)
         if abs(others[n, O_SPEED]) > MOVES or abs(others[n, O_YAW]) > TURNS:
             others[n, O_STILL] = 0.0
         else:
-            others[n, O_STILL] += desk.car[b, PERIOD]
+            others[n, O_STILL] += known.car[b, PERIOD]
     return found
 
 
 @jit
-def _note_progress(desk: Desk, b: int, wanted: float, speed: float, yaw_rate: float) -> None:
+def _note_progress(known: Knowledge, b: int, wanted: float, speed: float, yaw_rate: float) -> None:
     """Count for how long the car has wanted to move and has not; forget its waits once it has got on.
 
     A turn in place counts little: half a turn less than HELD_UP.
     """
-    memory = desk.memory[b]
+    memory = known.memory[b]
     if speed != 0.0:
         memory[STUCK] = 0.0
         if abs(memory[ODO] - memory[MARK]) > PROGRESS:
@@ -129,20 +129,20 @@ def _note_progress(desk: Desk, b: int, wanted: float, speed: float, yaw_rate: fl
             if wanted > 0.0:
                 memory[BACKING] = 0.0
     elif wanted != 0.0:
-        turned = abs(yaw_rate) * desk.car[b, PERIOD]
-        memory[STUCK] += TURN_SHARE * turned if turned > 0.0 else desk.car[b, PERIOD]
+        turned = abs(yaw_rate) * known.car[b, PERIOD]
+        memory[STUCK] += TURN_SHARE * turned if turned > 0.0 else known.car[b, PERIOD]
         if wanted < 0.0 and memory[STUCK] > 0.2:
             memory[BACKING] = BARRED
 
 
 @jit
-def _find_place(desk: Desk, b: int) -> None:
-    memory = desk.memory[b]
-    span = desk.span[b]
+def _find_place(known: Knowledge, b: int) -> None:
+    memory = known.memory[b]
+    span = known.span[b]
     row, sigma, left, travelled = locate(
-        desk.path, desk.row[b], memory[SIGMA], desk.ego[b, 0], desk.ego[b, 1], span[0], span[1], span[2]
+        known.path, known.row[b], memory[SIGMA], known.ego[b, 0], known.ego[b, 1], span[0], span[1], span[2]
     )
-    desk.row[b] = row
+    known.row[b] = row
     memory[SIGMA] = sigma
     memory[LEFT] = left
     memory[ODO] += travelled
@@ -152,57 +152,57 @@ def _find_place(desk: Desk, b: int) -> None:
 
 
 @jit
-def _speed_in_traffic(desk: Desk, b: int) -> float:
+def _speed_in_traffic(known: Knowledge, b: int) -> float:
     """Return the speed that traffic allows; negative to back up."""
-    memory = desk.memory[b]
-    car = desk.car[b]
-    span = desk.span[b]
-    sample_path(desk.path, desk.row[b], memory[SIGMA], span[0], span[1], span[2], desk.sample)
+    memory = known.memory[b]
+    car = known.car[b]
+    span = known.span[b]
+    sample_path(known.path, known.row[b], memory[SIGMA], span[0], span[1], span[2], known.sample)
     begin, aim, ramp, until = memory[BEGIN], memory[AIM], memory[RAMP], memory[UNTIL]
-    last = desk.sample.shape[0] - 1
+    last = known.sample.shape[0] - 1
     first, who, nearest = conflict(
-        desk, b, last, memory[ODO] - memory[FROM], begin, aim, ramp, until, STILL_MARGIN, MOVING_MARGIN
+        known, b, last, memory[ODO] - memory[FROM], begin, aim, ramp, until, STILL_MARGIN, MOVING_MARGIN
     )
     speed = car[FASTEST] if begin == 0.0 and aim == 0.0 else min(car[FASTEST], PASSING_SPEED)
-    speed = min(speed, _following_speed(desk, b, first, who, nearest))
+    speed = min(speed, _following_speed(known, b, first, who, nearest))
     line, gate_x, gate_y = next_gate(
-        desk.path, desk.row[b], memory[SIGMA], WAITING_GAP - 0.02, span[0], span[1], span[2]
+        known.path, known.row[b], memory[SIGMA], WAITING_GAP - 0.02, span[0], span[1], span[2]
     )
     cause = who
     if line < NO_STOP:
-        occupant = _occupant(desk, b, gate_x, gate_y)
-        if occupant == NOBODY and who != NOBODY and _stops_inside(desk, b, who, nearest, gate_x, gate_y):
+        occupant = _occupant(known, b, gate_x, gate_y)
+        if occupant == NOBODY and who != NOBODY and _stops_inside(known, b, who, nearest, gate_x, gate_y):
             occupant = who
         if occupant != NOBODY:
             allowed = max(0.0, GAIN * line)
             if allowed < speed:
                 speed = allowed
                 cause = occupant
-    return stand(desk, b, speed, cause, first)
+    return stand(known, b, speed, cause, first)
 
 
 @jit
-def _following_speed(desk: Desk, b: int, first: int, who: int, nearest: int) -> float:
+def _following_speed(known: Knowledge, b: int, first: int, who: int, nearest: int) -> float:
     """Return the speed at which the gap to what is in the way becomes and stays the one to follow at."""
     if who == NOBODY:
-        return desk.car[b, FASTEST]
+        return known.car[b, FASTEST]
     if who < 0:
         return max(0.0, GAIN * (SPACING * first - 0.35))
-    o = desk.others[b, who]
-    along = o[O_SPEED] * (o[OC] * desk.sample[nearest, TX] + o[OS] * desk.sample[nearest, TY])
-    dx = o[OX] - desk.ego[b, 0]
-    dy = o[OY] - desk.ego[b, 1]
+    o = known.others[b, who]
+    along = o[O_SPEED] * (o[OC] * known.sample[nearest, TX] + o[OS] * known.sample[nearest, TY])
+    dx = o[OX] - known.ego[b, 0]
+    dy = o[OY] - known.ego[b, 1]
     far = SPACING * nearest
-    if not is_oncoming(desk, b, who):
+    if not is_oncoming(known, b, who):
         far = min(far, sqrt(dx * dx + dy * dy))
-    return max(0.0, max(0.0, along) + GAIN * (far - desk.car[b, FOLLOW]))
+    return max(0.0, max(0.0, along) + GAIN * (far - known.car[b, FOLLOW]))
 
 
 @jit
-def _occupant(desk: Desk, b: int, gate_x: float, gate_y: float) -> int:
+def _occupant(known: Knowledge, b: int, gate_x: float, gate_y: float) -> int:
     """Return a car whose body meets the disc and that has moved of late, or NOBODY."""
-    radius = desk.car[b, DISC] + desk.car[b, REACH]
-    others = desk.others[b]
+    radius = known.car[b, DISC] + known.car[b, REACH]
+    others = known.others[b]
     for n in range(others.shape[0]):
         if others[n, O_SEEN] == 0.0 or others[n, O_STILL] >= STANDS:
             continue
@@ -214,57 +214,57 @@ def _occupant(desk: Desk, b: int, gate_x: float, gate_y: float) -> int:
 
 
 @jit
-def _stops_inside(desk: Desk, b: int, who: int, nearest: int, gate_x: float, gate_y: float) -> bool:
+def _stops_inside(known: Knowledge, b: int, who: int, nearest: int, gate_x: float, gate_y: float) -> bool:
     """Whether the car would have to stop behind a standing `who` before it has left the disc again."""
-    if who >= 0 and desk.others[b, who, O_STILL] == 0.0:
+    if who >= 0 and known.others[b, who, O_STILL] == 0.0:
         return False
-    k = nearest - int(desk.car[b, FOLLOW] / SPACING)
+    k = nearest - int(known.car[b, FOLLOW] / SPACING)
     if k < 0:
         return True
-    dx = desk.sample[k, PX] - gate_x
-    dy = desk.sample[k, PY] - gate_y
-    radius = desk.car[b, DISC] + desk.car[b, REACH]
+    dx = known.sample[k, PX] - gate_x
+    dy = known.sample[k, PY] - gate_y
+    radius = known.car[b, DISC] + known.car[b, REACH]
     return dx * dx + dy * dy < radius * radius
 
 
 @jit
-def _follow(desk: Desk, b: int, speed: float) -> tuple[float, float]:
+def _follow(known: Knowledge, b: int, speed: float) -> tuple[float, float]:
     """Return the command that follows the path at `speed`, backwards if it is negative."""
-    car = desk.car[b]
+    car = known.car[b]
     if speed == 0.0 and car[SLOWEST] <= 0.0:
         return 0.0, 0.0
-    memory = desk.memory[b]
-    span = desk.span[b]
-    row = desk.row[b]
+    memory = known.memory[b]
+    span = known.span[b]
+    row = known.row[b]
     sigma = memory[SIGMA]
     if speed >= 0.0:
-        aim_row, aim_sigma = ahead_on(desk.path, row, sigma, AHEAD, span[0], span[1], span[2], True)
+        aim_row, aim_sigma = ahead_on(known.path, row, sigma, AHEAD, span[0], span[1], span[2], True)
         distance = memory[ODO] - memory[FROM] + AHEAD
-        if desk.path[row, PIVOT] != 0.0:
-            speed = min(speed, max(desk.path[row, LENGTH] - sigma, 0.01) / car[PERIOD])
+        if known.path[row, PIVOT] != 0.0:
+            speed = min(speed, max(known.path[row, LENGTH] - sigma, 0.01) / car[PERIOD])
     else:
         aim_row, aim_sigma = row, sigma - AHEAD
         distance = memory[ODO] - memory[FROM] - AHEAD
-    px, py, tx, ty = place_on(desk.path, aim_row, aim_sigma)
+    px, py, tx, ty = place_on(known.path, aim_row, aim_sigma)
     offset = offset_at(distance, memory[BEGIN], memory[AIM], memory[RAMP], memory[UNTIL])
-    if aim_row != row or desk.path[row, LOW] <= memory[LEFT] <= desk.path[row, HIGH]:
-        offset = min(max(offset, desk.path[aim_row, LOW]), desk.path[aim_row, HIGH])
+    if aim_row != row or known.path[row, LOW] <= memory[LEFT] <= known.path[row, HIGH]:
+        offset = min(max(offset, known.path[aim_row, LOW]), known.path[aim_row, HIGH])
     if speed < 0.0:
         offset = memory[LEFT]
     speed, yaw_rate, turns = steer(
-        desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3],
+        known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3],
         px - offset * ty, py + offset * tx, speed, car[YAW_MOST], car[RADIUS],
     )  # fmt: skip
     if turns and car[RADIUS] > 0.0:
-        return _shuffle(desk, b, yaw_rate)
+        return _shuffle(known, b, yaw_rate)
     return max(speed, car[SLOWEST]), yaw_rate
 
 
 @jit
-def _shuffle(desk: Desk, b: int, yaw_rate: float) -> tuple[float, float]:
+def _shuffle(known: Knowledge, b: int, yaw_rate: float) -> tuple[float, float]:
     """Return the command of a car with a turning radius that has to turn on the spot: to and fro, or a full turn."""
-    memory = desk.memory[b]
-    car = desk.car[b]
+    memory = known.memory[b]
+    car = known.car[b]
     memory[SHUFFLED] += 1.0
     speed = min(car[FASTEST], BACK_SPEED)
     if car[SLOWEST] <= -0.05:
@@ -278,28 +278,30 @@ def _shuffle(desk: Desk, b: int, yaw_rate: float) -> tuple[float, float]:
 
 
 @jit
-def _last_look(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> tuple[float, float]:
+def _last_look(
+    known: Knowledge, roads: RoadTable, b: int, speed: float, yaw_rate: float
+) -> tuple[float, float]:
     """Return the command, unless it might lead into a contact or off the road: then the car stands if it can."""
-    if _is_safe(desk, roads, b, speed, yaw_rate):
+    if _is_safe(known, roads, b, speed, yaw_rate):
         return speed, yaw_rate
-    if desk.car[b, SLOWEST] > 0.0:
-        return desk.car[b, SLOWEST], yaw_rate
+    if known.car[b, SLOWEST] > 0.0:
+        return known.car[b, SLOWEST], yaw_rate
     return 0.0, 0.0
 
 
 @jit
-def _is_safe(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
-    car = desk.car[b]
+def _is_safe(known: Knowledge, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
+    car = known.car[b]
     period = car[PERIOD]
-    x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
-    edge = float(roads.half_width[desk.net[b]]) - VERGE
-    if speed != 0.0 and leaves_road(x, y, c, s, speed, yaw_rate, period, edge, roads, desk.net[b]):
+    x, y, c, s = known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3]
+    edge = float(roads.half_width[known.net[b]]) - VERGE
+    if speed != 0.0 and leaves_road(x, y, c, s, speed, yaw_rate, period, edge, roads, known.net[b]):
         return False
     a, h, r, reach = car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING], car[REACH]
     travel = max(car[FASTEST], -car[SLOWEST]) * period
     if a + h > 0.0:
         travel += car[YAW_MOST] * reach * period
-    others = desk.others[b]
+    others = known.others[b]
     for n in range(others.shape[0]):
         o = others[n]
         dx = o[OX] - x
@@ -312,5 +314,5 @@ def _is_safe(desk: Desk, roads: RoadTable, b: int, speed: float, yaw_rate: float
             return False
     return not may_hit(
         x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
-        desk.part, desk.part_off[b], desk.part_off[b + 1], NEAR, 0.0,
+        known.part, known.part_off[b], known.part_off[b + 1], NEAR, 0.0,
     )  # fmt: skip

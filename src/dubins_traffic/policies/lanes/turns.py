@@ -1,8 +1,8 @@
 """The way from one lane to the next: curves and corners that stay on the road.
 
-Everything here is plain Python, done once per route; `policies.lanes.tracking` follows what comes out. Turns are built in
-the frame of the lane that comes in: its direction is +x, the intersection lies in the origin, the right lane is the
-line y = -w.
+Everything here is plain Python, done once per route; `policies.lanes.tracking` follows what comes out. Turns are
+built in the frame of the lane that comes in: its direction is +x, the intersection lies in the origin, the right lane
+is the line y = -w.
 """
 
 from __future__ import annotations

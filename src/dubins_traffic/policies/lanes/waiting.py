@@ -18,7 +18,7 @@ from dubins_traffic.policies.lanes.gaps import (
     first_conflict,
     gap_to,
 )
-from dubins_traffic.policies.lanes.memory import (
+from dubins_traffic.policies.lanes.knowledge import (
     AIM,
     BACK_SPEED,
     BACKING,
@@ -51,17 +51,17 @@ from dubins_traffic.policies.lanes.memory import (
     UNTIL,
     WAITED,
     WARY_MARGIN,
-    Desk,
+    Knowledge,
 )
 from dubins_traffic.policies.lanes.paths import HIGH, LOW
 
 
 @jit_inner
-def gap_now(desk: Desk, b: int, n: int) -> float:
+def gap_now(known: Knowledge, b: int, n: int) -> float:
     """Return the gap between the ego and car n, metres."""
-    car = desk.car[b]
-    o = desk.others[b, n]
-    ego = desk.ego[b]
+    car = known.car[b]
+    o = known.others[b, n]
+    ego = known.ego[b]
     return gap_to(
         ego[0], ego[1], ego[2], ego[3], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
         o[OX], o[OY], o[OC], o[OS], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
@@ -70,7 +70,7 @@ def gap_now(desk: Desk, b: int, n: int) -> float:
 
 @jit_inner
 def conflict(
-    desk: Desk,
+    known: Knowledge,
     b: int,
     last: int,
     done: float,
@@ -81,33 +81,35 @@ def conflict(
     still: float,
     moving: float,
 ) -> tuple[int, int, int]:
-    """Return what `policies.lanes.gaps.first_conflict` says of the ego's manoeuvre: first sample, who, nearest sample."""
-    car = desk.car[b]
+    """Return what `policies.lanes.gaps.first_conflict` says of the ego's manoeuvre: first sample, who, nearest
+    sample.
+    """
+    car = known.car[b]
     return first_conflict(
-        desk.sample, last, done, begin, aim, ramp, until,
+        known.sample, last, done, begin, aim, ramp, until,
         car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING], car[REACH],
-        desk.others[b], desk.part, desk.part_off[b], desk.part_off[b + 1], still, moving,
+        known.others[b], known.part, known.part_off[b], known.part_off[b + 1], still, moving,
     )  # fmt: skip
 
 
 @jit_inner
-def stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
+def stand(known: Knowledge, b: int, speed: float, cause: int, first: int) -> float:
     """Count how long the car has been kept waiting by `cause`; back up, pass or ask for another route in time."""
-    memory = desk.memory[b]
-    period = desk.car[b, PERIOD]
-    if memory[BACKING] > 0.0 and cause != NOBODY and _backs_up(desk, b, int(memory[BACKING]) - 1):
+    memory = known.memory[b]
+    period = known.car[b, PERIOD]
+    if memory[BACKING] > 0.0 and cause != NOBODY and _backs_up(known, b, int(memory[BACKING]) - 1):
         return -BACK_SPEED
     stuck = memory[STUCK] > HELD_UP
     if stuck and cause == NOBODY:
-        cause = _nearest_body(desk, b)
+        cause = _nearest_body(known, b)
         if cause == NOBODY:
-            _return(desk, b)
+            _return(known, b)
     if cause == NOBODY or (speed > 0.03 and not stuck):
         return speed
     memory[WAITED] += period
     memory[TRIED] += period
-    still = desk.others[b, cause, O_STILL] if cause >= 0 else 1e9
-    comes = cause >= 0 and is_oncoming(desk, b, cause)
+    still = known.others[b, cause, O_STILL] if cause >= 0 else 1e9
+    comes = cause >= 0 and is_oncoming(known, b, cause)
     hasty = stuck or comes
     if (
         memory[WAITED] > (HELD_UP if hasty else PATIENCE)
@@ -115,21 +117,21 @@ def stand(desk: Desk, b: int, speed: float, cause: int, first: int) -> float:
         and memory[TRIED] >= (HELD_UP if comes else RETRY)
     ):
         memory[TRIED] = 0.0
-        if _find_way_past(desk, b, first):
+        if _find_way_past(known, b, first):
             memory[STUCK] = 0.0
             memory[BACKING] = 0.0
-            return min(desk.car[b, FASTEST], PASSING_SPEED)
-    if cause >= 0 and _backs_up(desk, b, cause):
+            return min(known.car[b, FASTEST], PASSING_SPEED)
+    if cause >= 0 and _backs_up(known, b, cause):
         return -BACK_SPEED
     if memory[WAITED] > DESPAIR:
-        desk.blocker[b] = cause
+        known.blocker[b] = cause
     return 0.0
 
 
 @jit
-def _return(desk: Desk, b: int) -> None:
+def _return(known: Knowledge, b: int) -> None:
     """Give up what the car was about, and go back to the path from where it is."""
-    memory = desk.memory[b]
+    memory = known.memory[b]
     memory[BEGIN] = memory[LEFT]
     memory[AIM] = 0.0
     memory[FROM] = memory[ODO]
@@ -138,36 +140,36 @@ def _return(desk: Desk, b: int) -> None:
 
 
 @jit_inner
-def is_oncoming(desk: Desk, b: int, n: int) -> bool:
+def is_oncoming(known: Knowledge, b: int, n: int) -> bool:
     """Whether car n faces the ego's way back, within 60 degrees."""
-    o = desk.others[b, n]
-    return o[OC] * desk.ego[b, 2] + o[OS] * desk.ego[b, 3] < -0.5
+    o = known.others[b, n]
+    return o[OC] * known.ego[b, 2] + o[OS] * known.ego[b, 3] < -0.5
 
 
 @jit
-def _backs_up(desk: Desk, b: int, cause: int) -> bool:
+def _backs_up(known: Knowledge, b: int, cause: int) -> bool:
     """Whether to back up from a car that stands so near that it may be waiting for the ego to go away.
 
     Once begun, this goes on until there is enough room, the car moves off or something is behind.
     """
-    memory = desk.memory[b]
-    o = desk.others[b, cause]
-    dx = o[OX] - desk.ego[b, 0]
-    dy = o[OY] - desk.ego[b, 1]
+    memory = known.memory[b]
+    o = known.others[b, cause]
+    dx = o[OX] - known.ego[b, 0]
+    dy = o[OY] - known.ego[b, 1]
     far2 = dx * dx + dy * dy
     if memory[BACKING] == 0.0 and far2 < NEAR * NEAR and memory[WAITED] > 0.6 and o[O_STILL] > 0.5:
         memory[BACKING] = cause + 1.0
-    if memory[BACKING] > 0.0 and (o[O_SEEN] == 0.0 or far2 > CLEAR * CLEAR or not _free_behind(desk, b)):
+    if memory[BACKING] > 0.0 and (o[O_SEEN] == 0.0 or far2 > CLEAR * CLEAR or not _free_behind(known, b)):
         memory[BACKING] = BARRED
     return memory[BACKING] > 0.0
 
 
 @jit
-def _nearest_body(desk: Desk, b: int) -> int:
+def _nearest_body(known: Knowledge, b: int) -> int:
     """Return the sensed car nearest to the ego, or an obstacle's part if there is no car within 1 m."""
     best = 1.0
-    who = -1 if desk.part_off[b + 1] > desk.part_off[b] else NOBODY
-    others = desk.others[b]
+    who = -1 if known.part_off[b + 1] > known.part_off[b] else NOBODY
+    others = known.others[b]
     for n in range(others.shape[0]):
         if others[n, O_SEEN] != 0.0 and others[n, O_GAP] < best:
             best = others[n, O_GAP]
@@ -176,17 +178,17 @@ def _nearest_body(desk: Desk, b: int) -> int:
 
 
 @jit
-def _free_behind(desk: Desk, b: int) -> bool:
+def _free_behind(known: Knowledge, b: int) -> bool:
     """Whether the car may back up a little: able to, on the road, nobody close behind."""
-    car = desk.car[b]
-    path = desk.path[desk.row[b]]
-    left = desk.memory[b, LEFT]
+    car = known.car[b]
+    path = known.path[known.row[b]]
+    left = known.memory[b, LEFT]
     if car[SLOWEST] >= 0.0 or left < path[LOW] or left > path[HIGH]:
         return False
-    x, y, c, s = desk.ego[b, 0], desk.ego[b, 1], desk.ego[b, 2], desk.ego[b, 3]
+    x, y, c, s = known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3]
     bx = x - 0.1 * c
     by = y - 0.1 * s
-    others = desk.others[b]
+    others = known.others[b]
     for n in range(others.shape[0]):
         o = others[n]
         if o[O_SEEN] == 0.0 or (o[OX] - x) * c + (o[OY] - y) * s > 0.0:
@@ -201,10 +203,10 @@ def _free_behind(desk: Desk, b: int) -> bool:
 
 
 @jit
-def _find_way_past(desk: Desk, b: int, first: int) -> bool:
+def _find_way_past(known: Knowledge, b: int, first: int) -> bool:
     """Look for the least offset at which the car gets past what stands in its way, and take it."""
-    memory = desk.memory[b]
-    sample = desk.sample
+    memory = known.memory[b]
+    sample = known.sample
     now = memory[LEFT]
     last = sample.shape[0] - 1
     ramp = min(0.7, max(0.15, SPACING * first - 0.1))
@@ -216,7 +218,7 @@ def _find_way_past(desk: Desk, b: int, first: int) -> bool:
             aim = -aim
         if aim < low or aim > high:
             continue
-        end = _passed(desk, b, now, aim, ramp, last)
+        end = _passed(known, b, now, aim, ramp, last)
         if end >= 0:
             memory[BEGIN] = now
             memory[AIM] = aim
@@ -228,11 +230,11 @@ def _find_way_past(desk: Desk, b: int, first: int) -> bool:
 
 
 @jit
-def _passed(desk: Desk, b: int, now: float, aim: float, ramp: float, last: int) -> int:
+def _passed(known: Knowledge, b: int, now: float, aim: float, ramp: float, last: int) -> int:
     """Return the sample at which a car with the offset `aim` can return to its path, or -1 if it is no way past."""
     for end in range(8, last - 8, 5):
         first, _, _ = conflict(
-            desk, b, min(last, end + 12), 0.0, now, aim, ramp, SPACING * end, PASSING_MARGIN, WARY_MARGIN
+            known, b, min(last, end + 12), 0.0, now, aim, ramp, SPACING * end, PASSING_MARGIN, WARY_MARGIN
         )
         if first < 0:
             return end

@@ -7,7 +7,7 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
 from dubins_traffic.policies.rules.room import has_room, room_in
-from dubins_traffic.policies.rules.tables import CROSSING, LANE, NEXT, WAITED, Desk, Drivers
+from dubins_traffic.policies.rules.tables import CROSSING, LANE, NEXT, WAITED, Drivers, Scratch
 from dubins_traffic.policies.rules.turn_arcs import BEFORE
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -20,7 +20,7 @@ asked, and on its way to another exit it might leave the disc outside its lane."
 @jit
 def take_another(
     b: int, n: int, tick: int, budget: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Choose the best exit in which there is room; tell whether there is one.
 
@@ -31,24 +31,24 @@ def take_another(
     ints = drivers.ints[b, n]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
-    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
     wanted = 0.0
     least = INFINITE
     for k in range(roads.degree[row]):
-        least = min(least, desk.cost[k])
+        least = min(least, scratch.cost[k])
         if roads.arms[row, k] == ints[NEXT]:
-            wanted = desk.cost[k]
+            wanted = scratch.cost[k]
     allowed = 0
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        cheap = desk.cost[k] - wanted < budget and (desk.cost[k] < BARRED or least >= BARRED)
+        cheap = scratch.cost[k] - wanted < budget and (scratch.cost[k] < BARRED or least >= BARRED)
         if (
             cheap
             and out != ints[NEXT]
-            and has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, desk)
+            and has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, scratch)
         ):
             allowed |= 1 << k
-    best = cheapest(v, roads.vert_off[net], allowed, roads, desk)
+    best = cheapest(v, roads.vert_off[net], allowed, roads, scratch)
     if best >= 0:
         ints[NEXT] = best
     return best >= 0
@@ -57,17 +57,17 @@ def take_another(
 @jit
 def take_widest(
     b: int, n: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Choose the exit in which there is most room, though it is not enough; `desk.cost` has what they count."""
+    """Choose the exit in which there is most room, though it is not enough; `scratch.cost` has what they count."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
     row = roads.vert_off[net] + lane_end(roads, net, ints[LANE])
     most = -INFINITE
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        room = room_in(b, n, out, 0, state, labels, roads, obstacles, drivers, desk)
-        room -= INFINITE * 0.5 if desk.cost[k] >= BARRED else 0.0
+        room = room_in(b, n, out, 0, state, labels, roads, obstacles, drivers, scratch)
+        room -= INFINITE * 0.5 if scratch.cost[k] >= BARRED else 0.0
         if room > most:
             most = room
             ints[NEXT] = out
@@ -76,17 +76,17 @@ def take_widest(
 @jit
 def turn_elsewhere(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
-    if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, desk):
+    if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, scratch):
         drivers.ints[b, n, WAITED] = 0
 
 
 @jit
 def find_way_out(
     b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
     ints = drivers.ints[b, n]
@@ -96,6 +96,6 @@ def find_way_out(
         return
     if crossing and tick % 4 != 0:
         return
-    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
+    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
         return
-    turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)
+    turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, scratch)

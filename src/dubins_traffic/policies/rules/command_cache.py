@@ -42,7 +42,6 @@ from dubins_traffic.policies.rules.tables import (
     KIND,
     LEFT_SIDE,
     LENGTH,
-    MOOD,
     OUT_LENGTH,
     PERIOD,
     REACH,
@@ -51,12 +50,13 @@ from dubins_traffic.policies.rules.tables import (
     SPEED,
     THROUGH_SPEED,
     TIGHTEST,
+    VIOLATIONS,
     WAITED,
     YAW_MOST,
-    Desk,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, Way, in_arc, on_lane
+from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, ReferencePath, in_arc, on_lane
 from dubins_traffic.policies.safety import VERGE
 from dubins_traffic.roads.lookup import CERTAIN
 from dubins_traffic.roads.table import RoadTable
@@ -69,7 +69,7 @@ EVERYWHERE = 1e9
 @jit_inline
 def coast(
     b: int, n: int, kind: int, company: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    desk: Desk,
+    scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Put off the command of a car that still just drives on as it did; tell whether it does.
 
@@ -97,7 +97,7 @@ def coast(
         return False
     if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.build[b]):
         return False
-    note(b, n, row[COAST_SPEED], left, px, py, bend, state, desk)
+    note(b, n, row[COAST_SPEED], left, px, py, bend, state, scratch)
     return True
 
 
@@ -109,8 +109,8 @@ def stop_coasting(row: Any) -> None:
 
 @jit_inline
 def drive_on(
-    b: int, n: int, part: int, left: float, px: float, py: float, outside: bool, way: Way, state: State,
-    labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk,
+    b: int, n: int, part: int, left: float, px: float, py: float, outside: bool, way: ReferencePath, state: State,
+    labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Put off the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
 
@@ -121,7 +121,7 @@ def drive_on(
     row = drivers.way[b, n]
     x, y = state.x[b, n], state.y[b, n]
     bits = np.int64(labels.bits[b, n])
-    special = bits & (BLOCKED | LEFT) != 0 or ints[MOOD] & LEFT_SIDE != 0
+    special = bits & (BLOCKED | LEFT) != 0 or ints[VIOLATIONS] & LEFT_SIDE != 0
     if special or drivers.floats[b, n, HOLD] > 0.0 or build[TIGHTEST] > 0.0 or part == AFTER:
         return False
     if ints[KIND] == ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
@@ -135,7 +135,7 @@ def drive_on(
         return False
     line = to_line(left, x, y, way, build) if gated else EVERYWHERE
     if line < speed * build[PERIOD]:
-        if row[CROSSING] == 0.0 or bits & GOES_NOW == GOES_NOW or ints[MOOD] & ROLLING != 0:
+        if row[CROSSING] == 0.0 or bits & GOES_NOW == GOES_NOW or ints[VIOLATIONS] & ROLLING != 0:
             return False
         speed = max(0.0, line) / build[PERIOD]
     else:
@@ -143,13 +143,13 @@ def drive_on(
     if gated:
         count_turn(bits, row, ints)
     ints[WAITED] = 0
-    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, desk)
+    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, scratch)
     return True
 
 
 @jit_inline
 def keep_course(
-    b: int, n: int, speed: float, part: int, outside: bool, gated: bool, x: float, y: float, way: Way,
+    b: int, n: int, speed: float, part: int, outside: bool, gated: bool, x: float, y: float, way: ReferencePath,
     labels: Labels, drivers: Drivers,
 ) -> None:  # fmt: skip
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
@@ -186,7 +186,9 @@ def cruise(hurries: bool, in_disc: bool, build: Any, floats: Any) -> float:
 
 
 @jit_inline
-def keeps_to_road(b: int, n: int, x: float, y: float, way: Way, roads: RoadTable, drivers: Drivers) -> bool:
+def keeps_to_road(
+    b: int, n: int, x: float, y: float, way: ReferencePath, roads: RoadTable, drivers: Drivers
+) -> bool:
     """Tell whether a car is certain to keep VERGE from the edge of the road for a tick, whatever it does.
 
     It is so near to the lane it is on, to the next one, or to the intersection between, that it can't get so far from

@@ -30,18 +30,26 @@ from dubins_traffic.policies.rules.tables import (
     ROUND,
     TIGHTEST,
     YAW_MOST,
-    Desk,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.rules.propositions import LEFT
 
 
 @jit_inline
 def note(
-    b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, state: State, desk: Desk
+    b: int,
+    n: int,
+    speed: float,
+    left: float,
+    px: float,
+    py: float,
+    bend: float,
+    state: State,
+    scratch: Scratch,
 ) -> None:
-    """Leave the command of a car to `catch_up`; its speed is one for the bend already (`steering.slowed`)."""
-    late = desk.late
+    """Leave the command of a car to `decide_deferred`; its speed is one for the bend already (`steering.slowed`)."""
+    late = scratch.late
     k = (n & -BLOCK) * LATE + (n & (BLOCK - 1))
     late[k + BLOCK * DUE] = 1.0
     late[k + BLOCK * LATE_SPEED] = speed
@@ -54,23 +62,25 @@ def note(
 
 
 @jit_inline
-def put_off(
+def defer(
     b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, close: bool, state: State,
-    labels: Labels, obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    labels: Labels, obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
-    """Leave the command of a car with nothing close around it, that just drives on, to `catch_up`, if it is one."""
+    """Leave the command of a car with nothing close around it, that just drives on, to `decide_deferred`, if it is
+    one.
+    """
     build = drivers.build[b]
     free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.ints[b, n, KIND] != ROUND
     bound = drivers.floats[b, n, ASIDE] != 0.0 or build[TIGHTEST] > 0.0
     astray = labels.lane[b, n] < 0 and left > ASTRAY
     if not free or bound or astray or np.int64(labels.bits[b, n]) & LEFT != 0:
         return False
-    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, desk)
+    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, scratch)
     return True
 
 
 @jit_inline
-def catch_up(b: int, state: State, drivers: Drivers, desk: Desk, commands: Floats) -> None:
+def decide_deferred(b: int, state: State, drivers: Drivers, scratch: Scratch, commands: Floats) -> None:
     """Write the commands that have been put off.
 
     The columns of a block are a fixed number of cars apart, and nothing in the loop over its cars is a branch: so the
@@ -78,7 +88,7 @@ def catch_up(b: int, state: State, drivers: Drivers, desk: Desk, commands: Float
     """
     build = drivers.build[b]
     limit, period = build[YAW_MOST], build[PERIOD]
-    late = desk.late
+    late = scratch.late
     for first in range(0, state.count[b], BLOCK):
         here = min(state.count[b] - first, BLOCK)
         begin = first * LATE

@@ -22,7 +22,6 @@ from dubins_traffic.policies.rules.tables import (
     LEFT_SIDE,
     LEFTS,
     LOOP,
-    MOOD,
     NEMESIS,
     NEXT,
     PARK_TIME,
@@ -36,8 +35,9 @@ from dubins_traffic.policies.rules.tables import (
     TAILGATES,
     TAILGATING,
     TURN,
-    Desk,
+    VIOLATIONS,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -60,9 +60,9 @@ BLOCK_TIME = 9.0
 @jit
 def take_lane(
     b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Note that car n is on `lane` now, choose the lane after it and the car's mood."""
+    """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
     ints = drivers.ints[b, n]
     floats = drivers.floats[b, n]
     seed = drivers.seed[b]
@@ -78,14 +78,14 @@ def take_lane(
             following = place_of(lane, ints[FIRST], ints[LAST], drivers.stage)
         ints[PLACE] = following
     v = lane_end(roads, drivers.net[b], lane)
-    mood = 0
+    violations = 0
     floats[HOLD] = 0.0
     if floats[ROLLS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < floats[ROLLS]:
-        mood |= ROLLING
+        violations |= ROLLING
     if floats[LEFTS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < floats[LEFTS]:
-        mood |= LEFT_SIDE
+        violations |= LEFT_SIDE
     if floats[TAILGATES] > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < floats[TAILGATES]:
-        mood |= TAILGATING
+        violations |= TAILGATING
     if floats[BLOCKS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < floats[BLOCKS]:
         floats[HOLD] = BLOCK_TIME
     if (
@@ -94,9 +94,9 @@ def take_lane(
         and uniform(seed, trial, n, tick, DRAW + 8) < floats[PARKS]
     ):
         floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
-    ints[MOOD] = mood
-    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-    ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, desk)
+    ints[VIOLATIONS] = violations
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+    ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
 
 
 @jit_inline
@@ -111,11 +111,11 @@ def is_goal(v: int, ints: Any, drivers: Drivers) -> bool:
 
 
 @jit_inline
-def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, desk: Desk) -> int:
+def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scratch) -> int:
     """Return the cheapest exit of v of those with their bit in `allowed`, -1 if there is none."""
     best = -1
     for k in range(roads.degree[offset + v]):
-        if allowed & (1 << k) != 0 and (best < 0 or desk.cost[k] < desk.cost[best]):
+        if allowed & (1 << k) != 0 and (best < 0 or scratch.cost[k] < scratch.cost[best]):
             best = k
     return roads.arms[offset + v, best] if best >= 0 else -1
 
@@ -123,9 +123,9 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, desk: Desk) ->
 @jit
 def price_exits(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Fill `desk.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
+    """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
     lane = ints[LANE]
@@ -136,7 +136,7 @@ def price_exits(
     follow = -1
     if on_loop:
         follow = drivers.stage[ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]]
-    known = aim(b, n, tick, v, state, labels, roads, drivers, desk)
+    known = aim(b, n, tick, v, state, labels, roads, drivers, scratch)
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
         cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
@@ -148,7 +148,7 @@ def price_exits(
         elif on_loop and out == follow:
             cost = -1.0
         elif known:
-            cost += STEP * desk.hops[out] if desk.hops[out] != FAR else UNREACHABLE
+            cost += STEP * scratch.hops[out] if scratch.hops[out] != FAR else UNREACHABLE
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
@@ -157,15 +157,15 @@ def price_exits(
             or leads_nowhere(b, int(out), roads, obstacles, drivers)
         ):
             cost += BARRED
-        desk.cost[k] = cost
+        scratch.cost[k] = cost
 
 
 @jit
 def aim(
     b: int, n: int, tick: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    desk: Desk,
+    scratch: Scratch,
 ) -> bool:  # fmt: skip
-    """Fill `desk.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
+    """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
     net = drivers.net[b]
     ints = drivers.ints[b, n]
     kind = ints[KIND]
@@ -178,63 +178,63 @@ def aim(
     if not seeks_loop and (kind not in (PLACES, NEMESIS) or ints[GOAL] < 0):
         return False
     if seeks_loop:
-        forget(net, roads, desk)
+        forget(net, roads, scratch)
         found = 0
         for k in range(ints[FIRST], ints[LAST]):
-            found = aim_for(drivers.stage[k], desk.hops, desk.queue, found)
-        spread(roads, net, desk.hops, desk.queue, found)
+            found = aim_for(drivers.stage[k], scratch.hops, scratch.queue, found)
+        spread(roads, net, scratch.hops, scratch.queue, found)
         return True
-    seek(net, ints[GOAL], roads, desk)
+    seek(net, ints[GOAL], roads, scratch)
     if kind == NEMESIS:
-        seek_ego(b, net, labels, roads, desk)
+        seek_ego(b, net, labels, roads, scratch)
     return True
 
 
 @jit
-def forget(net: int, roads: RoadTable, desk: Desk) -> None:
+def forget(net: int, roads: RoadTable, scratch: Scratch) -> None:
     """Make all lanes of a network far from everywhere."""
     for k in range(2 * (roads.seg_off[net + 1] - roads.seg_off[net])):
-        desk.hops[k] = FAR
+        scratch.hops[k] = FAR
 
 
 @jit
-def seek(net: int, v: int, roads: RoadTable, desk: Desk) -> None:
-    """Fill `desk.hops` with the lanes from each lane to intersection v."""
-    forget(net, roads, desk)
+def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
+    """Fill `scratch.hops` with the lanes from each lane to intersection v."""
+    forget(net, roads, scratch)
     row = roads.vert_off[net] + v
     found = 0
     for k in range(roads.degree[row]):
-        found = aim_for(roads.arms[row, k] ^ 1, desk.hops, desk.queue, found)
-    spread(roads, net, desk.hops, desk.queue, found)
+        found = aim_for(roads.arms[row, k] ^ 1, scratch.hops, scratch.queue, found)
+    spread(roads, net, scratch.hops, scratch.queue, found)
 
 
 @jit
-def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, desk: Desk) -> None:
+def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratch) -> None:
     """Turn hops to the ego's goal into hops to the next lanes on its way there."""
     lane = labels.lane[b, 0]
     v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
     count = 0
-    while v >= 0 and count < desk.chain.shape[0]:
+    while v >= 0 and count < scratch.chain.shape[0]:
         row = roads.vert_off[net] + v
         best = -1
         for k in range(roads.degree[row]):
             out = roads.arms[row, k]
             back = lane >= 0 and out == lane ^ 1 and roads.degree[row] > 1
-            if not back and (best < 0 or desk.hops[out] < desk.hops[best]):
+            if not back and (best < 0 or scratch.hops[out] < scratch.hops[best]):
                 best = out
-        desk.chain[count] = best
+        scratch.chain[count] = best
         count += 1
-        if desk.hops[best] == 0:
+        if scratch.hops[best] == 0:
             break
         lane = best
         v = lane_end(roads, net, lane)
     if count == 0:
         return
-    forget(net, roads, desk)
+    forget(net, roads, scratch)
     found = 0
     for k in range(count):
-        found = aim_for(desk.chain[k], desk.hops, desk.queue, found)
-    spread(roads, net, desk.hops, desk.queue, found)
+        found = aim_for(scratch.chain[k], scratch.hops, scratch.queue, found)
+    spread(roads, net, scratch.hops, scratch.queue, found)
 
 
 @jit

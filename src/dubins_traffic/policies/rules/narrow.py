@@ -7,7 +7,7 @@ from typing import Any
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.rules.tables import HALF_WIDTH, MIDDLE, REACH, ROUNDING
-from dubins_traffic.policies.rules.turn_arcs import Way
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction
 from dubins_traffic.roads.table import RoadTable
 
@@ -28,7 +28,9 @@ def within_lane(offset: float, build: Any) -> bool:
 
 
 @jit
-def offset_on_way(b: int, way: Way, begin: float, end: float, obstacles: ObstacleTable, build: Any) -> float:
+def offset_on_way(
+    b: int, way: ReferencePath, begin: float, end: float, obstacles: ObstacleTable, build: Any
+) -> float:
     """Return `clear_offset` for the stretch from `begin` to `end` of the lane in which a way begins.
 
     Both are metres along the lane from its end, negative.

@@ -25,10 +25,10 @@ from dubins_traffic.policies.rules.tables import (
     TIGHTEST,
     UNTIL,
     WAITED,
-    Desk,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import Way
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING, STANDS
@@ -59,13 +59,13 @@ NARROWS = 1.5
 
 
 @jit_inline
-def along(way: Way, x: float, y: float) -> float:
+def along(way: ReferencePath, x: float, y: float) -> float:
     """Return metres along the lane from its end, negative."""
     return (x - way.x) * way.tx + (y - way.y) * way.ty
 
 
 @jit_inline
-def aside(way: Way, x: float, y: float) -> float:
+def aside(way: ReferencePath, x: float, y: float) -> float:
     """Return metres left of the middle of the right lane."""
     return way.tx * (y - way.y) - way.ty * (x - way.x) + way.middle
 
@@ -78,7 +78,7 @@ def stop_line(build: Any) -> float:
 
 
 @jit
-def half_width(b: int, j: Any, way: Way, state: State, build: Any) -> float:
+def half_width(b: int, j: Any, way: ReferencePath, state: State, build: Any) -> float:
     """Return half the extent of a car across the lane."""
     return half_extent(
         way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
@@ -94,15 +94,17 @@ def can_come_back(build: Any) -> bool:
 
 @jit
 def find_way_past(
-    b: int, n: int, way: Way, who: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    b: int, n: int, way: ReferencePath, who: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Begin to pass what stands ahead, if there is room to return and the other lane is and stays free."""
     build = drivers.build[b]
     floats = drivers.floats[b, n]
     reach = build[REACH]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, _ = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, offset, _ = extent(
+        b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], scratch
+    )
     offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
     line = stop_line(build)
     until = end + SLIP + 2.0 * build[HALF_LENGTH]
@@ -129,7 +131,7 @@ def find_way_past(
         return
     comes = max(COMES, build[FASTEST]) * time + SPARE
     room = line - back
-    j = desk.head[drivers.ints[b, n, LANE] >> 1]
+    j = scratch.head[drivers.ints[b, n, LANE] >> 1]
     while j >= 0:
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
@@ -144,11 +146,11 @@ def find_way_past(
                 if key < end:
                     return
                 room -= 2.0 * reach + BERTH
-        j = desk.link[j]
+        j = scratch.link[j]
     if room < 0.0:
         return
     if -line - reach - build[DISC] + (line - back) < comes and may_come(
-        b, n, who, comes, way, state, labels, roads, drivers, desk
+        b, n, who, comes, way, state, labels, roads, drivers, scratch
     ):
         return
     floats[ASIDE] = offset
@@ -158,8 +160,8 @@ def find_way_past(
 
 @jit
 def keep_off(
-    b: int, n: int, p: int, way: Way, state: State, labels: Labels, obstacles: ObstacleTable, drivers: Drivers,
-    desk: Desk,
+    b: int, n: int, p: int, way: ReferencePath, state: State, labels: Labels, obstacles: ObstacleTable, drivers:
+    Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there.
 
@@ -167,7 +169,7 @@ def keep_off(
     """
     build = drivers.build[b]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], desk)
+    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], scratch)
     offset = 0.0
     if end >= own and low > -INFINITE:
         offset = offset_on_way(b, way, own, end + SLIP, obstacles, build)
@@ -182,15 +184,15 @@ def keep_off(
 
 @jit
 def may_come(
-    b: int, n: int, who: int, comes: float, way: Way, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers, desk: Desk,
+    b: int, n: int, who: int, comes: float, way: ReferencePath, state: State, labels: Labels, roads: RoadTable,
+    drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car may come out of the next disc, from `comes` metres behind it at most."""
     net = drivers.net[b]
     v = lane_end(roads, net, drivers.ints[b, n, LANE])
     row = roads.vert_off[net] + v
     for k in range(roads.degree[row]):
-        j = desk.head[roads.arms[row, k] >> 1]
+        j = scratch.head[roads.arms[row, k] >> 1]
         while j >= 0:
             dx = state.x[b, j] - way.x
             dy = state.y[b, j] - way.y
@@ -200,13 +202,13 @@ def may_come(
                     return True
                 if labels.crosses[b, j] == v:
                     return True
-            j = desk.link[j]
+            j = scratch.link[j]
     return False
 
 
 @jit_inline
 def ego_is_beside(
-    b: int, own: float, back: float, way: Way, state: State, labels: Labels, lane: int, build: Any
+    b: int, own: float, back: float, way: ReferencePath, state: State, labels: Labels, lane: int, build: Any
 ) -> bool:
     """Tell whether the ego is in the lane where a car would pass: it might keep beside, or stop where that returns."""
     if labels.segment[b, EGO] != lane >> 1:
@@ -218,8 +220,8 @@ def ego_is_beside(
 
 @jit
 def extent(
-    b: int, n: int, way: Way, own: float, state: State, labels: Labels, obstacles: ObstacleTable, build: Any,
-    lane: int, desk: Desk,
+    b: int, n: int, way: ReferencePath, own: float, state: State, labels: Labels, obstacles: ObstacleTable, build: Any,
+    lane: int, scratch: Scratch,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
@@ -233,7 +235,7 @@ def extent(
     while end > before:
         before = end
         horizon = max(own, end) + NARROWS
-        j = desk.head[lane >> 1]
+        j = scratch.head[lane >> 1]
         while j >= 0:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
@@ -241,7 +243,7 @@ def extent(
                 end = max(end, key)
                 offset = max(offset, left + half_width(b, j, way, state, build))
                 low = -INFINITE
-            j = desk.link[j]
+            j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
             row = obstacles.part[p]
             key = along(way, row[0], row[1])
@@ -255,7 +257,7 @@ def extent(
 
 @jit
 def stands_beside(
-    b: int, own: float, back: float, offset: float, way: Way, obstacles: ObstacleTable, build: Any
+    b: int, own: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, build: Any
 ) -> bool:
     """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
     wide = build[HALF_WIDTH] + build[ROUNDING] + BESIDE
@@ -271,8 +273,8 @@ def stands_beside(
 
 @jit
 def keep_passing(
-    b: int, n: int, speed: float, way: Way, near: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    b: int, n: int, speed: float, way: ReferencePath, near: int, state: State, labels: Labels, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
 ) -> float:  # fmt: skip
     """Return the speed of a car that passes; end the manoeuvre when it is done or there is nothing left to pass."""
     build = drivers.build[b]
@@ -283,7 +285,7 @@ def keep_passing(
         if abs(left) < 0.05:
             floats[ASIDE] = 0.0
         elif labels.bits[b, n] & LEFT != 0:
-            pass_again(b, own, way, near, state, floats, build, desk)
+            pass_again(b, own, way, near, state, floats, build, scratch)
         return speed
     if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(floats[ASIDE], build):
         floats[ASIDE] = 0.0
@@ -297,7 +299,7 @@ def keep_passing(
     beside = False
     before = False
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         key = along(way, state.x[b, j], state.y[b, j])
         its = aside(way, state.x[b, j], state.y[b, j])
         if its > build[MIDDLE] or abs(its) > 2.0 * build[MIDDLE]:
@@ -316,12 +318,12 @@ def keep_passing(
 
 @jit
 def pass_again(
-    b: int, own: float, way: Way, near: int, state: State, floats: Any, build: Any, desk: Desk
+    b: int, own: float, way: ReferencePath, near: int, state: State, floats: Any, build: Any, scratch: Scratch
 ) -> None:  # fmt: skip
     """Go on passing what has moved up meanwhile and stands where the car would return, if there is room."""
     length = 2.0 * build[REACH] + BERTH
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         key = along(way, state.x[b, j], state.y[b, j])
         until = key + SLIP + 2.0 * build[HALF_LENGTH]
         beside = abs(aside(way, state.x[b, j], state.y[b, j])) < build[MIDDLE] and 0.0 < key - own < length

@@ -19,13 +19,13 @@ from dubins_traffic.policies.rules.tables import (
     WAY,
     Drivers,
 )
-from dubins_traffic.policies.rules.turn_arcs import Way, way_between
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath, way_between
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
 
 
 @jit_inline
-def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> Way:
+def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> ReferencePath:
     """Return the way from the lane that a car drives to the next one, which is kept until either changes."""
     ints = drivers.ints[b, n]
     row = drivers.way[b, n]
@@ -35,9 +35,9 @@ def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> Way:
 
 
 @jit_inline
-def kept_way(row: Any) -> Way:
+def kept_way(row: Any) -> ReferencePath:
     """Return the way that a row of `Drivers.way` holds."""
-    return Way(
+    return ReferencePath(
         row[WAY], row[WAY + 1], row[WAY + 2], row[WAY + 3], row[WAY + 4], row[WAY + 5], row[WAY + 6],
         row[WAY + 7], row[WAY + 8], row[WAY + 9], row[WAY + 10], row[WAY + 11],
     )  # fmt: skip

@@ -25,7 +25,6 @@ from dubins_traffic.policies.rules.tables import (
     LANE,
     LEFT_SIDE,
     MIDDLE,
-    MOOD,
     NEMESIS,
     NEXT,
     OWED,
@@ -37,10 +36,11 @@ from dubins_traffic.policies.rules.tables import (
     ROUNDING,
     TAILGATING,
     TURN,
-    Desk,
+    VIOLATIONS,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import BEFORE, Way, on_way
+from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import CLEAR, FIRST, FORFEITED, LEFT, STOPPED
@@ -65,9 +65,10 @@ GOES_NOW = STOPPED | FIRST | CLEAR
 
 
 @jit_inline
-def mind_gate(
-    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: Way,
-    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+def yield_at_line(
+    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: ReferencePath,
+    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch:
+    Scratch,
 ) -> float:  # fmt: skip
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
     net = drivers.net[b]
@@ -78,7 +79,7 @@ def mind_gate(
     bits = np.int64(labels.bits[b, n])
     its_turn = count_turn(bits, drivers.way[b, n], ints)
     line = to_line(left, x, y, way, build)
-    minds = n != EGO and ints[MOOD] & TAILGATING == 0
+    minds = n != EGO and ints[VIOLATIONS] & TAILGATING == 0
     behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
     if behind and drivers.way[b, n, CROSSING] != 0.0:
         line -= build[APPROACHES]
@@ -87,19 +88,19 @@ def mind_gate(
         return speed
     v = lane_end(roads, net, ints[LANE])
     if drivers.way[b, n, CROSSING] != 0.0:
-        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, desk)
-        free = free or ints[MOOD] & ROLLING != 0
+        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+        free = free or ints[VIOLATIONS] & ROLLING != 0
     else:
-        free = may_enter_bend(b, n, v, way, near, state, labels, roads, obstacles, drivers, desk)
-    if bits & LEFT != 0 and ints[MOOD] & LEFT_SIDE == 0:
+        free = may_enter_bend(b, n, v, way, near, state, labels, roads, obstacles, drivers, scratch)
+    if bits & LEFT != 0 and ints[VIOLATIONS] & LEFT_SIDE == 0:
         free = False
     return speed if free else max(0.0, line) / build[PERIOD]
 
 
 @jit
 def may_enter_bend(
-    b: int, n: int, v: int, way: Way, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    b: int, n: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
@@ -112,7 +113,7 @@ def may_enter_bend(
     inside = 0
     held = False
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         if labels.crosses[b, j] == v:
             inside += 1 if turns else shares_way(b, j, way, degree, state, build)
             held = held or (n != EGO and (j == EGO or turns_round(drivers.ints[b, j])))
@@ -121,10 +122,10 @@ def may_enter_bend(
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
-        free = has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, desk)
+        free = has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, scratch)
         long = ints[KIND] != ROUND and ints[KEPT_OUT] * build[PERIOD] > PATIENT * build[REST_TIME]
         if long and inside == 0:
-            free = free or is_free(b, n, ints[NEXT], state, roads, drivers, desk)
+            free = free or is_free(b, n, ints[NEXT], state, roads, drivers, scratch)
     ints[KEPT_OUT] = 0 if free else ints[KEPT_OUT] + 1
     return free
 
@@ -147,7 +148,7 @@ def count_turn(bits: Any, way: Any, ints: Any) -> bool:
 
 
 @jit_inline
-def to_line(left: float, x: float, y: float, way: Way, build: Any) -> float:
+def to_line(left: float, x: float, y: float, way: ReferencePath, build: Any) -> float:
     """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
     edge = build[DISC] + build[REACH] + MARGIN
     aside = left - build[MIDDLE]
@@ -155,7 +156,7 @@ def to_line(left: float, x: float, y: float, way: Way, build: Any) -> float:
 
 
 @jit_inline
-def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) -> int:
+def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, build: Any) -> int:
     """Return 1 if a car in the disc is on this way, or in a disc that is no bend."""
     if degree != 2:
         return 1
@@ -165,7 +166,7 @@ def shares_way(b: int, j: int, way: Way, degree: Any, state: State, build: Any) 
 
 @jit_inline
 def is_behind_ego(
-    b: int, n: int, x: float, y: float, way: Way, state: State, labels: Labels, drivers: Drivers
+    b: int, n: int, x: float, y: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers
 ) -> bool:
     """Tell whether the ego is ahead in a car's lane.
 
@@ -202,7 +203,7 @@ def comes_first(
 @jit
 def may_go(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
     ints = drivers.ints[b, n]
@@ -218,16 +219,16 @@ def may_go(
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
-    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
+    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
         return True
     waited = ints[OWED] - ticks_of(CHOOSY, build)
     if not due and (waited < 0 or waited % 8 != 0):
         return False
     budget = BUDGET * ints[OWED] * build[PERIOD] if ints[KIND] == ROUND else INFINITE
-    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, desk):
+    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
         return True
     if due:
-        take_widest(b, n, state, labels, roads, obstacles, drivers, desk)
+        take_widest(b, n, state, labels, roads, obstacles, drivers, scratch)
     return due
 
 

@@ -19,8 +19,8 @@ from dubins_traffic.policies.rules.tables import (
     MIDDLE,
     REACH,
     ROUNDING,
-    Desk,
     Drivers,
+    Scratch,
 )
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
 from dubins_traffic.roads.table import RoadTable
@@ -40,19 +40,19 @@ PRESSED = 0.4
 @jit
 def has_room(
     b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
 
     `inside` cars are still in the disc and will be before it.
     """
-    return room_in(b, n, out, inside, state, labels, roads, obstacles, drivers, desk) >= 0.0
+    return room_in(b, n, out, inside, state, labels, roads, obstacles, drivers, scratch) >= 0.0
 
 
 @jit
 def room_in(
     b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> float:  # fmt: skip
     """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres.
 
@@ -73,7 +73,7 @@ def room_in(
     last = min(last, before_obstacles(b, out, roads, obstacles, drivers))
     wall = INFINITE
     for look in range(2):
-        j = desk.head[out >> 1]
+        j = scratch.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
             oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
@@ -81,7 +81,7 @@ def room_in(
             if j != n and there and not oncoming and labels.crosses[b, j] != start:
                 if look == 1:
                     last -= pitch if along < wall else 0.0
-                    j = desk.link[j]
+                    j = scratch.link[j]
                     continue
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
                 slow = abs(state.speed[b, j]) < BRISK or heading < 0.5
@@ -91,22 +91,24 @@ def room_in(
                     back = build[BACKS_UP] if j == EGO and n != EGO and crossing else 0.0
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
-            j = desk.link[j]
+            j = scratch.link[j]
     return last - pitch * inside - mouth
 
 
 @jit
-def is_free(b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, desk: Desk) -> bool:
+def is_free(
+    b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, scratch: Scratch
+) -> bool:
     """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
     build = drivers.build[b]
-    j = desk.head[out >> 1]
+    j = scratch.head[out >> 1]
     while j >= 0:
         along, aside = lane_coordinates(
             roads, drivers.net[b], out, float(state.x[b, j]), float(state.y[b, j])
         )
         if j != n and aside <= 0.0 and along <= build[DISC] + build[EXIT_GAP]:
             return False
-        j = desk.link[j]
+        j = scratch.link[j]
     return True
 
 
@@ -132,7 +134,7 @@ def before_obstacles(
 
 @jit
 def is_pressed(
-    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, desk: Desk
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
 ) -> bool:  # fmt: skip
     """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
 
@@ -144,19 +146,19 @@ def is_pressed(
         return False
     own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
     far = 2.0 * build[REACH] + PRESSED
-    j = desk.head[lane >> 1]
+    j = scratch.head[lane >> 1]
     while j >= 0:
         along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
         if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
             far += 2.0 * build[REACH] + QUEUE_GAP
-        j = desk.link[j]
+        j = scratch.link[j]
     row = roads.vert_off[net] + v
     for k in range(roads.degree[row]):
-        j = desk.head[roads.arms[row, k] >> 1]
+        j = scratch.head[roads.arms[row, k] >> 1]
         while j >= 0:
             dx = state.x[b, j] - state.x[b, n]
             dy = state.y[b, j] - state.y[b, n]
             if j != n and labels.crosses[b, j] == v and dx * dx + dy * dy < far * far:
                 return True
-            j = desk.link[j]
+            j = scratch.link[j]
     return False

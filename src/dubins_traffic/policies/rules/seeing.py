@@ -16,17 +16,17 @@ from dubins_traffic.policies.rules.tables import (
     FASTEST,
     HALF_WIDTH,
     KIND,
-    MOOD,
     PERIOD,
     REACH,
     ROUND,
     ROUNDING,
     TAILGATING,
     UNTIL,
-    Desk,
+    VIOLATIONS,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import BEFORE, Way, on_way
+from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import APPROACH, EXCUSED, LEFT, STANDS
@@ -59,7 +59,7 @@ AWARE = 0.06
 
 
 @jit_inline
-def way_to_go(way: Way, x: float, y: float) -> float:
+def way_to_go(way: ReferencePath, x: float, y: float) -> float:
     """Return minus the metres along the lane to the intersection at its end."""
     return (x - way.x) * way.tx + (y - way.y) * way.ty
 
@@ -79,7 +79,16 @@ def corridor(left: float, wide: float) -> tuple[float, float]:
 
 @jit_inline
 def meets_nobody(
-    b: int, n: int, part: int, key: float, left: float, x: float, y: float, way: Way, state: State, build: Any
+    b: int,
+    n: int,
+    part: int,
+    key: float,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    state: State,
+    build: Any,
 ) -> bool:
     """Tell whether no car of the trial makes a difference to one that just drives on: is close, or ahead on its way."""
     far, touch = alone(build), 2.0 * build[REACH] + CLOSE
@@ -99,15 +108,15 @@ def meets_nobody(
 
 @jit_inline
 def gather(
-    b: int, n: int, lane: int, x: float, y: float, way: Way, labels: Labels, roads: RoadTable,
-    drivers: Drivers, desk: Desk,
+    b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, labels: Labels, roads: RoadTable,
+    drivers: Drivers, scratch: Scratch,
 ) -> int:  # fmt: skip
     """List the cars on the car's segment, and on those that meet it where it is near an end; return how many."""
     net = drivers.net[b]
     disc = drivers.build[b, DISC]
-    count = add_segment(labels.segment[b, n], n, 0, desk)
+    count = add_segment(labels.segment[b, n], n, 0, scratch)
     if labels.segment[b, n] != lane >> 1:
-        count = add_segment(lane >> 1, n, count, desk)
+        count = add_segment(lane >> 1, n, count, scratch)
     to_go = -way_to_go(way, x, y)
     length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
     for end in range(2):
@@ -119,26 +128,26 @@ def gather(
         for k in range(roads.degree[row]):
             segment = roads.arms[row, k] >> 1
             if segment != lane >> 1 and segment != labels.segment[b, n]:
-                count = add_segment(int(segment), n, count, desk)
+                count = add_segment(int(segment), n, count, scratch)
     return count
 
 
 @jit_inline
-def add_segment(segment: int, n: int, count: int, desk: Desk) -> int:
-    """Add the cars of a segment but n to `desk.near`; return how many there are now."""
-    other = desk.head[segment]
+def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
+    """Add the cars of a segment but n to `scratch.near`; return how many there are now."""
+    other = scratch.head[segment]
     while other >= 0:
         if other != n:
-            desk.near[count] = other
+            scratch.near[count] = other
             count += 1
-        other = desk.link[other]
+        other = scratch.link[other]
     return count
 
 
 @jit_inline
 def look_ahead(
-    b: int, part: int, key: float, left: float, x: float, y: float, way: Way, near: int,
-    state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, desk: Desk,
+    b: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, near: int,
+    state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, scratch: Scratch,
 ) -> tuple[float, int, bool]:  # fmt: skip
     """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
 
@@ -157,7 +166,7 @@ def look_ahead(
     close = False
     touch = 2.0 * reach + CLOSE
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
         d2 = dx * dx + dy * dy
@@ -182,14 +191,14 @@ def look_ahead(
 
 
 @jit_inline
-def around(way: Way) -> float:
+def around(way: ReferencePath) -> float:
     """Return metres of the arc of a way that turns round, 0 of others."""
     return HALF_TURN * way.radius if way.tx * way.ux + way.ty * way.uy < BACKWARD else 0.0
 
 
 @jit_inline
 def see_obstacles(
-    b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float,
+    b: int, part: int, key: float, x: float, y: float, way: ReferencePath, low: float, high: float,
     gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
 ) -> tuple[float, int, bool]:  # fmt: skip
     """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
@@ -229,7 +238,7 @@ def wanted_gap(
     b: int,
     n: int,
     who: int,
-    way: Way,
+    way: ReferencePath,
     state: State,
     labels: Labels,
     ints: Any,
@@ -244,7 +253,7 @@ def wanted_gap(
         standing = QUEUE_GAP
     if who < -1:
         return QUEUE_GAP if labels.crosses[b, n] >= 0 else standing
-    if ints[MOOD] & TAILGATING != 0:
+    if ints[VIOLATIONS] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])

@@ -24,10 +24,10 @@ from dubins_traffic.policies.rules.tables import (
     WATCH_X,
     WATCH_Y,
     WATCHED,
-    Desk,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import Way
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import APPROACH, OVERTAKING, STANDS, STOPPED
 from dubins_traffic.rules.shape import half_extent
@@ -38,8 +38,8 @@ LINE, SURE = 0.002, 0.03
 
 @jit
 def stays_right(
-    b: int, n: int, speed: float, yaw_rate: float, way: Way, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
     build = drivers.build[b]
@@ -58,12 +58,12 @@ def stays_right(
         there = own - row[7] <= key <= own + row[7] + build[FORE]
         if there and abs(aside(way, row[0], row[1])) - row[7] < build[MIDDLE]:
             return True
-    return surely_stands(b, n, own, way, state, labels, drivers, desk)
+    return surely_stands(b, n, own, way, state, labels, drivers, scratch)
 
 
 @jit
 def surely_stands(
-    b: int, n: int, own: float, way: Way, state: State, labels: Labels, drivers: Drivers, desk: Desk
+    b: int, n: int, own: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers, scratch: Scratch
 ) -> bool:  # fmt: skip
     """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
 
@@ -76,7 +76,7 @@ def surely_stands(
         return False
     watch_x, watch_y = drivers.floats[b, n, WATCH_X], drivers.floats[b, n, WATCH_Y]
     found = False
-    j = desk.head[lane >> 1]
+    j = scratch.head[lane >> 1]
     while j >= 0:
         bits = labels.bits[b, j]
         if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
@@ -88,21 +88,21 @@ def surely_stands(
             half = half_width(b, j, way, state, build)
             if own - build[BEHIND] + SURE < key < own + build[FORE] - SURE:
                 found = found or narrows(left - half, left + half, 2.0 * build[MIDDLE], build[NEEDED])
-        j = desk.link[j]
+        j = scratch.link[j]
     return found
 
 
 @jit_inline
 def watch(
-    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, desk: Desk
+    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, scratch: Scratch
 ) -> None:  # fmt: skip
     """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
-    j = desk.head[lane >> 1]
+    j = scratch.head[lane >> 1]
     while j >= 0:
         if j != n and state.x[b, j] == floats[WATCH_X] and state.y[b, j] == floats[WATCH_Y]:
             ints[WATCHED] += 1
             return
-        j = desk.link[j]
+        j = scratch.link[j]
     ints[WATCHED] = 0
     if who >= 0:
         floats[WATCH_X], floats[WATCH_Y] = state.x[b, who], state.y[b, who]

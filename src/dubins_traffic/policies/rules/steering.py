@@ -17,17 +17,17 @@ from dubins_traffic.policies.rules.tables import (
     HALF_LENGTH,
     HALF_WIDTH,
     LEFT_SIDE,
-    MOOD,
     PERIOD,
     REACH,
     ROUNDING,
     SLOWEST,
     TIGHTEST,
+    VIOLATIONS,
     YAW_MOST,
-    Desk,
     Drivers,
+    Scratch,
 )
-from dubins_traffic.policies.rules.turn_arcs import Way
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.rules.propositions import LEFT
 
@@ -47,8 +47,8 @@ GAIN = 8.0
 @jit_inline
 def move(
     b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
-    way: Way, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, desk: Desk,
+    way: ReferencePath, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
     build = drivers.build[b]
@@ -64,18 +64,18 @@ def move(
     )
     if passes or build[TIGHTEST] > 0.0:
         speed, yaw_rate = keep_right(
-            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, desk
+            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, scratch
         )
-    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
+    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
     if not safe and passes and offset == 0.0:
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
         )
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
     if not safe:
         speed = 0.0
         if build[HALF_LENGTH] > 0.0 and not is_safe(
-            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk
+            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch
         ):
             yaw_rate = 0.0
     return speed, yaw_rate
@@ -83,15 +83,15 @@ def move(
 
 @jit_inline
 def keep_right(
-    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: Way, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, desk: Desk,
+    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
     build = drivers.build[b]
     bits = np.int64(labels.bits[b, n])
-    lawless = drivers.ints[b, n, MOOD] & LEFT_SIDE != 0
+    lawless = drivers.ints[b, n, VIOLATIONS] & LEFT_SIDE != 0
     if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
-        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, desk
+        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, scratch
     ):  # fmt: skip
         return speed, yaw_rate
     leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
@@ -118,7 +118,8 @@ def steer(
 
     `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
     line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
-    `limit` is its largest yaw rate. All is worked out whatever the case, so that `late.catch_up` has no branches.
+    `limit` is its largest yaw rate. All is worked out whatever the case, so that `late.decide_deferred` has no
+    branches.
     """
     sine = min(max(-left / HURRY, -most), most)
     cosine = sqrt(1.0 - sine * sine)
@@ -143,7 +144,7 @@ def steer(
 @jit
 def is_safe(
     b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
-    obstacles: ObstacleTable, build: Any, desk: Desk,
+    obstacles: ObstacleTable, build: Any, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
@@ -153,7 +154,7 @@ def is_safe(
     if p > 0.0:
         travel += build[YAW_MOST] * reach * period
     for k in range(near):
-        j = desk.near[k]
+        j = scratch.near[k]
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
         far = 2.0 * reach + NEAR

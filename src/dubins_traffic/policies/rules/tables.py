@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
 
-KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, MOOD, WATCHED, KEPT_OUT = range(13)
+KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, VIOLATIONS, WATCHED, KEPT_OUT = range(13)
 INTS = 13
 """Columns of `Drivers.ints`.
 
@@ -27,8 +27,8 @@ KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, L
 LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the row of `stage` it is at, -1: none; GOAL:
 the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
 which it has been its turn to enter the crossing ahead; OWED: the same, over all of this wait; WAITED: ticks for which
-something has been in its way; MOOD: which rules it breaks on this lane; WATCHED: ticks for which what it may pass has
-not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter.
+something has been in its way; VIOLATIONS: which rules it breaks on this lane; WATCHED: ticks for which what it may
+pass has not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter.
 """
 
 SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y, DEPARTS = (
@@ -47,7 +47,7 @@ DEPARTS: seconds from the beginning for which it parks.
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
 DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
 STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME, APPROACHES = range(19, 24)
-BUILD = 24
+VEHICLE = 24
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
 crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
@@ -65,10 +65,10 @@ COAST_LOW, COAST_HIGH, COAST_PAST, COAST_SPEED, COAST_BEND, COAST_LANE, COAST_CR
 )
 WAYS = 24
 """Columns of `Drivers.way`: the two lanes whose way the row holds (-1: none yet), whether there is a crossing between
-them, metres of the first, and from WAY on the fields of the `policies.rules.turn_arcs.Way`. Of a car that
-just drives on (`policies.rules.command_cache`): the stretch on which it goes on so, metres along the first lane from the arc's
-centre (from LOW to HIGH) and along the second (to PAST), its speed, m/s, the curvature of its line, 1/m, the lane of
-its lane state and the disc that its body meets. OUT_LENGTH: metres of the second lane.
+them, metres of the first, and from WAY on the fields of the `policies.rules.turn_arcs.ReferencePath`. Of a car that
+just drives on (`policies.rules.command_cache`): the stretch on which it goes on so, metres along the first lane from
+the arc's centre (from LOW to HIGH) and along the second (to PAST), its speed, m/s, the curvature of its line, 1/m,
+the lane of its lane state and the disc that its body meets. OUT_LENGTH: metres of the second lane.
 """
 
 LONGEST_WAY = 2.21
@@ -76,7 +76,7 @@ LONGEST_WAY = 2.21
 PROMPT = 0.8
 
 ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
-"""Bits of MOOD."""
+"""Bits of VIOLATIONS."""
 
 
 ALONE, UNSURE, CROWDED = range(3)
@@ -86,7 +86,7 @@ all of them; nothing.
 
 DUE, LATE_SPEED, LATE_LEFT, LATE_X, LATE_Y, LATE_BEND, LATE_C, LATE_S, LATE_YAW = range(9)
 LATE = 9
-"""`Desk.late`: blocks of BLOCK cars, each LATE columns of BLOCK numbers.
+"""`Scratch.late`: blocks of BLOCK cars, each LATE columns of BLOCK numbers.
 
 DUE: 1 if a command has been put off. Allowed speed, m/s; metres left of the line to follow; its direction (X, Y); its
 curvature, 1/m; the heading (C, S); and the yaw rate that is found, rad/s, as the speed is then found in LATE_SPEED.
@@ -97,7 +97,7 @@ class Drivers(NamedTuple):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
-    `trial` (B,): of the random numbers; `build` (B, BUILD), `ints` (B, N, INTS), `floats` (B, N, FLOATS) and `way`
+    `trial` (B,): of the random numbers; `build` (B, VEHICLE), `ints` (B, N, INTS), `floats` (B, N, FLOATS) and `way`
     (B, N, WAYS): columns as above; `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from
     the beginning of each lane to the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
     """
@@ -114,7 +114,7 @@ class Drivers(NamedTuple):
     distance: Floats
 
 
-class Desk(NamedTuple):
+class Scratch(NamedTuple):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
     lanes that the ego will probably take; `late`: commands put off; `apart` (N,): for
     who does not know how far cars are apart, 0; `listed` (1,): who is in the lists.
@@ -144,9 +144,9 @@ def no_ways(trials: int, cars: int) -> Floats:
     return np.full((trials, cars, WAYS), -1.0)
 
 
-def desk(cars: int, segments: int) -> Desk:
+def scratch(cars: int, segments: int) -> Scratch:
     """Return scratch for trials of up to `cars` cars on up to `segments` segments."""
-    return Desk(
+    return Scratch(
         head=np.full(segments, -1, dtype=np.int64),
         link=np.zeros(cars, dtype=np.int64),
         near=np.zeros(8 * cars, dtype=np.int64),

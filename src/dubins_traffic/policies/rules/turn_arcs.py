@@ -23,7 +23,7 @@ TIGHTEST = 0.05
 """Least radius of an arc, metres."""
 
 
-class Way(NamedTuple):
+class ReferencePath(NamedTuple):
     """The way from a lane to another through the intersection at (x, y).
 
     (tx, ty) and (ux, uy) are the directions of the lane in and the lane out, (cx, cy) the centre of the arc and
@@ -46,7 +46,7 @@ class Way(NamedTuple):
 
 
 @jit
-def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, disc: float) -> Way:
+def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, disc: float) -> ReferencePath:
     """Return the way from `lane` to `out`, which begins where it ends (`lane ^ 1`: turning round to the left).
 
     Parameters
@@ -73,7 +73,7 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
         cot = 0.0
         radius = middle
     elif abs(sine) < STRAIGHT and cosine > 0.0:
-        return Way(x, y, tx, ty, ux, uy, x, y, 0.0, 0.0, middle, 0.0)
+        return ReferencePath(x, y, tx, ty, ux, uy, x, y, 0.0, 0.0, middle, 0.0)
     else:
         side = 1.0 if sine > 0.0 else -1.0
         cot = abs(sine) / (1.0 - cosine)
@@ -84,11 +84,11 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
     py = y - begin * ty - middle * tx
     cx = px - side * radius * ty
     cy = py + side * radius * tx
-    return Way(x, y, tx, ty, ux, uy, cx, cy, radius, side, middle, side / radius)
+    return ReferencePath(x, y, tx, ty, ux, uy, cx, cy, radius, side, middle, side / radius)
 
 
 @jit
-def on_way(way: Way, x: float, y: float) -> tuple[int, float, float, float, float]:
+def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, float, float]:
     """Return (part, key, left, px, py) of a point.
 
     `part` is BEFORE, THROUGH or AFTER; `key` grows along each part; `left` is how far left of the way the point lies,
@@ -116,7 +116,7 @@ def on_way(way: Way, x: float, y: float) -> tuple[int, float, float, float, floa
 
 
 @jit_inline
-def in_arc(way: Way, dx: float, dy: float) -> tuple[int, float, float, float, float]:
+def in_arc(way: ReferencePath, dx: float, dy: float) -> tuple[int, float, float, float, float]:
     """Return what `on_way` does, of a point that is known to be in the arc, (dx, dy) from its centre."""
     far = sqrt(dx * dx + dy * dy)
     ex = dx / far
@@ -127,7 +127,7 @@ def in_arc(way: Way, dx: float, dy: float) -> tuple[int, float, float, float, fl
 
 
 @jit
-def on_lane(way: Way, x: float, y: float) -> tuple[int, float, float, float, float]:
+def on_lane(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, float, float]:
     """Return what `on_way` does, of a point that is known to be on the lane in."""
     along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
     left = way.tx * (y - way.y) - way.ty * (x - way.x) + way.middle

@@ -36,7 +36,7 @@ class Told:
     results_file: str | None = None
 
 
-class Desk:
+class MaestroServices:
     """Services, parameters and the latched problem instance.
 
     Parameters

@@ -38,7 +38,7 @@ class _Service:
     answer: Callable[[Any], Any]
 
 
-class Desk:
+class MaestroServices:
     """Answers requests, and tells the problem.
 
     Parameters

@@ -50,7 +50,7 @@ SHUTTLE = 10
 """Ticks of each stroke of a car that has to shuttle to turn round."""
 
 
-class Desk(NamedTuple):
+class Knowledge(NamedTuple):
     """What the law knows and remembers of each trial of a batch.
 
     `path` (rows, paths.FIELDS): all trials' paths; `span` (B, 3): first row, end, and number of the row after the
