@@ -89,7 +89,7 @@ def shield(
     state, labels, roads, obstacles
         The trials.
     drivers, guards, scratch
-        `shield_tables.egos`, what the shield remembers, and room to work in.
+        `tables.egos`, what the shield remembers, and room to work in.
     commands : (B, N, 2)
         Speed and yaw rate of every car; `guards.mark[:, REASON]` tells why the shield stepped in.
     """

@@ -66,7 +66,7 @@ def drive_by_law(
     b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
 ) -> None:  # fmt: skip
-    """Write the command of an ego that the law drives; it goes by the cars within sight (`law.decide_trial`)."""
+    """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
     decide_trial(
         b, tick, sight2, scratch.apart, 0.0, state, labels, roads, obstacles, drivers, scratch, commands
     )

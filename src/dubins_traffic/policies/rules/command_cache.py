@@ -114,7 +114,7 @@ def drive_on(
 ) -> bool:  # fmt: skip
     """Put off the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
 
-    Nothing is around the car that matters to it (`law.just_drives`). What it does is kept for the ticks to come.
+    Nothing is around the car that matters to it (`policy.just_drives`). What it does is kept for the ticks to come.
     """
     build = drivers.build[b]
     ints = drivers.ints[b, n]

@@ -118,7 +118,7 @@ def steer(
 
     `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
     line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
-    `limit` is its largest yaw rate. All is worked out whatever the case, so that `late.decide_deferred` has no
+    `limit` is its largest yaw rate. All is worked out whatever the case, so that `decide_deferred` has no
     branches.
     """
     sine = min(max(-left / HURRY, -most), most)
