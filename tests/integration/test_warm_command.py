@@ -47,14 +47,14 @@ def test_what_runs_and_batches_need_is_asked_for_once(asked) -> None:
     assert heard == [(len(asked), len(asked))]
     assert {
         "agents.kernel.decide",
-        "campaign.batch_kernel.run_trials",
+        "engine.batch_kernel.run_trials",
         "cars.motion.step",
-        "controllers.lanes_law.decide",
-        "driving.law.decide",
-        "driving.shield.shield",
+        "policies.lanes.policy.decide",
+        "policies.rules.policy.decide",
+        "shield.nearest_command.shield",
         "scoring.margins_kernel.find_margins",
-        "spec.frame.label_frame",
-        "spec.judge_kernel.judge_frames",
+        "rules.frame.label_frame",
+        "rules.referee_kernel.judge_frames",
     } <= set(asked)
     assert not any(name.startswith("synthesis.") for name in asked)
 
@@ -64,7 +64,7 @@ def test_all_is_more(asked) -> None:
     assert {
         "cars.sensing.scan",
         "cars.sensing.blur",
-        "spec.logic.kernel.advance",
+        "logic.kernel.advance",
         "synthesis.fixpoint.reach",
     } <= set(asked)
 

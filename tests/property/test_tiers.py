@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.campaign.batch import run_batch
-from dubins_traffic.campaign.batch_kernel import run_trials
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.engine.batch import run_batch
+from dubins_traffic.engine.batch_kernel import run_trials
 from dubins_traffic.kernels import asking, store
 from dubins_traffic.kernels.compile import Kernel, rehearsal
 from dubins_traffic.kernels.machine import Code
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.single import run_trial
 
 TRIALS = 6
 

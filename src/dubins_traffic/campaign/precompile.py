@@ -11,10 +11,9 @@ from tempfile import TemporaryDirectory
 from time import sleep
 from typing import Any
 
-from dubins_traffic.campaign.batch import outcomes
-from dubins_traffic.campaign.course import course
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.checkup.scenarios import course
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels import asking
 from dubins_traffic.kernels.compile import TIER, never_compiled, rehearsal
@@ -22,6 +21,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Disturbances, Instance, Laser
 from dubins_traffic.record import reader
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import score
 from dubins_traffic.verification.contacts import from_poses
 
