@@ -37,5 +37,6 @@ def run_over_lcm(
     """
     maestro = Maestro() if wait else None
     transport = Lcm(url, maestro)
+    programme = programme.claim(transport.name)
     programme.rehearse()
     yield from programme.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

@@ -30,8 +30,9 @@ def run_over_lines(programme: Programme, pace: Pace, *, port: int = 0) -> Iterat
     InputError
         If an instance can't be drawn.
     """
-    programme.rehearse()
     transport = Lines(port)
+    programme = programme.claim(transport.name)
+    programme.rehearse()
     yield from programme.run(
         transport, pace, None, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
     )

@@ -67,9 +67,15 @@ def run_over_ros1(
     if elsewhere and (pace.lockstep or pace.factor != 1.0):
         expected = "neither --lockstep nor --factor"
         raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
+    if elsewhere and programme.append:
+        expected = "--overwrite, or another folder: the other maestro tells other problems"
+        raise InputError("both at once", file="--maestro-elsewhere, --append", expected=expected)
     ego = programme.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
+    if world:
+        programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
+    programme = programme.claim(Ros1.name)
     programme.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
@@ -86,7 +92,6 @@ def run_over_ros1(
         if not world:
             yield from programme.run(transport, pace, maestro, foreign=foreign)
             return
-        programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
         make = partial(_elsewhere, transport, ego, poses)
         yield from programme.run(transport, pace, maestro, make, foreign=foreign)
 

@@ -65,6 +65,7 @@ def run_over_ros2(
     """
     maestro = Maestro() if programme.controller is None else None
     transport = make_transport(domain, maestro, here=here, clock=clock)
+    programme = programme.claim(transport.name)
     programme.rehearse()
     where = f"DDS domain {transport.domain}{', within this machine' if here else ''}"
     yield from programme.run(transport, pace, maestro, at=lambda: where)
