@@ -39,7 +39,7 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import OF_TRIAL, BreachLog
+from dubins_traffic.rules.breach_log import MOST, OF_TRIAL, BreachLog
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 FRAMES = 16
-"""For how many frames in which all goes wrong there is room in the breach_log."""
+"""For how many frames of any trial in which all goes wrong there is room in the breach_log."""
 WORK = 500_000
 """Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
 
@@ -109,9 +109,8 @@ class Group:
         cars, obstacles, rows, work = simulator.tables
         terms = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, len(terms.goal))
-        breach_log = breach_log._replace(
-            row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
-        )
+        most = MOST * places + int(np.diff(terms.goal_off).max())
+        breach_log = breach_log._replace(row=np.zeros((FRAMES * most, breach_log.row.shape[1]), np.int64))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         self._world = World(

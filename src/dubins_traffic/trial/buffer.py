@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
+from dubins_traffic.cars.state import STATE_END, Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
@@ -15,9 +15,6 @@ from dubins_traffic.protocols import Ending, Sink
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
-
-
-STATE_END = len(State._fields)
 
 
 @jit
