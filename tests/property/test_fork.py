@@ -16,6 +16,8 @@ from hypothesis import strategies as st
 
 import dubins_traffic as dt
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.engine.batch_kernel import World
+from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -208,3 +210,90 @@ def test_a_simulator_that_can_t_go_on_twice_is_refused() -> None:
     instance = draw(configuration((), "plain", rules=False), SEED, 0)
     with pytest.raises(InputError, match="simulator"):
         Trial(instance, simulator=Elsewhere()).fork()
+
+
+def group_of(kinds: Sequence[Any], world: str, rules: bool, keeps_rules: bool, seconds: int = 2) -> Group:
+    """Return a group of three trials."""
+    config = configuration(kinds, world, rules, seconds)
+    return Group([draw(config, SEED, trial) for trial in range(3)], keeps_rules=keeps_rules)
+
+
+def finished(group: Group, keeps_rules: bool) -> list[Any]:
+    """Run a group to the end; return what came of its trials."""
+    while len(group.active):
+        if not keeps_rules:
+            for b in group.active.tolist():
+                group.commands[b, 0] = wheel(int(group.ticks[b]), 0.0)
+        group.advance()
+    found = group.outcomes(range(len(group.instances)), "any")
+    return [(own.ending, plain(own.score)) for own in found]
+
+
+@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(
+    kinds=st.lists(st.sampled_from(KINDS), unique_by=lambda kind: kind["name"], max_size=4),
+    world=st.sampled_from(sorted(set(WORLDS) - {"formulas", "noise", "lossy", "laser"})),
+    rules=st.booleans(),
+    keeps_rules=st.booleans(),
+    at=st.integers(0, 55),
+    trials=st.lists(st.integers(0, 2), min_size=1, max_size=4),
+)
+def test_forks_of_some_trials_of_a_batch_equal_the_trials(
+    kinds: Sequence[Any], world: str, rules: bool, keeps_rules: bool, at: int, trials: list[int]
+) -> None:
+    wanted = finished(group_of(kinds, world, rules, keeps_rules), keeps_rules)
+    group = group_of(kinds, world, rules, keeps_rules)
+    for _ in range(at):
+        for b in group.active.tolist():
+            if not keeps_rules:
+                group.commands[b, 0] = wheel(int(group.ticks[b]), 0.0)
+        group.advance()
+    forks = group.fork(trials)
+    spoilt = forks.fork([len(trials) - 1] * 2, seeds=[1, 2])
+    again = forks.fork([0, 0])
+    assert not shared(forks, again)
+    spoilt.commands[:] = 0.7, 1.0
+    spoilt.finish()
+    assert finished(again, keeps_rules) == [wanted[trials[0]]] * 2
+    assert finished(forks, keeps_rules) == [wanted[b] for b in trials]
+    assert finished(group, keeps_rules) == wanted
+
+
+def shared(one: Group, other: Group) -> list[str]:
+    """Return the names of the arrays that change and that two groups share."""
+    constant = {"stage", "distance", "cycle", "script", "mask"}
+    found: list[str] = []
+    for name, table, others in zip(World._fields, one.world, other.world, strict=True):
+        if name in ("roads", "beside"):
+            continue
+        for part, array, its in zip(table._fields, table, others, strict=True):
+            if part not in constant and np.may_share_memory(array, its):
+                found.append(f"{name}.{part}")
+    return found
+
+
+def test_forks_of_a_batch_with_other_seeds_go_other_ways() -> None:
+    group = group_of(KINDS[3:4], "plain", rules=True, keeps_rules=True, seconds=12)
+    group.advance(20)
+    forks = group.fork([1] * 6, seeds=[SEED, SEED, 7, 7, 8, 10])
+    assert [own.seed for own in forks.instances] == [SEED, SEED, 7, 7, 8, 10]
+    forks.advance(10**6)
+    with pytest.raises(DubinsTrafficError, match="ended"):
+        forks.fork([2])
+    group.advance(10**6)
+    poses = [forks.state.x[b].tobytes() for b in range(6)]
+    assert poses[0] == poses[1] == group.state.x[1].tobytes()
+    assert poses[2] == poses[3]
+    assert len(set(poses)) > 1
+
+
+def test_forks_of_a_batch_of_so_many_cars_that_they_are_looked_for_in_cells() -> None:
+    crowd = [{"type": "lawful", "name": "agent", "count": 28, "parameters": {"rolls": 0.3}}, *KINDS[5:6]]
+    group = group_of(crowd, "obstacle", rules=True, keeps_rules=True, seconds=3)
+    group.advance(25)
+    forks = group.fork([2, 0])
+    group.finish()
+    forks.finish()
+    assert [plain(own.score) for own in forks.outcomes([0, 1], "rules")] == [
+        plain(own.score) for own in group.outcomes([2, 0], "rules")
+    ]
