@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 import dubins_traffic as dt
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch_kernel import World
+from dubins_traffic.engine.controlled import Controlled
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.problem.draw import draw
@@ -27,6 +29,7 @@ from dubins_traffic.scoring.score import Scorer
 from dubins_traffic.simulators.embedded import Embedded
 from dubins_traffic.trial.trial import FORKED
 from tests.forks import KINDS, WORLDS, Kept, configuration, plain
+from tests.property.test_batch import Wheel
 
 SEED = 5
 
@@ -273,7 +276,8 @@ def shared(one: Group, other: Group) -> list[str]:
 
 
 def test_forks_of_a_batch_with_other_seeds_go_other_ways() -> None:
-    group = group_of(KINDS[3:4], "plain", rules=True, keeps_rules=True, seconds=12)
+    many = [{**KINDS[0], "count": 3}, {**KINDS[3], "count": 4}]
+    group = group_of(many, "plain", rules=True, keeps_rules=True, seconds=14)
     group.advance(20)
     forks = group.fork([1] * 6, seeds=[SEED, SEED, 7, 7, 8, 10])
     assert [own.seed for own in forks.instances] == [SEED, SEED, 7, 7, 8, 10]
@@ -297,3 +301,39 @@ def test_forks_of_a_batch_of_so_many_cars_that_they_are_looked_for_in_cells() ->
     assert [plain(own.score) for own in forks.outcomes([0, 1], "rules")] == [
         plain(own.score) for own in group.outcomes([2, 0], "rules")
     ]
+
+
+def asked(controlled: Controlled, ticks: int = 10**6) -> dict[int, Any]:
+    """Let the controllers of a group drive for some ticks, or to the end; return what came of trials, by number."""
+    found: dict[int, Any] = {}
+    while len(controlled.group.active) and ticks > 0:
+        ticks -= 1
+        controlled.ask_each()
+        before = set(controlled.group.active.tolist())
+        ended = list(controlled.step("any"))
+        gone = sorted(before - set(controlled.group.active.tolist()))
+        assert len(gone) == len(ended)
+        found |= {b: (own.ending, plain(own.score)) for b, own in zip(gone, ended, strict=True)}
+    return found
+
+
+@pytest.mark.parametrize("world", ["noise", "lossy", "laser"])
+@pytest.mark.parametrize("controller", ["rules", "lanes+shield"])
+def test_forks_of_trials_whose_controllers_are_asked_equal_the_trials(world: str, controller: str) -> None:
+    config = configuration(KINDS[:4], world, True, seconds=3)
+    own = Controlled([draw(config, SEED, k) for k in range(2)], partial(controllers.load, controller), None)
+    assert asked(own, 40) == {}
+    forks = own.fork([1, 0, 1])
+    others = own.fork([1, 1], seeds=[SEED, SEED + 1])
+    wanted = asked(own)
+    assert asked(forks) == {0: wanted[1], 1: wanted[0], 2: wanted[1]}
+    found = asked(others)
+    assert found[0] == wanted[1]
+    assert found[1] != wanted[1]
+
+
+def test_a_controller_of_whole_batches_does_not_go_on_twice() -> None:
+    config = configuration((), "plain", rules=False)
+    own = Controlled([draw(config, SEED, 0)], Wheel, Wheel())
+    with pytest.raises(DubinsTrafficError, match="whole batches"):
+        own.fork([0])
