@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
@@ -26,9 +27,13 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Capabilities, Controller
 from dubins_traffic.runs.single import Trial
 from dubins_traffic.scoring.score import Scorer
+from dubins_traffic.sessions.remote import hand_over
 from dubins_traffic.simulators.embedded import Embedded
+from dubins_traffic.transports.clocks import Lockstep
+from dubins_traffic.transports.lines import Lines
+from dubins_traffic.transports.link import Link
 from dubins_traffic.trial.trial import FORKED
-from tests.forks import KINDS, WORLDS, Kept, configuration, plain
+from tests.forks import KINDS, WORLDS, Kept, arrays_in, configuration, plain
 from tests.property.test_batch import Wheel
 
 SEED = 5
@@ -89,6 +94,20 @@ def test_a_fork_and_a_fork_of_it_equal_a_trial_that_nobody_has_forked(
     kinds: Sequence[Any], world: str, rules: bool, at: int, later: int, trial: int
 ) -> None:
     check_forks(draw(configuration(kinds, world, rules, seconds=2), SEED, trial), at, later)
+
+
+def test_a_trial_and_its_fork_share_no_array() -> None:
+    instance = draw(configuration(KINDS, "laser", rules=True), SEED, 0)
+    trial = begun(instance)
+    swung(trial, 40)
+    fork = trial.fork()
+    swung(fork, 1)
+    swung(trial, 1)
+    here, there = arrays_in(trial), arrays_in(fork)
+    assert here.keys() == there.keys()
+    assert len(here) > 100
+    for name, array in here.items():
+        assert not any(np.may_share_memory(array, other) for other in there.values()), name
 
 
 @pytest.mark.parametrize("at", [0, 45])
@@ -207,6 +226,17 @@ class Elsewhere(Embedded):
     """A simulator that does not say that it can go on twice."""
 
     capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
+
+
+def test_e_agents_that_programs_elsewhere_drive_are_refused() -> None:
+    instance = draw(configuration(KINDS[2:3], "plain", rules=False), SEED, 0)
+    link = Link(Lines(), Lockstep())
+    with (
+        closing(link.transport),
+        Trial(hand_over(instance, ["nemesis"]), link=link) as trial,
+        pytest.raises(InputError, match="elsewhere"),
+    ):
+        trial.fork()
 
 
 def test_a_simulator_that_can_t_go_on_twice_is_refused() -> None:
