@@ -215,6 +215,11 @@ def test_a_fork_that_can_t_be_is_refused_and_the_trial_goes_on(tmp_path: Path) -
             recorded.fork(3, record=tmp_path / "fork.mcap")
         with pytest.raises(InputError, match="exists"):
             recorded.fork(record=tmp_path / "there.mcap")
+        with pytest.raises(InputError, match="the record of the trial"):
+            recorded.fork(record=tmp_path / "trial.mcap", overwrite=True)
+        swung(recorded.fork(record=tmp_path / "again.mcap"), 10**6)
+        swung(recorded, 10**6)
+    assert (tmp_path / "trial.mcap").read_bytes() == (tmp_path / "again.mcap").read_bytes()
     assert (tmp_path / "there.mcap").read_bytes() == b"mine"
     assert not (tmp_path / "fork.mcap").exists()
     swung(trial, 10**6)

@@ -121,6 +121,10 @@ class RecordWriter:
             If the file exists and may not be replaced, can't be made, or this record can't be read any more.
         """
         twin = RecordWriter(path, controller=self._controller, overwrite=overwrite)
+        if twin.path.exists() and self.path.exists() and twin.path.samefile(self.path):
+            raise InputError(
+                "is the record of the trial that is forked", file=str(path), expected="another file"
+            )
         with self._written():
             before = self.path.open("rb")
         with before:
