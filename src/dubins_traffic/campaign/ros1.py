@@ -73,10 +73,11 @@ def run_over_ros1(
     ego = programme.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
+    simulated = programme
     if world:
         programme = replace(programme, supply=partial(moved_by, programme.supply, WORLD))
     programme = programme.claim(Ros1.name)
-    programme.rehearse()
+    simulated.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master is not None:
