@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.sessions import rehearse
 from dubins_traffic.protocols import End, Mailbox
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.messages import load
