@@ -65,6 +65,14 @@ class Lawful:
         self._labels: Labels | None = None
         self._commands: Floats | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_state": None, "_labels": None, "_commands": None, "_call": None}
+
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._drivers.seed[:] = seed
+
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
         if state is not self._state or labels is not self._labels or commands is not self._commands:

@@ -130,8 +130,11 @@ class Score(Tabulated):
 class Scorer:
     """A sink that holds all metrics of one trial.
 
-    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut.
+    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut. A copy of
+    it goes on in a fork of its trial.
     """
+
+    forks = True
 
     def __init__(self) -> None:
         self._icra2016 = Icra2016()

@@ -26,15 +26,18 @@ class CommandLine:
     def __init__(self, instance: Instance) -> None:
         disturbances = instance.disturbances
         self._loss = disturbances.command_loss
-        self._seed = np.uint64(instance.seed)
-        self._trial = instance.trial
+        self._instance = instance
         self._under_way = deque([(0.0, 0.0)] * disturbances.command_delay)
         self._latest = (0.0, 0.0)
         self.clear = self._loss == 0.0 and not self._under_way
 
     def carry(self, tick: int, command: tuple[float, float]) -> tuple[float, float]:
         """Return the command in force in this tick."""
-        if self._loss == 0.0 or uniform(self._seed, self._trial, EGO, tick, LOSS_DRAW) >= self._loss:
+        if self._loss == 0.0 or self._draw(tick) >= self._loss:
             self._latest = command
         self._under_way.append(self._latest)
         return self._under_way.popleft()
+
+    def _draw(self, tick: int) -> float:
+        seed = np.uint64(self._instance.seed)
+        return uniform(seed, self._instance.trial, EGO, tick, LOSS_DRAW)
