@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from dubins_traffic.runs.plan import Plan, plan
     from dubins_traffic.runs.single import Result, Trial, run_trial
     from dubins_traffic.runs.sources import load, load_record
+    from dubins_traffic.scoring.judging import Judging
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
-    from dubins_traffic.scoring.verdict import Judging, Verdict
+    from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
     from dubins_traffic.verification.verify import verify
     from dubins_traffic.viewer.plot import plot, write_plot
@@ -57,8 +58,9 @@ _PLACES = {
     "record.writer": ("RecordWriter",),
     "roads.generate": ("generate_network=generate",),
     "roads.network": ("RoadNetwork",),
+    "scoring.judging": ("Judging",),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
-    "scoring.verdict": ("Judging", "Verdict"),
+    "scoring.verdict": ("Verdict",),
     "verification.result": ("Difference", "Verification"),
     "verification.verify": ("verify",),
     "viewer.plot": ("plot", "write_plot"),

@@ -13,6 +13,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
 from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
@@ -160,11 +161,7 @@ def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -
 
 def _place(spec: str, index: int, folder: Path | None) -> str:
     """Return where a controller is, having loaded it once."""
-    path, colon, name = spec.rpartition(":")
-    if colon and path.endswith(".py"):
-        beside = (folder or Path()) / Path(path).expanduser()
-        found = beside if is_file(beside) else Path(path).expanduser()
-        spec = f"{found.resolve()}:{name}"
+    spec = outside.resolved(spec, folder)
     try:
         controllers.load(spec)
     except InputError as error:

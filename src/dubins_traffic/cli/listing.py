@@ -27,6 +27,7 @@ class Subject(StrEnum):
     AGENTS = "agents"
     CONFIGURATIONS = "configurations"
     CONTROLLERS = "controllers"
+    MAP_FORMATS = "map-formats"
     RULES = "rules"
     SIMULATORS = "simulators"
 
@@ -45,7 +46,7 @@ def listing(
         else:
             _print_parameters(rules, "")
         return
-    entries: Sequence[Entry] = getattr(catalogue, subject.value)()
+    entries: Sequence[Entry] = getattr(catalogue, subject.value.replace("-", "_"))()
     if json:
         _print_json(subject, [entry.to_json() for entry in entries])
         return

@@ -17,6 +17,7 @@ from dubins_traffic.agents.registry import names as agent_names
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
+from dubins_traffic.roads.formats.registry import names as format_names
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.simulators.registry import names as simulator_names
 
@@ -122,6 +123,11 @@ def controllers() -> tuple[Entry, ...]:
 def simulators() -> tuple[Entry, ...]:
     """Return the simulators."""
     return tuple(Entry(name, line) for name, line in simulator_names().items())
+
+
+def map_formats() -> tuple[Entry, ...]:
+    """Return the map formats of this and other packages."""
+    return tuple(Entry(name, line) for name, line in format_names().items())
 
 
 def _unit(name: str) -> str:

@@ -24,8 +24,9 @@ from dubins_traffic.scoring.duration import counted_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.verdict import Judging, Verdict
+from dubins_traffic.scoring.verdict import Verdict
 
 _BLOCK = 512
 
