@@ -1,4 +1,4 @@
-"""The verdict on a trial: whether the ego kept the rules of the road, or others broke them before it did."""
+"""The verdict (docs/rules.md#verdicts): whether the ego kept the rules of the road, or others broke them before."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
@@ -40,7 +41,7 @@ _SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
 
 class Ruling(StrEnum):
-    """What is said of a trial (RULES, *Verdicts*)."""
+    """What is said of a trial (docs/rules.md#verdicts)."""
 
     SATISFIED = "satisfied"
     VIOLATED = "violated"
@@ -78,6 +79,11 @@ class Violation:
     since: float
     where: Place
 
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states the rule, as ``docs/rules.md#3.stop``."""
+        return clause(self.rule)
+
     def to_json(self) -> dict[str, Any]:
         """Return the breach as a JSON object: rule, car, time, since, where."""
         return {
@@ -100,6 +106,11 @@ class Excuse:
     assumption: str
     violation: Violation
     sensed: bool
+
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states this part of the assumption, as ``docs/rules.md#E3``."""
+        return clause(self.assumption)
 
     def to_json(self) -> dict[str, Any]:
         """Return the excuse as a JSON object."""
@@ -376,7 +387,7 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3 (docs/rules.md#E1)."""
     return rule[:2] if rule.startswith("E") else "E1"
 
 
