@@ -66,7 +66,7 @@ def random_network(
     slack: float = SEGMENT_SLACK,
     rigid_motion: bool = False,
 ) -> RoadNetwork:
-    """Return a random planar, connected network that keeps the clearances of RULES, *Ground*.
+    """Return a random planar, connected network that keeps the clearances of docs/rules.md#room.
 
     Parameters
     ----------
