@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.configuration import Configuration, load_config
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
+from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import Score
 
 KINDS: tuple[Mapping[str, Any], ...] = (
@@ -102,3 +106,27 @@ def plain(found: Score) -> Mapping[str, Any]:
         for name, value in found.to_json().items()
         if name not in ("time_to_begin_s", "record", "controller")
     }
+
+
+def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[str, np.ndarray]:
+    """Return the arrays that an object holds, itself or by what it holds, but for those of values that never change."""
+    seen = set() if seen is None else seen
+    if id(value) in seen or isinstance(value, Instance | Problem | RoadNetwork | str | type):
+        return {}
+    seen.add(id(value))
+    if isinstance(value, np.ndarray):
+        return {name: value}
+    if isinstance(value, Mapping):
+        parts = {str(key): part for key, part in value.items()}
+    elif isinstance(value, list | tuple | deque):
+        parts = {str(k): part for k, part in enumerate(value)}
+    else:
+        slots = [slot for kind in type(value).__mro__ for slot in getattr(kind, "__slots__", ())]
+        parts = {
+            **getattr(value, "__dict__", {}),
+            **{s: getattr(value, s) for s in slots if hasattr(value, s)},
+        }
+    found: dict[str, np.ndarray] = {}
+    for key, part in parts.items():
+        found |= arrays_in(part, f"{name}.{key}", seen)
+    return found

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from hypothesis import strategies as st
 import dubins_traffic as dt
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch_kernel import World
+from dubins_traffic.engine.controlled import Controlled
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.problem.draw import draw
@@ -24,9 +27,14 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Capabilities, Controller
 from dubins_traffic.runs.single import Trial
 from dubins_traffic.scoring.score import Scorer
+from dubins_traffic.sessions.remote import hand_over
 from dubins_traffic.simulators.embedded import Embedded
+from dubins_traffic.transports.clocks import Lockstep
+from dubins_traffic.transports.lines import Lines
+from dubins_traffic.transports.link import Link
 from dubins_traffic.trial.trial import FORKED
-from tests.forks import KINDS, WORLDS, Kept, configuration, plain
+from tests.forks import KINDS, WORLDS, Kept, arrays_in, configuration, plain
+from tests.property.test_batch import Wheel
 
 SEED = 5
 
@@ -86,6 +94,20 @@ def test_a_fork_and_a_fork_of_it_equal_a_trial_that_nobody_has_forked(
     kinds: Sequence[Any], world: str, rules: bool, at: int, later: int, trial: int
 ) -> None:
     check_forks(draw(configuration(kinds, world, rules, seconds=2), SEED, trial), at, later)
+
+
+def test_a_trial_and_its_fork_share_no_array() -> None:
+    instance = draw(configuration(KINDS, "laser", rules=True), SEED, 0)
+    trial = begun(instance)
+    swung(trial, 40)
+    fork = trial.fork()
+    swung(fork, 1)
+    swung(trial, 1)
+    here, there = arrays_in(trial), arrays_in(fork)
+    assert here.keys() == there.keys()
+    assert len(here) > 100
+    for name, array in here.items():
+        assert not any(np.may_share_memory(array, other) for other in there.values()), name
 
 
 @pytest.mark.parametrize("at", [0, 45])
@@ -206,6 +228,17 @@ class Elsewhere(Embedded):
     capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
 
 
+def test_e_agents_that_programs_elsewhere_drive_are_refused() -> None:
+    instance = draw(configuration(KINDS[2:3], "plain", rules=False), SEED, 0)
+    link = Link(Lines(), Lockstep())
+    with (
+        closing(link.transport),
+        Trial(hand_over(instance, ["nemesis"]), link=link) as trial,
+        pytest.raises(InputError, match="elsewhere"),
+    ):
+        trial.fork()
+
+
 def test_a_simulator_that_can_t_go_on_twice_is_refused() -> None:
     instance = draw(configuration((), "plain", rules=False), SEED, 0)
     with pytest.raises(InputError, match="simulator"):
@@ -273,7 +306,8 @@ def shared(one: Group, other: Group) -> list[str]:
 
 
 def test_forks_of_a_batch_with_other_seeds_go_other_ways() -> None:
-    group = group_of(KINDS[3:4], "plain", rules=True, keeps_rules=True, seconds=12)
+    many = [{**KINDS[0], "count": 3}, {**KINDS[3], "count": 4}]
+    group = group_of(many, "plain", rules=True, keeps_rules=True, seconds=14)
     group.advance(20)
     forks = group.fork([1] * 6, seeds=[SEED, SEED, 7, 7, 8, 10])
     assert [own.seed for own in forks.instances] == [SEED, SEED, 7, 7, 8, 10]
@@ -297,3 +331,39 @@ def test_forks_of_a_batch_of_so_many_cars_that_they_are_looked_for_in_cells() ->
     assert [plain(own.score) for own in forks.outcomes([0, 1], "rules")] == [
         plain(own.score) for own in group.outcomes([2, 0], "rules")
     ]
+
+
+def asked(controlled: Controlled, ticks: int = 10**6) -> dict[int, Any]:
+    """Let the controllers of a group drive for some ticks, or to the end; return what came of trials, by number."""
+    found: dict[int, Any] = {}
+    while len(controlled.group.active) and ticks > 0:
+        ticks -= 1
+        controlled.ask_each()
+        before = set(controlled.group.active.tolist())
+        ended = list(controlled.step("any"))
+        gone = sorted(before - set(controlled.group.active.tolist()))
+        assert len(gone) == len(ended)
+        found |= {b: (own.ending, plain(own.score)) for b, own in zip(gone, ended, strict=True)}
+    return found
+
+
+@pytest.mark.parametrize("world", ["noise", "lossy", "laser"])
+@pytest.mark.parametrize("controller", ["rules", "lanes+shield"])
+def test_forks_of_trials_whose_controllers_are_asked_equal_the_trials(world: str, controller: str) -> None:
+    config = configuration(KINDS[:4], world, True, seconds=3)
+    own = Controlled([draw(config, SEED, k) for k in range(2)], partial(controllers.load, controller), None)
+    assert asked(own, 40) == {}
+    forks = own.fork([1, 0, 1])
+    others = own.fork([1, 1], seeds=[SEED, SEED + 1])
+    wanted = asked(own)
+    assert asked(forks) == {0: wanted[1], 1: wanted[0], 2: wanted[1]}
+    found = asked(others)
+    assert found[0] == wanted[1]
+    assert found[1] != wanted[1]
+
+
+def test_a_controller_of_whole_batches_does_not_go_on_twice() -> None:
+    config = configuration((), "plain", rules=False)
+    own = Controlled([draw(config, SEED, 0)], Wheel, Wheel())
+    with pytest.raises(DubinsTrafficError, match="whole batches"):
+        own.fork([0])

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from dubins_traffic.agents.tables import TRAIL, Agents
 from dubins_traffic.cars.rows import rows
@@ -30,7 +31,7 @@ class Ragged(NamedTuple):
     row: Ints
 
 
-def world_of(world: World, trials: Ints, seeds: Ints | None, dt: float) -> World:
+def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt: float) -> World:
     """Return the tables of forks of some trials, one of which may be named more than once.
 
     The batch and its forks share nothing that changes.
@@ -84,9 +85,10 @@ def rows_of(table: Table, trials: Ints, **other: Any) -> Table:
 
 def ragged(off: Ints, trials: Ints) -> Ragged:
     """Return the rows of `trials` out of rows with the offsets `off` (B + 1,), and their offsets (K + 1,)."""
-    spans = [np.arange(off[b], off[b + 1]) for b in trials.tolist()]
-    ends = np.cumsum([0, *(len(span) for span in spans)], dtype=np.int64)
-    return Ragged(ends, np.concatenate([np.zeros(0, dtype=np.int64), *spans]))
+    first, count = off[trials], np.diff(off)[trials]
+    ends = np.append(0, count.cumsum())
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(first - ends[:-1], count)
+    return Ragged(ends, rows)
 
 
 def _copied(table: Table) -> Table:

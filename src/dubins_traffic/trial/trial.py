@@ -16,7 +16,7 @@ from dubins_traffic.protocols import Draws, Driver, End, Ending, Reports, Scans,
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
-from dubins_traffic.trial.endings import agent_fault, checked_command, collision_detail
+from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.interrupts import WHOLE
 
 if TYPE_CHECKING:
@@ -116,12 +116,10 @@ class Trial:
         if self.ending is not None:
             raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): make a new one")
         try:
-            speed, yaw = checked_command(command, self._tick)
+            speed, yaw = self._line.take(self._tick, command)
         except ControllerError as error:
             self.end(End.CONTROLLER_FAULT, error.detail)
             raise
-        if not self._line.clear:
-            speed, yaw = self._line.carry(self._tick, (speed, yaw))
         commands = self._commands
         for agent in self._agents:
             agent.decide(self._tick, self._state, self._labels, commands)
