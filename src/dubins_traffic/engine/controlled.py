@@ -21,6 +21,7 @@ from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Controller, End, Reports
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
+from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import checked_command
 from dubins_traffic.trial.run import close, told
@@ -75,8 +76,14 @@ Maker = Callable[[], Controller]
 class _Seats:
     """The egos of one group of trials."""
 
-    def __init__(self, instances: Sequence[Instance], make: Maker, shared: BatchController | None) -> None:
-        self.group = Group(instances, keeps_rules=False)
+    def __init__(
+        self,
+        instances: Sequence[Instance],
+        make: Maker,
+        shared: BatchController | None,
+        metrics: Sequence[MetricMaker],
+    ) -> None:
+        self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
         self._senses = [Senses(instance) for instance in instances] if shared is None else []
         self._views = [self._of_trial(b) for b in range(len(instances))]
@@ -134,6 +141,8 @@ class _Seats:
         if heard:
             pairs = cast("Sequence[tuple[str, str]]", self._answer)
             self._interventions[b] += sum(kind == SHIELD for kind, _ in pairs)
+            for kind, detail in pairs:
+                self.group.note(b, kind, detail)
         self._answer = answer
         return heard
 
@@ -217,6 +226,7 @@ def ask(
     controller: str,
     batch: int,
     cancelled: Callable[[], bool] = lambda: False,
+    metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
     """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
 
@@ -232,6 +242,8 @@ def ask(
         Its name.
     batch
         How many trials run at a time.
+    metrics
+        What makes further metrics for a trial.
     """
     made = make()
     shared = made if isinstance(made, BatchController) else None
@@ -245,7 +257,7 @@ def ask(
         for own in grouped(taken):
             if shared is not None:
                 _check_clear(own)
-            seats.append(_Seats(own, make, shared))
+            seats.append(_Seats(own, make, shared, metrics))
         if not seats:
             return
         if shared is None:
