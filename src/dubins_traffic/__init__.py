@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dubins_traffic.runs.single import Result, Trial, run_trial
     from dubins_traffic.runs.sources import load, load_record
     from dubins_traffic.scoring.judging import Judging
+    from dubins_traffic.scoring.metric import Column, Metric
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
     from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
@@ -59,6 +60,7 @@ _PLACES = {
     "roads.generate": ("generate_network=generate",),
     "roads.network": ("RoadNetwork",),
     "scoring.judging": ("Judging",),
+    "scoring.metric": ("Column", "Metric"),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
     "scoring.verdict": ("Verdict",),
     "verification.result": ("Difference", "Verification"),
@@ -79,6 +81,7 @@ __all__ = [
     "Bounds",
     "CampaignResults",
     "Car",
+    "Column",
     "Command",
     "Configuration",
     "Contact",
@@ -96,6 +99,7 @@ __all__ = [
     "Instance",
     "Job",
     "Judging",
+    "Metric",
     "Observation",
     "Plan",
     "PolygonObstacle",

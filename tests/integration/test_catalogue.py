@@ -56,7 +56,7 @@ def test_configurations_with_a_line_each(capsys):
 
 
 @pytest.mark.parametrize(
-    "subject", ["agents", "configurations", "controllers", "map-formats", "rules", "simulators"]
+    "subject", ["agents", "configurations", "controllers", "map-formats", "metrics", "rules", "simulators"]
 )
 def test_all_of_it_as_json(subject, capsys):
     found: list[dict[str, Any]] = json.loads(listed(capsys, subject, "--json"))[subject]

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from dubins_traffic.runs.catalogue import Entry, Parameter
 
-EXAMPLES = options.examples("list agents", "list rules", "list configurations --json", "list controllers")
+EXAMPLES = options.examples(
+    "list agents", "list rules", "list configurations --json", "list controllers", "list metrics"
+)
 WIDTH = 100
 """Columns of what is listed."""
 
@@ -28,6 +30,7 @@ class Subject(StrEnum):
     CONFIGURATIONS = "configurations"
     CONTROLLERS = "controllers"
     MAP_FORMATS = "map-formats"
+    METRICS = "metrics"
     RULES = "rules"
     SIMULATORS = "simulators"
 
