@@ -19,7 +19,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES)
 @session.shared
 def run(
-    asked: session.Asked,
+    asked: session.SessionOptions,
     url: Annotated[
         str | None,
         typer.Option(

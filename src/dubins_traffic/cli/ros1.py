@@ -22,7 +22,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES, context_settings={"allow_extra_args": True})
 @session.shared
 def run(
-    asked: session.Asked,
+    asked: session.SessionOptions,
     context: typer.Context,
     master: Annotated[
         bool,

@@ -21,7 +21,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES)
 @session.shared
 def run(
-    asked: session.Asked,
+    asked: session.SessionOptions,
     domain: Annotated[
         int | None,
         typer.Option(

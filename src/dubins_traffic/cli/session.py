@@ -57,7 +57,7 @@ Clock = Annotated[
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class SessionOptions:
     """What the options say that all of these commands share."""
 
     source: options.Source
@@ -102,22 +102,22 @@ class Asked:
 
 
 def shared(own: Callable[..., None]) -> Callable[..., None]:
-    """Return a command with the options of `own`, but for its first parameter, and those of `Asked`, which it is given.
+    """Return a command with the options of `own`, except its first parameter, and those of `SessionOptions`.
 
-    The library reads options off a signature, so this makes one.
+    `own` is given these as its first argument. The library reads options off a signature, so this makes one.
     """
 
     @wraps(own)
     def command(**given: Any) -> None:
-        asked = Asked(**{name: given.pop(name) for name in hints})
+        asked = SessionOptions(**{name: given.pop(name) for name in hints})
         own(asked, **given)
 
-    hints = get_type_hints(Asked, include_extras=True)
+    hints = get_type_hints(SessionOptions, include_extras=True)
     own_hints = get_type_hints(own, include_extras=True)
     _, *rest = signature(own).parameters.values()
     parameters = [
         *(one.replace(kind=Parameter.KEYWORD_ONLY, annotation=own_hints[one.name]) for one in rest),
-        *(one.replace(annotation=hints[one.name]) for one in signature(Asked).parameters.values()),
+        *(one.replace(annotation=hints[one.name]) for one in signature(SessionOptions).parameters.values()),
     ]
     command.__signature__ = Signature(parameters)  # pyright: ignore[reportAttributeAccessIssue]
     command.__annotations__ = {one.name: one.annotation for one in parameters}
