@@ -54,7 +54,7 @@ Silence = Annotated[
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class SessionOptions:
     """What the options say that all of these commands share."""
 
     source: options.Source
@@ -109,23 +109,23 @@ def app(name: str, entry: TransportEntry) -> typer.Typer:
 
 
 def command(name: str, entry: TransportEntry) -> Callable[..., None]:
-    """Return the function that runs a session over a transport, with its own options and those of `Asked`.
+    """Return the function that runs a session over a transport, with its own options and those of `SessionOptions`.
 
-    The library reads options off a signature, so this makes one.
+    `own` is given these as its first argument. The library reads options off a signature, so this makes one.
     """
 
     def run(**given: Any) -> None:
         context: typer.Context = given.pop("context")
-        asked = Asked(**{name: given.pop(name) for name in hints})
+        asked = SessionOptions(**{name: given.pop(name) for name in hints})
         _check_remappings(name, context.args)
         todo = asked.session_plan()
         run_session(todo, entry.runner(todo, asked.pace(), **given), json=asked.json)
 
-    hints = get_type_hints(Asked, include_extras=True)
+    hints = get_type_hints(SessionOptions, include_extras=True)
     parameters = [
         Parameter("context", Parameter.KEYWORD_ONLY, annotation=typer.Context),
         *map(_parameter, entry.options),
-        *(one.replace(annotation=hints[one.name]) for one in signature(Asked).parameters.values()),
+        *(one.replace(annotation=hints[one.name]) for one in signature(SessionOptions).parameters.values()),
     ]
     run.__doc__ = entry.about
     run.__signature__ = Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]

@@ -108,7 +108,7 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
         always(negation(prop(f"collision_{ego}"))),
         always(implies(yesterday(on_road), on_road)),
         *visits,
-        *_conduct(ego, crossings, rules),
+        *_rules_2_and_3(ego, crossings, rules),
     ]
     assumptions = [formula for name in others for formula in _assumed(name, crossings, rules)]
     if rules.assume_e6:
@@ -116,7 +116,7 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
     return _specification(assumptions, guarantees, ego)
 
 
-def _conduct(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
+def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
     """Return rules 2 and 3 for a car."""
     left = prop(f"left_{name}")
     found = [
@@ -139,7 +139,7 @@ def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> li
     if rules.assume_e1 and rules.exceptions:
         found.append(always(negation(prop(f"excess_{name}"))))
     elif rules.assume_e1:
-        found += _conduct(name, crossings, rules)
+        found += _rules_2_and_3(name, crossings, rules)
     if rules.assume_e2:
         found.append(always(negation(prop(f"at_fault_{name}"))))
     if rules.assume_e3:
