@@ -140,6 +140,15 @@ def is_shut(
     net, build = drivers.net[b], drivers.build[b]
     if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
         return True
+    return stands_in_disc(b, lane, out, roads, obstacles, drivers)
+
+
+@jit
+def stands_in_disc(
+    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> bool:
+    """Tell whether an obstacle is in the way through the disc from a lane to the lane `out`."""
+    net, build = drivers.net[b], drivers.build[b]
     way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
     wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.driving.barred import stands_in_disc
 from dubins_traffic.driving.exits import BARRED, cheapest, price_exits, ticks_of
-from dubins_traffic.driving.law_tables import CROSSING, LANE, NEXT, WAITED, Desk, Drivers
-from dubins_traffic.driving.room import has_room, room_in
+from dubins_traffic.driving.law_tables import CROSSING, LANE, NEXT, WAITED, WITHIN, Desk, Drivers
+from dubins_traffic.driving.room import has_room, is_free, is_open, room_in
 from dubins_traffic.driving.turn_arcs import BEFORE
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import INFINITE, lane_end
@@ -15,6 +16,9 @@ from dubins_traffic.roads.table import RoadTable
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
 asked, and on its way to another exit it might leave the disc outside its lane."""
+LATE = 1.0
+"""Who has been in a crossing for so long, seconds, keeps to its exit while this is open, though there may be no room
+behind what drives there: on the way to another it might not leave the disc in time."""
 
 
 @jit
@@ -74,13 +78,60 @@ def take_widest(
 
 
 @jit
+def take_last_resort(
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
+    desk: Desk,
+) -> bool:  # fmt: skip
+    """Choose an exit beyond which obstacles bar the way, or else one that is open, though there is no room.
+
+    Tells whether there is any. `desk.cost` has what they count.
+    """
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    v = lane_end(roads, net, ints[LANE])
+    row = roads.vert_off[net] + v
+    wide = opened = 0
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        if out == ints[NEXT] or stands_in_disc(b, ints[LANE], out, roads, obstacles, drivers):
+            continue
+        if has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, desk):
+            wide |= 1 << k
+        elif desk.cost[k] < BARRED and is_open(b, n, out, state, labels, roads, drivers, desk):
+            opened |= 1 << k
+    best = cheapest(v, roads.vert_off[net], wide if wide != 0 else opened, roads, desk)
+    if best >= 0:
+        ints[NEXT] = best
+    return best >= 0
+
+
+@jit
+def take_way_on(
+    b: int, n: int, state: State, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, desk: Desk
+) -> None:
+    """Choose an exit that is free as E4 says, whatever bars the way beyond, for who would turn round in a bend."""
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    row = roads.vert_off[net] + lane_end(roads, net, ints[LANE])
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        on = out != ints[LANE] ^ 1 and not stands_in_disc(b, ints[LANE], out, roads, obstacles, drivers)
+        if on and is_free(b, n, out, state, roads, drivers, desk):
+            ints[NEXT] = out
+
+
+@jit
 def turn_elsewhere(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
     drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
-    if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, desk):
-        drivers.ints[b, n, WAITED] = 0
+    ints = drivers.ints[b, n]
+    found = take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, desk)
+    if not found and not is_open(b, n, ints[NEXT], state, labels, roads, drivers, desk):
+        found = take_last_resort(b, n, state, labels, roads, obstacles, drivers, desk)
+    if found:
+        ints[WAITED] = 0
 
 
 @jit
@@ -88,14 +139,20 @@ def find_way_out(
     b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
     drivers: Drivers, desk: Desk,
 ) -> None:  # fmt: skip
-    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
+    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while.
+
+    Who has been in a crossing for a while does so only if its own exit is taken.
+    """
     ints = drivers.ints[b, n]
     build = drivers.build[b]
     crossing = drivers.way[b, n, CROSSING] != 0.0
     if not crossing and (part == BEFORE or ints[WAITED] <= ticks_of(STUCK, build)):
         return
-    if crossing and tick % 4 != 0:
-        return
-    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
-        return
+    if crossing:
+        ints[WITHIN] += 1
+        if tick % 4 != 0 or has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, desk):
+            return
+        late = ints[WITHIN] > ticks_of(LATE, build)
+        if late and is_open(b, n, ints[NEXT], state, labels, roads, drivers, desk):
+            return
     turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, desk)

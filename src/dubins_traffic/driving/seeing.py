@@ -188,6 +188,12 @@ def around(way: Way) -> float:
 
 
 @jit_inline
+def chord(way: Way) -> float:
+    """Return metres between the ends of the arc of a way: it is at least so long."""
+    return way.radius * sqrt(2.0 * max(1.0 - way.tx * way.ux - way.ty * way.uy, 0.0))
+
+
+@jit_inline
 def see_obstacles(
     b: int, part: int, key: float, x: float, y: float, way: Way, low: float, high: float,
     gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
@@ -216,7 +222,7 @@ def see_obstacles(
             continue
         distance = sqrt(d2)
         if there - part == 2:
-            distance = max(distance, its_key - key + around(way))
+            distance = max(distance, its_key - key + max(around(way), chord(way)))
         its_gap = distance - build[REACH] - row[7]
         if its_gap < gap:
             gap = its_gap

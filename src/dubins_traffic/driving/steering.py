@@ -25,6 +25,7 @@ from dubins_traffic.driving.law_tables import (
     Desk,
     Drivers,
 )
+from dubins_traffic.driving.narrow import within_lane
 from dubins_traffic.driving.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.driving.standing import stays_right
 from dubins_traffic.driving.turn_arcs import Way
@@ -70,6 +71,12 @@ def move(
     if not safe and passes and offset == 0.0:
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+        )
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
+    elif not safe and passes and within_lane(drivers.floats[b, n, ASIDE], build):
+        across = 1.0 if left > offset else -1.0
+        speed, yaw_rate = steer(
+            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, build[TIGHTEST], build[PERIOD]
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, desk)
     if not safe:
