@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.barred import stands_in_disc
+from dubins_traffic.driving.barred import has_place, stands_in_disc
 from dubins_traffic.driving.exits import BARRED, cheapest, price_exits, ticks_of
-from dubins_traffic.driving.law_tables import CROSSING, LANE, NEXT, WAITED, WITHIN, Desk, Drivers
+from dubins_traffic.driving.law_tables import BACKS_UP, CROSSING, LANE, NEXT, WAITED, WITHIN, Desk, Drivers
 from dubins_traffic.driving.room import has_room, is_free, is_open, room_in
 from dubins_traffic.driving.turn_arcs import BEFORE
 from dubins_traffic.kernels.compile import jit
@@ -78,28 +78,40 @@ def take_widest(
 
 
 @jit
+def leads_out(
+    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> bool:
+    """Tell whether obstacles leave a car that comes by a lane the way out of the disc to `out`."""
+    through = not stands_in_disc(b, lane, out, roads, obstacles, drivers)
+    return through and has_place(b, out, roads, obstacles, drivers)
+
+
+@jit
 def take_last_resort(
     b: int, n: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
     desk: Desk,
 ) -> bool:  # fmt: skip
-    """Choose an exit beyond which obstacles bar the way, or else one that is open, though there is no room.
+    """Choose an exit for a car that finds room in none of those it wants; tell whether there is any.
 
-    Tells whether there is any. `desk.cost` has what they count.
+    First come those that are open and lack but the room into which the ego might back up, then those in which there is
+    room before an obstacle that bars the way, then all that are open. `desk.cost` has what they count.
     """
     net = drivers.net[b]
     ints = drivers.ints[b, n]
     v = lane_end(roads, net, ints[LANE])
     row = roads.vert_off[net] + v
-    wide = opened = 0
+    ample = barred = opened = 0
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        if out == ints[NEXT] or stands_in_disc(b, ints[LANE], out, roads, obstacles, drivers):
-            continue
-        if has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, desk):
-            wide |= 1 << k
-        elif desk.cost[k] < BARRED and is_open(b, n, out, state, labels, roads, drivers, desk):
-            opened |= 1 << k
-    best = cheapest(v, roads.vert_off[net], wide if wide != 0 else opened, roads, desk)
+        room = room_in(b, n, out, 0, state, labels, roads, obstacles, drivers, desk)
+        if desk.cost[k] < BARRED:
+            if is_open(b, n, out, state, labels, roads, drivers, desk):
+                opened |= 1 << k
+                ample |= 1 << k if room >= -drivers.build[b, BACKS_UP] else 0
+        elif room >= 0.0 and leads_out(b, ints[LANE], out, roads, obstacles, drivers):
+            barred |= 1 << k
+    allowed = ample if ample != 0 else (barred if barred != 0 else opened)
+    best = cheapest(v, roads.vert_off[net], allowed, roads, desk)
     if best >= 0:
         ints[NEXT] = best
     return best >= 0
@@ -115,7 +127,7 @@ def take_way_on(
     row = roads.vert_off[net] + lane_end(roads, net, ints[LANE])
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        on = out != ints[LANE] ^ 1 and not stands_in_disc(b, ints[LANE], out, roads, obstacles, drivers)
+        on = out != ints[LANE] ^ 1 and leads_out(b, ints[LANE], out, roads, obstacles, drivers)
         if on and is_free(b, n, out, state, roads, drivers, desk):
             ints[NEXT] = out
 

@@ -41,6 +41,8 @@ the largest distance between centres, at which it still counts as blocking the l
 """
 FACING_GAP = 0.8
 """Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
+OBSTACLE_GAP = 0.04
+"""Gap kept in a disc from an obstacle behind it, metres: it never moves, and who comes near may pass it then."""
 CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
 SIDE, NARROW = 0.04, 0.02
@@ -249,7 +251,7 @@ def wanted_gap(
     if labels.bits[b, n] & LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
-        return QUEUE_GAP if labels.crosses[b, n] >= 0 else standing
+        return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
     if ints[MOOD] & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
