@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
-from dubins_traffic.campaign.batch import outcomes
-from dubins_traffic.campaign.group import Group
+from dubins_traffic.engine.batch import outcomes
+from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many

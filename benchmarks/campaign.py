@@ -27,12 +27,12 @@ from benchmarks.batch import configuration
 from benchmarks.table import Row
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.conduct import run_campaign, run_left
-from dubins_traffic.campaign.engine import Engine
-from dubins_traffic.campaign.many import Job, run_trials
+from dubins_traffic.campaign.engines import Engine
 from dubins_traffic.campaign.pool import Pool
 from dubins_traffic.campaign.ray_engine import RayEngine
-from dubins_traffic.campaign.work import Surroundings
+from dubins_traffic.campaign.run_campaign import run_campaign, run_left
+from dubins_traffic.campaign.worker import Surroundings
+from dubins_traffic.runs.jobs import Job, run_trials
 
 TRIALS = 20_000
 BARE = 2_000

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from benchmarks.table import Row
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.runs.single import run_trial
 
 SECONDS: Final = 300.0
 SETTLED: Final = 100.0

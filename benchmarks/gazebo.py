@@ -22,7 +22,6 @@ from time import perf_counter, sleep
 import numpy as np
 
 from benchmarks.table import Row
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import EGO, Frames, Pose
 from dubins_traffic.errors import InputError
@@ -31,6 +30,7 @@ from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.simulators.embedded import Embedded
 from dubins_traffic.simulators.gazebo.prefix import Installation, find

@@ -16,10 +16,10 @@ from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Referee
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.spec.judge import Referee
-from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.parameters import RuleParameters
 
 TRIALS, TICKS, WARM = 512, 150, 3
 

@@ -12,12 +12,12 @@ import numpy as np
 from lcm import LCM
 
 from benchmarks.table import Row
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Mailbox, View
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.lcm import connection
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import command_t, state_t

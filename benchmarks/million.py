@@ -16,7 +16,7 @@ from time import perf_counter
 from benchmarks.batch import configuration
 from benchmarks.table import Row
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.conduct import run_campaign
+from dubins_traffic.campaign.run_campaign import run_campaign
 
 TRIALS = 1_000_000
 WORKERS = 2

@@ -10,11 +10,11 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.table import Row
+from dubins_traffic.logic.formula import propositions
+from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.spec.logic.formula import propositions
-from dubins_traffic.spec.logic.monitor import Monitors
-from dubins_traffic.spec.task import task
+from dubins_traffic.rules.task import task
 
 FRAMES, TURNS = 300, 5
 BAR = 1e7

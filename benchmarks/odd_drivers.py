@@ -11,9 +11,9 @@ from typing import Final
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.driving.guard import Guard
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.spec.propositions import APPROACH, CLEAR, FIRST, LEFT, STOPPED
+from dubins_traffic.rules.propositions import APPROACH, CLEAR, FIRST, LEFT, STOPPED
+from dubins_traffic.shield.filter import ShieldFilter
 
 GOES: Final = STOPPED | FIRST | CLEAR
 NEAR: Final = 2.5
@@ -40,7 +40,7 @@ class Odd:
         self.dice = random.Random(seed)
         self.law = Command(0.0, 0.0)
         self._rules = Rules()
-        self._guard = Guard()
+        self._shield_filter = ShieldFilter()
         self._hold: tuple[float, float] = (0.0, 0.0)
         self._until = -1
         self._crosses = self._at = -1
@@ -51,7 +51,7 @@ class Odd:
         self.problem = problem
         self.bounds = problem.car.bounds
         self._rules.start(problem)
-        self._guard.start(problem)
+        self._shield_filter.start(problem)
 
     def act(self, observation: Observation) -> Command:
         """Do as the habit says, as far as the shield lets it."""
@@ -59,7 +59,7 @@ class Odd:
         asked = self._hold if observation.tick < self._until else self.habit(observation)
         seen = observation.propositions
         self._crosses, self._at, self._bits = seen.crosses, seen.at, seen.bits
-        return self._guard.filter(observation, asked)
+        return self._shield_filter.filter(observation, asked)
 
     def habit(self, observation: Observation) -> tuple[float, float]:
         """Return the speed and yaw rate asked for in this tick."""

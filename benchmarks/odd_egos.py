@@ -24,10 +24,10 @@ from benchmarks.drawing import random_roads, random_trial
 from benchmarks.odd_drivers import KINDS
 from benchmarks.rules import e_agents
 from benchmarks.table import Row, show
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End
+from dubins_traffic.runs.single import run_trial
 
 DURATION = 120.0
 SEED = 2016

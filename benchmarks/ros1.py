@@ -20,9 +20,9 @@ import numpy as np
 
 import dubins_traffic as dt
 from benchmarks.table import Row
-from dubins_traffic.campaign.sessions import rehearse
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.protocols import Clock, View
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.ros1.debian import MissingRosError

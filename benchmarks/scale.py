@@ -10,8 +10,8 @@ from time import process_time
 
 from benchmarks.batch import configuration
 from benchmarks.table import Row
-from dubins_traffic.campaign.group import Group
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.engine.group import Group
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import EAgent, Instance

@@ -23,22 +23,22 @@ from benchmarks.drawing import random_roads, random_trial
 from benchmarks.rules import e_agents
 from benchmarks.shield_hostile import KINDS, Hostile
 from benchmarks.table import Row, show
-from dubins_traffic.campaign.asked import grouped
-from dubins_traffic.campaign.group import Group
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import desk
-from dubins_traffic.driving.shield import shield
-from dubins_traffic.driving.shield_tables import REASON, REASONS, egos, guards
+from dubins_traffic.engine.controlled import grouped
+from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.tables import scratch
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
-from dubins_traffic.spec.propositions import LEFT
+from dubins_traffic.shield.nearest_command import shield
+from dubins_traffic.shield.tables import REASON, REASONS, egos, guards
 
 DURATION = 60.0
 SEED = 2016
@@ -124,7 +124,7 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
     bodies = pack_obstacles([problem.obstacles for problem in problems])
     law, drivers = egos(problems, places, net), egos(problems, places, net)
     watch = guards(problems, roads, net)
-    room = desk(places, int(np.diff(roads.seg_off).max()))
+    room = scratch(places, int(np.diff(roads.seg_off).max()))
     hostile = Hostile(kinds, law.build, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
     passed, aside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
@@ -170,7 +170,9 @@ def ruled(number: int, seconds: float = DURATION) -> Shielded:
     """Run a trial of the controller `rules` under the shield."""
     driver, own = Shield("rules"), instance(number, seconds)
     score = run_trial(own, driver).score
-    return _shielded(own, "rules", score, {"": driver.guard.count} if driver.guard.count else {})
+    return _shielded(
+        own, "rules", score, {"": driver.shield_filter.count} if driver.shield_filter.count else {}
+    )
 
 
 def bars(found: Sequence[Shielded]) -> list[Row]:

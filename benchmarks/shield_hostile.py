@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.driving.law_tables import FASTEST, MIDDLE, SLOWEST, YAW_MOST
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.policies.rules.tables import FASTEST, MIDDLE, SLOWEST, YAW_MOST
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.propositions import LEFT
+from dubins_traffic.rules.propositions import LEFT
 
 LAG = 15
 """By how many ticks `lags` drives late."""

@@ -7,9 +7,9 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from benchmarks.table import Row
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.single import run_trial
 
 TURNS = 40
 

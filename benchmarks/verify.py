@@ -19,9 +19,9 @@ from typing import Any
 
 import dubins_traffic as dt
 from benchmarks.table import Row, show
-from dubins_traffic.campaign.remote import hand_over
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.sessions.remote import hand_over
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.lines_client import drive

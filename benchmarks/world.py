@@ -6,9 +6,9 @@ from time import process_time
 
 from benchmarks.batch import configuration
 from benchmarks.table import Row
-from dubins_traffic.campaign.single import Trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.single import Trial
 
 ROUNDS = 20
 

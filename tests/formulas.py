@@ -9,7 +9,7 @@ from random import Random
 
 import numpy as np
 
-from dubins_traffic.spec.logic.formula import FALSE, TRUE, Formula, Op, conj, disj, make, prop
+from dubins_traffic.logic.formula import FALSE, TRUE, Formula, Op, conj, disj, make, prop
 
 _UNARY = (Op.NOT, Op.X, Op.F, Op.G)
 _BINARY = (Op.U, Op.R, Op.W, Op.M, Op.IMPLIES, Op.IFF, Op.AND, Op.OR, Op.AND, Op.OR)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
 from tests.rules_reference import Car, Reference
 from tests.rules_scripts import Frame
 

@@ -12,7 +12,7 @@ import numpy as np
 from dubins_traffic.cars.state import Contact, Frames, State
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.judge import Breach, Referee
+from dubins_traffic.rules.referee import Breach, Referee
 from tests.rules_scripts import KITE, Frame, fill, on_lane
 from tests.rules_scripts import instance as bare_instance
 

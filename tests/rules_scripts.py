@@ -13,8 +13,8 @@ from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Labels, Pose, State
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.propositions import names
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.propositions import names
 
 Frame = list[tuple[float, float, float, float]]
 

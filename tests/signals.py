@@ -1,4 +1,4 @@
-"""What the formulas of `spec.task` say of a recorded trial: when each is first broken, and its last verdict."""
+"""What the formulas of `rules.task` say of a recorded trial: when each is first broken, and its last verdict."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from dubins_traffic.cars.state import EGO, NONE, Frames
+from dubins_traffic.logic.automaton import VERDICTS
+from dubins_traffic.logic.formula import TRUE, Formula, always, conj, eventually, propositions
+from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach
+from dubins_traffic.rules.task import task
+from dubins_traffic.rules.valuation import Valuation
 from dubins_traffic.scoring.verdict import first_fall
-from dubins_traffic.spec.judge import Breach
-from dubins_traffic.spec.logic.automaton import VERDICTS
-from dubins_traffic.spec.logic.formula import TRUE, Formula, always, conj, eventually, propositions
-from dubins_traffic.spec.logic.monitor import Monitors
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.task import task
-from dubins_traffic.spec.valuation import Valuation
 
 Key: TypeAlias = tuple[str, int, int]
 """A rule, a car and an intersection (-1: none)."""

@@ -17,7 +17,7 @@ from dubins_traffic.cars.state import Pose
 from dubins_traffic.files import replace_file
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import METADATA, Canvas
 from dubins_traffic.viewer.plot import STYLE

@@ -9,16 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.batch import Batch, run_batch
-    from dubins_traffic.campaign.conduct import run_campaign
-    from dubins_traffic.campaign.many import Job, run_trials
-    from dubins_traffic.campaign.plan import Plan, plan
     from dubins_traffic.campaign.results import CampaignResults, load_results
-    from dubins_traffic.campaign.single import Result, Trial, run_trial
-    from dubins_traffic.campaign.sources import load, load_record
+    from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
     from dubins_traffic.cars.state import Command, Contact, Frames, Observation, Pose, SensedCar, Twist
     from dubins_traffic.controllers.shield import Shield
+    from dubins_traffic.engine.batch import Batch, run_batch
     from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
     from dubins_traffic.problem.configuration import Configuration, load_config
     from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
@@ -29,6 +25,10 @@ if TYPE_CHECKING:
     from dubins_traffic.record.writer import RecordWriter
     from dubins_traffic.roads.generate import generate as generate_network
     from dubins_traffic.roads.network import RoadNetwork
+    from dubins_traffic.runs.jobs import Job, run_trials
+    from dubins_traffic.runs.plan import Plan, plan
+    from dubins_traffic.runs.single import Result, Trial, run_trial
+    from dubins_traffic.runs.sources import load, load_record
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
     from dubins_traffic.scoring.verdict import Judging, Verdict
     from dubins_traffic.verification.result import Difference, Verification
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from dubins_traffic.viewer.replay import write_replay
 
 _PLACES = {
-    "campaign.batch": ("Batch", "run_batch"),
-    "campaign.conduct": ("run_campaign",),
-    "campaign.many": ("Job", "run_trials"),
-    "campaign.plan": ("Plan", "plan"),
+    "engine.batch": ("Batch", "run_batch"),
+    "campaign.run_campaign": ("run_campaign",),
+    "runs.jobs": ("Job", "run_trials"),
+    "runs.plan": ("Plan", "plan"),
     "campaign.results": ("CampaignResults", "load_results"),
-    "campaign.single": ("Result", "Trial", "run_trial"),
-    "campaign.sources": ("load", "load_record"),
+    "runs.single": ("Result", "Trial", "run_trial"),
+    "runs.sources": ("load", "load_record"),
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
     "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
     "controllers.shield": ("Shield",),

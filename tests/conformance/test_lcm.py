@@ -13,12 +13,12 @@ pytest.importorskip("lcm")
 
 from lcm import LCM
 
-from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.protocols import End
+from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.inbox import Inbox
 from dubins_traffic.transports.lcm import connection

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.remote import Session, hand_over, run_remote
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.told import problem_from_document, problem_to_document
+from dubins_traffic.problem.public_problem import problem_from_document, problem_to_document
 from dubins_traffic.record.sink import End
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sessions.remote import Session, hand_over, run_remote
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.inbox import Inbox
 from dubins_traffic.transports.lines import Lines

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.sessions import rehearse
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import leave

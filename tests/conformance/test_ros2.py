@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("cyclonedds")
 
-from dubins_traffic.campaign.sessions import rehearse
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from dubins_traffic.transports.ros2.transport import Ros2

@@ -24,11 +24,11 @@ from typing import Any
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.remote import Session, hand_over, run_remote
-from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.protocols import Transport
 from dubins_traffic.record.sink import End
 from dubins_traffic.record.wall import read
+from dubins_traffic.runs.single import Result, run_trial
+from dubins_traffic.sessions.remote import Session, hand_over, run_remote
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.patience import Patience

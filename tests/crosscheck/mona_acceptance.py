@@ -20,8 +20,8 @@ def transitions(dot: str) -> tuple[set[int], dict[int, list[tuple[str, int]]]]:
     accepting = {int(state) for state in re.findall(r"\d+", final[1] if final else "")}
     edges: dict[int, list[tuple[str, int]]] = {}
     for source, target, label in re.findall(r'(\d+) -> (\d+) \[label="([^"]*)"\]', dot):
-        guard = label.replace("~", " not ").replace("&", " and ").replace("|", " or ")
-        edges.setdefault(int(source), []).append((guard.replace("true", "True").strip(), int(target)))
+        shield_filter = label.replace("~", " not ").replace("&", " and ").replace("|", " or ")
+        edges.setdefault(int(source), []).append((shield_filter.replace("true", "True").strip(), int(target)))
     return accepting, edges
 
 
@@ -31,7 +31,9 @@ def accepts(dot: str, word: list[int], names: list[str]) -> bool:
     state = 1
     for letter in word:
         values = {name: bool(letter >> bit & 1) for bit, name in enumerate(names)}
-        targets = [target for guard, target in edges.get(state, []) if eval(guard, {}, values)]
+        targets = [
+            target for shield_filter, target in edges.get(state, []) if eval(shield_filter, {}, values)
+        ]
         if len(targets) != 1:
             raise ValueError(f"{len(targets)} ways on from state {state}: {dot}")
         state = targets[0]

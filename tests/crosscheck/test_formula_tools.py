@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dubins_traffic.spec.logic.exports import Specification, spin, stl, tulip
-from dubins_traffic.spec.logic.formula import Formula, Op, subformulas
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.printer import SPIN, Brackets, Style, to_spin, written
-from dubins_traffic.spec.logic.rewrite import simplify
-from dubins_traffic.spec.logic.robustness import robustness
-from dubins_traffic.spec.logic.translation import until_and_release_only
+from dubins_traffic.logic.exports import Specification, spin, stl, tulip
+from dubins_traffic.logic.formula import Formula, Op, subformulas
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import SPIN, Brackets, Style, to_spin, written
+from dubins_traffic.logic.rewrite import simplify
+from dubins_traffic.logic.robustness import robustness
+from dubins_traffic.logic.translation import until_and_release_only
 from tests.formulas import drawn
 from tests.tools import interpreter_with, program
 

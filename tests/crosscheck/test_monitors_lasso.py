@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from dubins_traffic.spec.logic.automaton import (
+from dubins_traffic.logic.automaton import (
     FALSE,
     PRESUMABLY_FALSE,
     PRESUMABLY_TRUE,
@@ -15,9 +15,9 @@ from dubins_traffic.spec.logic.automaton import (
     Automaton,
     automaton,
 )
-from dubins_traffic.spec.logic.formula import Formula, FormulaError, propositions
-from dubins_traffic.spec.logic.monitor import Monitors, parts
-from dubins_traffic.spec.logic.parse import parse
+from dubins_traffic.logic.formula import Formula, FormulaError, propositions
+from dubins_traffic.logic.monitor import Monitors, parts
+from dubins_traffic.logic.parse import parse
 from tests.formulas import drawn, holds, holds_finite, words
 
 NAMES = ("a", "b")

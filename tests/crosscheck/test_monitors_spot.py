@@ -9,11 +9,11 @@ from random import Random
 
 import pytest
 
-from dubins_traffic.spec.logic.automaton import FALSE, TRUE, automaton
-from dubins_traffic.spec.logic.formula import Formula, Op, until
-from dubins_traffic.spec.logic.printer import Brackets, Style, written
-from dubins_traffic.spec.logic.rewrite import mapped
-from dubins_traffic.spec.logic.translation import in_ticks, until_and_release_only, written_out
+from dubins_traffic.logic.automaton import FALSE, TRUE, automaton
+from dubins_traffic.logic.formula import Formula, Op, until
+from dubins_traffic.logic.printer import Brackets, Style, written
+from dubins_traffic.logic.rewrite import mapped
+from dubins_traffic.logic.translation import in_ticks, until_and_release_only, written_out
 from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn
 from tests.tools import interpreter_with

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
+from dubins_traffic.rules.breach_log import RULES
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Referee
+from dubins_traffic.rules.valuation import Valuation
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.verdict import Judging
-from dubins_traffic.spec.docket import RULES
-from dubins_traffic.spec.judge import Referee
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.valuation import Valuation
 from tests.judge_reference import Judge
 from tests.judging import GRID, ROADS, after, before, case, frames_of, lanes_in, lanes_out
 from tests.rules_scripts import KITE, on_lane, wander

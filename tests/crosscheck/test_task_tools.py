@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cli.main import main
+from dubins_traffic.logic.automaton import PRESUMABLY_TRUE
+from dubins_traffic.logic.formula import Formula, Op, make, propositions, subformulas
+from dubins_traffic.logic.monitor import Monitors
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import to_spin
+from dubins_traffic.logic.rewrite import mapped
+from dubins_traffic.logic.robustness import robustness
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
-from dubins_traffic.spec.logic.automaton import PRESUMABLY_TRUE
-from dubins_traffic.spec.logic.formula import Formula, Op, make, propositions, subformulas
-from dubins_traffic.spec.logic.monitor import Monitors
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.printer import to_spin
-from dubins_traffic.spec.logic.rewrite import mapped
-from dubins_traffic.spec.logic.robustness import robustness
-from dubins_traffic.spec.task import task
-from dubins_traffic.spec.valuation import Valuation
+from dubins_traffic.rules.task import task
+from dubins_traffic.rules.valuation import Valuation
+from dubins_traffic.runs.single import run_trial
 from tests.crosscheck.test_formula_tools import asked, spin_output
 from tests.formulas import holds
 from tests.grammars import slugs_sections, tlsf_sections
@@ -100,8 +100,10 @@ class Buchi:
         done = re.fullmatch(r":: atomic \{ (.*) -> assert\(.*\) \}", line)
         if found is None and done is None:
             return []
-        guard, target = found.groups() if found else (done[1] if done else "", "accept_all")
-        return [(guard.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)]
+        shield_filter, target = found.groups() if found else (done[1] if done else "", "accept_all")
+        return [
+            (shield_filter.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)
+        ]
 
     def accepts(self, word: list[dict[str, bool]], loop: int) -> bool:
         """Say whether the word is accepted whose last `loop` letters go on for ever."""
@@ -111,9 +113,9 @@ class Buchi:
             seen, stack = set[tuple[str, int]](), list(nodes)
             while stack:
                 state, place = stack.pop()
-                for guard, target in self.ways[state]:
+                for shield_filter, target in self.ways[state]:
                     node = target, after[place]
-                    if node not in seen and eval(guard, {}, word[place]):
+                    if node not in seen and eval(shield_filter, {}, word[place]):
                         seen.add(node)
                         stack.append(node)
             return seen

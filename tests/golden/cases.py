@@ -17,10 +17,10 @@ from pyarrow import parquet
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main as command_line
+from dubins_traffic.logic.exports import FORMATS
+from dubins_traffic.logic.formula import FormulaError
 from dubins_traffic.record.export import export
-from dubins_traffic.spec.logic.exports import FORMATS
-from dubins_traffic.spec.logic.formula import FormulaError
-from dubins_traffic.spec.task import task
+from dubins_traffic.rules.task import task
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.transports.clocks import Lockstep

@@ -446,7 +446,7 @@ def test_the_same_as_a_process_of_its_own(case, place):
 )
 def test_no_permission(arguments, needles, place, run_here):
     # Kernels are loaded as the user whose cache they are in, not as nobody.
-    importlib.import_module("dubins_traffic.campaign.many")
+    importlib.import_module("dubins_traffic.runs.jobs")
     importlib.import_module("dubins_traffic.controllers.lanes")
     (place / "secret.json").write_text(json.dumps(NETWORK))
     (place / "secret.json").chmod(0)

@@ -23,13 +23,13 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign import manifest
-from dubins_traffic.campaign.conduct import run_campaign
 from dubins_traffic.campaign.report.comparison import compare
 from dubins_traffic.campaign.report.metrics import METRICS
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.write import write_report
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.rows import SCORES
+from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from tests.campaigns import campaign, written

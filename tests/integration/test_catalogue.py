@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign import catalogue
 from dubins_traffic.cli.main import main
 from dubins_traffic.cli.reference import renewed
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import shipped_names
 from dubins_traffic.problem.kinds import KINDS
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.runs import catalogue
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "documents.md"
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign import checkup
-from dubins_traffic.campaign.checkup import Checkup, check_controller
-from dubins_traffic.campaign.course import course
-from dubins_traffic.campaign.course_watch import Waited, see_off
+from dubins_traffic.checkup import checkup
+from dubins_traffic.checkup.checkup import Checkup, check_controller
+from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.watch import Waited, see_off
 from dubins_traffic.cli.main import main
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES

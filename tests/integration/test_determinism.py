@@ -9,18 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.many import Job, run_trials
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.jobs import Job, run_trials
+from dubins_traffic.runs.single import run_trial
 from tests.unit.test_trial import Collect
 
 RUN = """
 import sys
 from dataclasses import replace
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 instance = replace(draw(load_config(sys.argv[1]), 3, 1), duration=float(sys.argv[3]))

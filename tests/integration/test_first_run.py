@@ -5,8 +5,8 @@ import signal
 import subprocess
 import sys
 
-from dubins_traffic.campaign import warm
 from dubins_traffic.kernels import compile
+from dubins_traffic.runs import precompile as warm
 
 
 def run(folder, record_folder):
@@ -30,7 +30,7 @@ def test_a_first_run_gives_the_bytes_of_later_ones(tmp_path) -> None:
 
 
 COMPANION = """
-from dubins_traffic.campaign.warm import companion
+from dubins_traffic.runs.precompile import companion
 with companion() as process:
     process.wait()
 with companion() as second:

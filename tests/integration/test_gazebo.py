@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.body import Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.sensing import scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
@@ -22,6 +21,7 @@ from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Scorer
 from dubins_traffic.simulators.gazebo import prefix
 from dubins_traffic.simulators.gazebo.link import Kind, LostError

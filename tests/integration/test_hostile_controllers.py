@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.batch import run_batch
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cli.main import main
+from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.reader import read
+from dubins_traffic.runs.single import run_trial
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 CONFIG: dict[str, Any] = {

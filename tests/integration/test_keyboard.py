@@ -16,11 +16,11 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.campaign.single import Trial
 from dubins_traffic.cli.main import main
 from dubins_traffic.controllers.keyboard import Map
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.single import Trial
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 

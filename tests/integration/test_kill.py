@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record import reader
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import score
 from dubins_traffic.verification.verify import verify
 
 PACED = """
 import sys, time
 from dataclasses import replace
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 period = float(sys.argv[2])

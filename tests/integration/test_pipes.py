@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError, shown
 from dubins_traffic.files import read_bytes
@@ -22,6 +21,7 @@ from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import dumps
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.runs.single import run_trial
 
 COMMAND = f"{sys.executable} -m dubins_traffic.cli"
 CONFIG: dict[str, Any] = {

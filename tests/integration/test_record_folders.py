@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.batch import run_batch
 from dubins_traffic.cli.main import main
+from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
 

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.sessions import rehearse
 from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.record.sink import End
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.ros1.master import pid_at
 from dubins_traffic.transports.ros1.messages import MD5, load
 from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros, read_until

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.sessions import rehearse
 from dubins_traffic.record.sink import End
+from dubins_traffic.sessions.plan import rehearse
 from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, need_ros
 
 COURSE = {

@@ -18,8 +18,8 @@ import pytest
 pytest.importorskip("cyclonedds")
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.ros2 import messages as m
 from tests.conformance.transport import frames
 from tests.ros2_client import READY, RESET, RESTART, START, Client, law

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from benchmarks.synthesized import Drive, Events, drive, instance
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
 from dubins_traffic.errors import InputError
@@ -16,6 +15,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.record.reader import read
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE
 from dubins_traffic.synthesis.strategy import Strategy

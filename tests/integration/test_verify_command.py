@@ -15,7 +15,7 @@ import pytest
 from benchmarks.verify import CONTROLLERS, WAYS, case, verified
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.conduct import run_campaign
+from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.record import schema, wall

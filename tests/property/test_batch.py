@@ -7,18 +7,18 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.asked import BatchView, ask
-from dubins_traffic.campaign.batch import outcomes, run_batch
-from dubins_traffic.campaign.batch_records import failed
-from dubins_traffic.campaign.group import Group
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation, Pose
+from dubins_traffic.engine.batch import outcomes, run_batch
+from dubins_traffic.engine.batch_records import failed
+from dubins_traffic.engine.controlled import BatchView, ask
+from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import EAgent, Problem
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import read
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score, score
 from tests.rules_scripts import on_lane
 
@@ -352,7 +352,7 @@ def test_what_is_wrong_is_refused() -> None:
 
 
 def test_room_for_pairs_contacts_and_breaches_is_found_when_it_is_needed(monkeypatch) -> None:
-    from dubins_traffic.campaign import group
+    from dubins_traffic.engine import group
 
     config = configuration()
     instances = [draw(config, SEED, k) for k in range(3)]

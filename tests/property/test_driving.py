@@ -15,15 +15,15 @@ from hypothesis import strategies as st
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.lanes import Lanes
-from dubins_traffic.driving.free_flow import free_flow
-from dubins_traffic.driving.rounds import round_time
-from dubins_traffic.driving.safety import motion_is_safe
-from dubins_traffic.driving.tours import LaneGraph, Round, find_round
-from dubins_traffic.driving.turns import IMPOSSIBLE, VISIT, Site, along, shape
 from dubins_traffic.kernels.boxes import NEVER, box_contact, separation
 from dubins_traffic.kernels.trig import advance, sincos
+from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, VISIT, Site, along, shape
+from dubins_traffic.policies.safety import motion_is_safe
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.routing.free_flow import free_flow
+from dubins_traffic.routing.rounds import round_time
+from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 
 CARS = [
     Car(),
@@ -255,7 +255,7 @@ def test_lanes_without_goals_stands() -> None:
 
 
 SCRIPT = """
-from dubins_traffic.campaign.single import Trial
+from dubins_traffic.runs.single import Trial
 from dubins_traffic.controllers.lanes import Lanes
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw

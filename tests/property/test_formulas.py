@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.spec.logic.formula import (
+from dubins_traffic.logic.formula import (
     FALSE,
     PAST,
     TRUE,
@@ -22,10 +22,10 @@ from dubins_traffic.spec.logic.formula import (
     prop,
     subformulas,
 )
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.printer import to_ascii, to_spin
-from dubins_traffic.spec.logic.rewrite import mapped, nnf, renamed, simplify
-from dubins_traffic.spec.logic.translation import in_ticks, until_and_release_only, without_past, written_out
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import to_ascii, to_spin
+from dubins_traffic.logic.rewrite import mapped, nnf, renamed, simplify
+from dubins_traffic.logic.translation import in_ticks, until_and_release_only, without_past, written_out
 from tests.formulas import drawn, holds, words
 
 _UNARY = (Op.NOT, Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.rnd import extent
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board

@@ -21,8 +21,8 @@ from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.overlap import body_shape, overlap
 from dubins_traffic.problem.starts import TIGHT, Ground, Wish, check_given
+from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.weave import most_segments
 from tests.roadnets import networks
 
 quick = settings(max_examples=40, deadline=None, derandomize=True)

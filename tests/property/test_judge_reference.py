@@ -16,9 +16,9 @@ from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import State
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.docket import RULES
-from dubins_traffic.spec.judge import Breach, Referee
-from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.rules.breach_log import RULES
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.referee import Breach, Referee
 from tests.judge_reference import Judge
 from tests.judge_trials import CLAUSES, compare
 from tests.judging import case, frames_of, judged, said

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.group import Group
 from dubins_traffic.cars.near import CELL, list_near
 from dubins_traffic.cars.state import NONE
 from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
@@ -15,9 +15,9 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import nearest_arm, patch
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
-from dubins_traffic.spec.holding import place
-from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.tables import (
+from dubins_traffic.rules.label_cache import place
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.tables import (
     ALONG_HIGH,
     ALONG_LOW,
     ASIDE_HIGH,
@@ -25,10 +25,6 @@ from dubins_traffic.spec.tables import (
     AXIS_X,
     AXIS_Y,
     CALM,
-    CALM_HIGH_X,
-    CALM_HIGH_Y,
-    CALM_LOW_X,
-    CALM_LOW_Y,
     FORK_SURE,
     FORK_X,
     FORK_Y,
@@ -36,6 +32,10 @@ from dubins_traffic.spec.tables import (
     FROM_Y,
     RING_HIGH,
     RING_LOW,
+    VALID_HIGH_X,
+    VALID_HIGH_Y,
+    VALID_LOW_X,
+    VALID_LOW_Y,
     VERTEX_X,
     VERTEX_Y,
 )
@@ -143,7 +143,7 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
         assert (labels.bits == group.labels.bits).all()
         for n in range(7):
             row = labeller.memory.calm[0, [place(n) + k * BLOCK for k in range(CALM)]]
-            low, high = row[[CALM_LOW_X, CALM_LOW_Y]], row[[CALM_HIGH_X, CALM_HIGH_Y]]
+            low, high = row[[VALID_LOW_X, VALID_LOW_Y]], row[[VALID_HIGH_X, VALID_HIGH_Y]]
             if tick % 10 != n or not (low < high).all():
                 continue
             looked += 1

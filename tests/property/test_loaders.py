@@ -15,8 +15,6 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.campaign.campaign import load_campaign
-from dubins_traffic.campaign.single import run_trial
-from dubins_traffic.campaign.sources import load
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
@@ -25,6 +23,8 @@ from dubins_traffic.problem.files import parse_json
 from dubins_traffic.problem.instance import Instance, Laser
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.runs.sources import load
 
 LASER = Laser()
 NETWORK: dict[str, Any] = {

@@ -11,10 +11,10 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.checks import meetings
 from dubins_traffic.roads.clearance import clearance_faults
+from dubins_traffic.roads.formats.rnd import FIELDS
+from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import generate, random_network, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.rnd import FIELDS
-from dubins_traffic.roads.weave import most_segments
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.errors import RecordError
 from dubins_traffic.record.chunks import is_finished, pieces
 from dubins_traffic.record.reader import Record, from_bytes, read
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.runs.single import run_trial
 from tests.recordings import feed, make_instance, random_frames, same
 from tests.tampering import damaged, length_at
 

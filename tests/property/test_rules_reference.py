@@ -14,7 +14,7 @@ import pytest
 
 from dubins_traffic.cars.body import Car, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.propositions import NAMES
+from dubins_traffic.rules.propositions import NAMES
 from tests.rules_reference import Reference
 from tests.rules_scripts import KITE, STAR, TURNED_STAR, flags, instance, label, moved, on_lane, wander
 

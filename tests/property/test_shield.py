@@ -10,12 +10,12 @@ from benchmarks.shield import KINDS, ruled, trials
 from hypothesis import given, settings, target
 from hypothesis import strategies as st
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.problem.instance import Problem
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.shield.tables import Overtakes
 from tests.unit.test_law import TURN, W, car, on_grid, turned
 
 Phase = tuple[int, str, float, float]

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Frames
+from dubins_traffic.rules.propositions import LEFT
 from dubins_traffic.scoring.score import Score, Scorer
+from dubins_traffic.shield.tables import Overtakes
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.spec.propositions import LEFT
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial
 from tests.property.test_shield import PHASES, Phase, Phases

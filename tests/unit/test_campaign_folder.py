@@ -14,7 +14,7 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
 from dubins_traffic.campaign.folder import Folder, opened
 from dubins_traffic.campaign.records import Keep, Records, read_keep
-from dubins_traffic.campaign.work import run_chunk
+from dubins_traffic.campaign.worker import run_chunk
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from tests.campaigns import campaign, written
 

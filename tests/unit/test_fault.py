@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.state import Contact, State
-from dubins_traffic.spec.fault import with_fault
-from dubins_traffic.spec.labeller import Labeller
-from dubins_traffic.spec.propositions import BREACH3, LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.rules.fault import with_fault
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.propositions import BREACH3, LEFT, ON_ROAD, OVERTAKING
 from tests.rules_scripts import STAR, fill, instance, on_lane
 
 

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from dubins_traffic.spec.logic.exports import (
+from dubins_traffic.logic.exports import (
     FORMATS,
     Specification,
     latex,
@@ -17,9 +17,9 @@ from dubins_traffic.spec.logic.exports import (
     tlsf,
     tulip,
 )
-from dubins_traffic.spec.logic.formula import Formula, FormulaError, conj, implies
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.printer import (
+from dubins_traffic.logic.formula import Formula, FormulaError, conj, implies
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import (
     ASCII,
     SPIN,
     Brackets,

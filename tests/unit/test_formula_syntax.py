@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.spec.logic.formula import (
+from dubins_traffic.logic.formula import (
     FALSE,
     TRUE,
     Formula,
@@ -30,8 +30,8 @@ from dubins_traffic.spec.logic.formula import (
     weak_until,
     yesterday,
 )
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.printer import to_ascii, to_spin
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import to_ascii, to_spin
 
 a, b, c, d = map(prop, "abcd")
 
@@ -218,7 +218,7 @@ def test_reading_formulas_does_not_load_the_compiler() -> None:
     import subprocess
 
     code = (
-        "import sys; from dubins_traffic.spec.logic import parse, exports, robustness, monitor;"
+        "import sys; from dubins_traffic.logic import parse, exports, robustness, monitor;"
         "monitor.Monitors({'f': parse.parse('[] a')}, ['a'], 0.1); sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.protocols import End, Ending
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
 from tests.recordings import make_instance
 

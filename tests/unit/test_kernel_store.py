@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,13 @@ def test_what_is_saved_is_found_by_its_key_alone(tmp_path) -> None:
 def test_how_kernels_are_put_together_decides_what_is_compiled() -> None:
     for file in kernel_files():
         assert PACKAGE / "kernels" / "linking.py" in imported(file)
+
+
+def test_a_kernel_saved_for_a_type_that_is_defined_elsewhere_now_is_not_found(tmp_path, monkeypatch) -> None:
+    module = types.ModuleType("streams_of_old")
+    module.Stream = type("Stream", (), {"__module__": module.__name__, "__repr__": lambda _self: "Stream"})
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    files = KernelFiles(tmp_path, "drawn")
+    files.save(module.Stream(), "compiled")
+    monkeypatch.delitem(sys.modules, module.__name__)
+    assert files.load(module.Stream()) is None

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 
 from dubins_traffic.agents.fleet import Fleet
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.driving.turn_arcs import AFTER, BEFORE, THROUGH, Way, on_way, way_between
+from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_way, way_between
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.spec.labeller import Labeller
 
 W, R = 0.3, 1.0
 TURN = 0.4
@@ -79,7 +79,7 @@ def broken(score: Score, name: str) -> set[str]:
     return {one.rule for one in score.verdict.violations if one.car == name}
 
 
-def march(way: Way) -> list[tuple[int, float, float]]:
+def march(way: ReferencePath) -> list[tuple[int, float, float]]:
     """Follow a way from its beginning; return parts and points."""
     x, y = way.x - 1.6 * way.tx + W * way.ty, way.y - 1.6 * way.ty - W * way.tx
     found: list[tuple[int, float, float]] = []

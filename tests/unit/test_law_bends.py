@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
+from dubins_traffic.runs.single import run_trial
 from tests.unit.test_law import W, car, on_grid, turned
 from tests.unit.test_law_company import Stands, Watch, breaches
 

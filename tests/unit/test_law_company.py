@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Frames
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from tests.unit.test_law import W, broken, car, on_grid, turned
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End
+from dubins_traffic.runs.single import run_trial
 from tests.unit.test_law import W, broken, car, on_grid, turned
 
 ROAD = 6.0

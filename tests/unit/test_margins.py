@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
+from dubins_traffic.logic.formula import always, eventually, implies, negation, prop
+from dubins_traffic.logic.robustness import robustness
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
+from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.score import score
-from dubins_traffic.spec.logic.formula import always, eventually, implies, negation, prop
-from dubins_traffic.spec.logic.robustness import robustness
-from dubins_traffic.spec.propositions import LEFT, ON_ROAD, OVERTAKING
 from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
 from tests.recordings import blocks
 from tests.rules_scripts import Frame, label, on_lane

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from benchmarks.monitors import monitors_of_a_task, updates_per_second
 
-from dubins_traffic.spec.logic.automaton import FALSE, PRESUMABLY_FALSE, PRESUMABLY_TRUE, TRUE
-from dubins_traffic.spec.logic.formula import FormulaError
-from dubins_traffic.spec.logic.monitor import Monitors, compiled, parts
-from dubins_traffic.spec.logic.parse import parse
+from dubins_traffic.logic.automaton import FALSE, PRESUMABLY_FALSE, PRESUMABLY_TRUE, TRUE
+from dubins_traffic.logic.formula import FormulaError
+from dubins_traffic.logic.monitor import Monitors, compiled, parts
+from dubins_traffic.logic.parse import parse
 
 
 def history(text: str, names: str, rows: list[str], period: float = 1.0) -> str:

@@ -10,7 +10,7 @@ import pytest
 from dubins_traffic.cars.body import Car, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import State
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.rules.labeller import Labeller
 from tests.rules_scripts import STAR, TURNED_STAR, Frame, fill, flags, instance, label, on_lane
 
 RHO = 0.177

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dubins_traffic.spec.logic.formula import FormulaError
-from dubins_traffic.spec.logic.parse import parse
-from dubins_traffic.spec.logic.robustness import robustness
+from dubins_traffic.logic.formula import FormulaError
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.robustness import robustness
 
 A = np.array([3.0, 1.0, -2.0, 4.0])
 B = np.array([-1.0, -1.0, 5.0, 0.5])

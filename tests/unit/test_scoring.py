@@ -10,12 +10,12 @@ from dubins_traffic.cars.body import Body, Disc, DiscObstacle, PolygonObstacle, 
 from dubins_traffic.cars.state import Contact, Frames
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.wall import measured
+from dubins_traffic.rules.propositions import LEFT, ON_ROAD, STILL
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
 from dubins_traffic.scoring.goals import GoalVisits, Visiting, Visits
 from dubins_traffic.scoring.score import Scorer, ScoreSheet
-from dubins_traffic.spec.propositions import LEFT, ON_ROAD, STILL
 from tests.recordings import blocks, feed, make_frames, make_instance
 
 A, B, C, ROAD = (0.2, 0.1), (6.0, 3.5), (3.0, 0.1), (1.5, 0.0)

@@ -14,18 +14,18 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.campaign.single import Result, run_trial
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.driving.guard import Guard, Intervention
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.reader import read
 from dubins_traffic.record.sink import Frames
+from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.scoring.score import Score
+from dubins_traffic.shield.filter import Intervention, ShieldFilter
+from dubins_traffic.shield.tables import Overtakes
 from tests.unit.test_law import TURN, W, broken, car, on_grid, turned
 
 Act = Callable[[Observation], Any]
@@ -59,8 +59,8 @@ class Noting(Shield):
     def act(self, observation: Observation) -> Command | None:
         """Note whether the shield steps in."""
         given = super().act(observation)
-        if self.guard.intervention is not None and given is not None:
-            self.found.append(self.guard.intervention)
+        if self.shield_filter.intervention is not None and given is not None:
+            self.found.append(self.shield_filter.intervention)
         return given
 
 
@@ -99,7 +99,7 @@ def test_rules_drives_as_without_a_shield(overtakes: Overtakes) -> None:
         instance = on_grid([*agents, parked], 60.0, START)
     shield = Shield("rules", overtakes=overtakes)
     with_it, without = run_trial(instance, shield).score, run_trial(instance, "rules").score
-    assert shield.guard.count == 0
+    assert shield.shield_filter.count == 0
     assert with_it.driven == without.driven
     assert with_it.driven.distance_m > 20.0
 
@@ -219,15 +219,15 @@ def test_a_car_that_starts_on_the_left_is_brought_back() -> None:
 
 
 def test_without_an_observation_in_between_nobody_backs_up() -> None:
-    guard, watch = Guard(), Drives(lambda _: (0.0, 0.0))
+    shield_filter, watch = ShieldFilter(), Drives(lambda _: (0.0, 0.0))
     instance = on_grid([], 1.0, turned(3.0, -W))
     run_trial(instance, watch)
-    guard.start(instance.problem)
-    assert guard.filter(watch.seen[0], (-0.3, 0.0)) == (-0.3, 0.0)
-    assert guard.filter(watch.seen[5], (-0.3, 0.0)) == (0.0, 0.0)
-    assert guard.filter(watch.seen[6], (0.3, 0.0)) == (0.3, 0.0)
-    assert guard.intervention is None
-    assert guard.count == 1
+    shield_filter.start(instance.problem)
+    assert shield_filter.filter(watch.seen[0], (-0.3, 0.0)) == (-0.3, 0.0)
+    assert shield_filter.filter(watch.seen[5], (-0.3, 0.0)) == (0.0, 0.0)
+    assert shield_filter.filter(watch.seen[6], (0.3, 0.0)) == (0.3, 0.0)
+    assert shield_filter.intervention is None
+    assert shield_filter.count == 1
 
 
 @pytest.mark.parametrize(("answer", "end"), [(None, "gave_up"), ("ab", "controller_fault")])
@@ -272,7 +272,7 @@ def test_names_with_a_shield(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="got ''"):
         registry.load("rules+shield:")
     with pytest.raises(InputError, match="got True"):
-        Guard(overtakes=True)  # pyright: ignore[reportArgumentType]
+        ShieldFilter(overtakes=True)  # pyright: ignore[reportArgumentType]
     instance = on_grid([], 8.0, START)
     result = run_trial(instance, "simple+shield", record=tmp_path / "one.mcap")
     assert read(result.record or "").controller == "simple+shield"
@@ -292,7 +292,7 @@ def test_a_car_that_can_not_keep_the_rules_is_refused() -> None:
     bounds = replace(instance.problem.car.bounds, speed_min=0.1)
     problem = replace(instance.problem, car=replace(instance.problem.car, bounds=bounds))
     with pytest.raises(InputError, match="can't stop"):
-        Guard().start(problem)
+        ShieldFilter().start(problem)
 
 
 class Digest:

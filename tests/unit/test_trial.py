@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.cars.body import DiscObstacle
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
 from dubins_traffic.kernels.trig import advance
@@ -13,6 +12,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Disturbances, Laser
 from dubins_traffic.protocols import End
+from dubins_traffic.runs.single import Trial, run_trial
 
 
 class Collect:

@@ -13,10 +13,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.logic.formula import FormulaError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.draw import draw
@@ -24,11 +24,11 @@ from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.schema import shipped_schema
 from dubins_traffic.record.reader import read
+from dubins_traffic.rules.propositions import STILL
+from dubins_traffic.rules.vocabulary import Proposition, Vocabulary
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.formulas import FormulaVerdicts
 from dubins_traffic.scoring.score import score
-from dubins_traffic.spec.logic.formula import FormulaError
-from dubins_traffic.spec.propositions import STILL
-from dubins_traffic.spec.vocabulary import Proposition, Vocabulary
 from tests.judging import GRID, case
 from tests.recordings import blocks
 from tests.unit.test_formula_syntax import MALFORMED

@@ -12,10 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.campaign.single import run_trial
 from dubins_traffic.cars.state import Contact, Pose
 from dubins_traffic.cli.main import main
-from dubins_traffic.driving.free_flow import free_flow
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -23,11 +21,13 @@ from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.reader import read
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.routing.free_flow import free_flow
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
 from dubins_traffic.scoring.verdict import Judging, Verdict
-from dubins_traffic.spec.judge import Breach
-from dubins_traffic.spec.parameters import RuleParameters
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
 from tests.recordings import blocks

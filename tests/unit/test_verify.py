@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.errors import RecordError
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.instance import Disturbances, Instance
@@ -20,6 +19,7 @@ from dubins_traffic.protocols import End
 from dubins_traffic.record import schema, wall
 from dubins_traffic.record.reader import from_bytes
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.verification.verify import verify
 from tests.recordings import make_instance
 from tests.tampering import Chunks, contact_with, cut, edit, find, heading, put, rebuilt

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.remote import hand_over
-from dubins_traffic.campaign.single import Trial, run_trial
 from dubins_traffic.cars.state import State
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.runs.single import Trial, run_trial
+from dubins_traffic.sessions.remote import hand_over
 from dubins_traffic.verification.verify import verify
 from dubins_traffic.verification.worlds import Replayed
 from tests.tampering import heading, rebuilt

@@ -2,9 +2,9 @@ import math
 
 import pytest
 
-from dubins_traffic.driving.waypoint import TAN_SIMPLE, TAN_WANDER, pursue, turn_then_drive
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.trig import advance, sincos
+from dubins_traffic.policies.waypoint import TAN_SIMPLE, TAN_WANDER, pursue, turn_then_drive
 
 PERIOD = 1 / 30
 

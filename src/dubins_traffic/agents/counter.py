@@ -12,37 +12,37 @@ import numpy as np
 from dubins_traffic.agents.lawful import drivers_of
 from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
 from dubins_traffic.cars.tables import pack_obstacles
-from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import (
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.room import MARGIN
+from dubins_traffic.policies.rules.tables import (
     FIRST,
     KIND,
     LANE,
     LAST,
-    MOOD,
     NEXT,
     PLACE,
     ROLLING,
     ROUND,
     SPEED,
+    VIOLATIONS,
     Drivers,
     blank,
-    desk,
+    scratch,
 )
-from dubins_traffic.driving.room import MARGIN
-from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.propositions import CLEAR
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.propositions import CLEAR
 from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
 from dubins_traffic.synthesis.queues import Scene
-from dubins_traffic.synthesis.road_play import RoadPlay, Terms
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.story import Moment, followed, moment_of, told
@@ -85,7 +85,7 @@ class CounterTeam:
         self._roads = pack([problem.network], [problem.car.lane_width])
         self._obstacles = pack_obstacles([problem.obstacles])
         self._drivers = _drivers(instance)
-        self._desk = desk(state.x.shape[1], len(problem.network.segments))
+        self._scratch = scratch(state.x.shape[1], len(problem.network.segments))
         self._points: list[list[float]] = problem.network.points.tolist()
         rules = RuleParameters.from_mapping(problem.rules)
         self._radius, self._reach = problem.intersection_radius, problem.car.body.reach
@@ -94,8 +94,8 @@ class CounterTeam:
         board = Board(arena_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
         self._strategy = Counterstrategy(solve(build(board)))
-        terms = Terms(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
-        self._play = RoadPlay(board, terms, instance.names)
+        sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
+        self._play = RoadPlay(board, sight, instance.names)
         self._targets = [-1] * len(instance.starts)
         self._scenes: list[Scene] = []
         self._jumps = board.assumption.order is not Order.KEPT
@@ -111,7 +111,7 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._desk)
+        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
         decide(tick, commands, *chain.from_iterable(tables))
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
@@ -153,7 +153,7 @@ class CounterTeam:
         for car in cars[1:]:
             enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
             clear = car.propositions.bits & CLEAR != 0
-            self._drivers.ints[0, car.car, MOOD] = ROLLING if enters and clear else 0
+            self._drivers.ints[0, car.car, VIOLATIONS] = ROLLING if enters and clear else 0
 
     def _send(self, car: Sighting) -> None:
         """Let the law take a car to its target."""

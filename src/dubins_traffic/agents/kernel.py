@@ -44,12 +44,12 @@ from dubins_traffic.agents.tables import (
 from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.driving.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
-from dubins_traffic.driving.waypoint import pursue, turn_then_drive
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.kernels.random import below
+from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.routing.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
 
 AIM = 0.6
 """How far along the lane's line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""

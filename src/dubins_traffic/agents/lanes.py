@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.driving.lane_graph import FAR
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import below
+from dubins_traffic.routing.lane_graph import FAR
 
 CHOICE_DRAW = 0
 

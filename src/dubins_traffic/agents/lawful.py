@@ -1,4 +1,4 @@
-"""The e-agents `lawful` and `nemesis`: the law of the road (`driving.law`) with their own ways to go."""
+"""The e-agents `lawful` and `nemesis`: the law of the road (`policies.rules.policy`) with their own ways to go."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
-from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import (
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.tables import (
     BLOCKS,
     DEPARTS,
     FIRST,
@@ -33,11 +35,9 @@ from dubins_traffic.driving.law_tables import (
     Drivers,
     blank,
     build_of,
-    desk,
     no_ways,
+    scratch,
 )
-from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
@@ -61,7 +61,7 @@ class Lawful:
         )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._drivers = pack_drivers(instances, cars, net)
-        own = desk(cars, int(np.diff(self._roads.seg_off).max()))
+        own = scratch(cars, int(np.diff(self._roads.seg_off).max()))
         self._arrays = (*self._roads, *self._obstacles, *self._drivers, *own)
         self._state: State | None = None
         self._labels: Labels | None = None
@@ -89,7 +89,7 @@ def pack_drivers(
     net : (B,)
         Number of each trial's road network.
     rounds
-        What `driving.rounds.stages` returns for each trial whose ego keeps the rules; by default no ego does.
+        What `routing.rounds.stages` returns for each trial whose ego keeps the rules; by default no ego does.
     """
     fleets, whose = distinct([(id(own.e_agents), id(own.problem.car)) for own in instances])
     rows = [_fleet(instances[b], cars) for b in fleets]

@@ -34,7 +34,7 @@ FLOATS = 12
 """Columns of `Agents.floats`: metres, m/s, rad/s.
 
 OFFSET: how far right of the centre line it drives. REACHED: when a waypoint counts as reached. TANGENT and MISS: the
-bearing tolerance (see `driving.waypoint`). STOP: it stands while a surface in sight is nearer. BERTH: it does not
+bearing tolerance (see `policies.waypoint`). STOP: it stands while a surface in sight is nearer. BERTH: it does not
 drive while the ego's centre is within; negative: never mind. SPEED, YAW_RATE: how fast it drives and turns. GAP:
 kept behind the ego. SIGHT: from where the ego is seen. It remembers GOAL_X, GOAL_Y: the waypoint.
 """

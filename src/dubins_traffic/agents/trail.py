@@ -21,10 +21,10 @@ from dubins_traffic.agents.tables import (
     YAW_RATE,
     W,
 )
-from dubins_traffic.driving.waypoint import pursue, turn_then_drive
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 
 Numbers = tuple[float, float, float, float]
 JUMP = 0.5

@@ -12,7 +12,7 @@ from dubins_traffic.campaign.settings import Factors
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.faults import Open
 from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings
-from dubins_traffic.roads.weave import most_segments
+from dubins_traffic.roads.from_grid import most_segments
 
 Scalar: TypeAlias = bool | int | float | str
 Document: TypeAlias = dict[str, Any]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.campaign.batch import Batch
 from dubins_traffic.campaign.rows import SCORES
-from dubins_traffic.campaign.single import Result
+from dubins_traffic.engine.batch import Batch
+from dubins_traffic.runs.single import Result
 from dubins_traffic.scoring.score import Score, ScoreSheet
 
 

@@ -10,11 +10,11 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engine import Outcome
-from dubins_traffic.campaign.many import deaf_to_interrupts
-from dubins_traffic.campaign.orphans import end_with_parent
-from dubins_traffic.campaign.work import Surroundings, run_part
+from dubins_traffic.campaign.engines import Outcome
+from dubins_traffic.campaign.worker import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.runs.jobs import deaf_to_interrupts
+from dubins_traffic.runs.parent_watch import end_with_parent
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event

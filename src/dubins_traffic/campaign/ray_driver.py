@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
 from dubins_traffic.campaign import ray_task
-from dubins_traffic.campaign.orphans import end_with_parent
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.runs.parent_watch import end_with_parent
 
 ALIVE, DONE, FAILED = "alive", "done", "failed"
 """Kinds of messages: (alive, processors of the cluster), (done, number, part or None if lost), (failed, why)."""

@@ -15,10 +15,10 @@ from importlib.util import find_spec
 
 from dubins_traffic.campaign import ray_driver
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engine import Outcome
-from dubins_traffic.campaign.many import deaf_to_interrupts
-from dubins_traffic.campaign.work import Surroundings
+from dubins_traffic.campaign.engines import Outcome
+from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.errors import ClusterLostError, DubinsTrafficError, InputError, MissingExtraError
+from dubins_traffic.runs.jobs import deaf_to_interrupts
 
 LOCAL = "local"
 SILENCE = 20.0

@@ -13,7 +13,7 @@ from dubins_traffic.errors import DubinsTrafficError
 
 if TYPE_CHECKING:
     from dubins_traffic.campaign.chunks import Chunk
-    from dubins_traffic.campaign.work import Surroundings
+    from dubins_traffic.campaign.worker import Surroundings
 
 PACKAGE = "dubins-traffic"
 
@@ -36,7 +36,7 @@ def run(chunk: bytes, around: bytes, wanted: str) -> bytes:
     own = version(PACKAGE)
     if own != wanted:
         raise DubinsTrafficError(f"a node has {PACKAGE} {own}, not {wanted}")
-    from dubins_traffic.campaign.work import run_part
+    from dubins_traffic.campaign.worker import run_part
 
     known: Chunk = pickle.loads(chunk)
     shared: Surroundings = pickle.loads(around)

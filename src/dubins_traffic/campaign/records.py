@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.record import wall
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.verdict import Ruling
 
@@ -66,12 +65,6 @@ class Records:
 def record_path(campaign: Path, number: int) -> Path:
     """Return where the record of trial `number` stands."""
     return campaign / FOLDER / f"trial-{number:09d}.mcap"
-
-
-def remove_record(record: Path) -> None:
-    """Remove a record and its sidecar."""
-    record.unlink(missing_ok=True)
-    wall.sidecar(record).unlink(missing_ok=True)
 
 
 def is_failure(row: Mapping[str, Any]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engine import Engine
+from dubins_traffic.campaign.engines import Engine
 
 LOSSES = 2
 """A chunk that was lost so often with others beside it is run alone, trial by trial."""

@@ -52,7 +52,7 @@ class Propositions(NamedTuple):
 
     `segment` is the nearest segment; `at` the intersection whose disc holds the centre and `crosses` the one whose
     disc the body meets (-1: none); `lane` the lane state, 2 * segment + direction (-1: none); `bits` a union of
-    the flags in `dubins_traffic.spec.propositions`.
+    the flags in `dubins_traffic.rules.propositions`.
     """
 
     segment: int

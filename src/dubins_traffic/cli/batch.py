@@ -10,7 +10,7 @@ from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.progress import progress
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.group import Outcome
+    from dubins_traffic.engine.group import Outcome
 
 EXAMPLES = options.examples(
     "batch town --trials 1000",
@@ -59,9 +59,9 @@ def batch(
 
     Ctrl-C keeps the scores of all finished trials.
     """
-    from dubins_traffic.campaign.batch import in_order, run_each
     from dubins_traffic.cli.tables import show
     from dubins_traffic.controllers.registry import shielded
+    from dubins_traffic.engine.batch import in_order, run_each
     from dubins_traffic.problem.configuration import load_config
     from dubins_traffic.record.sink import FAULTS
 

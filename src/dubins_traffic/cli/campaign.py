@@ -11,7 +11,7 @@ from dubins_traffic.cli import faults, options
 from dubins_traffic.errors import ClusterLostError
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.conduct import Ran
+    from dubins_traffic.campaign.run_campaign import Ran
 
 RUN_EXAMPLES = options.examples(
     "campaign run gaps.toml -o gaps",
@@ -68,8 +68,8 @@ def run(
     ] = None,
 ) -> None:
     """Run a campaign, or what is left of it. Whatever ends it, finished trials are kept."""
-    from dubins_traffic.campaign.conduct import run_campaign
     from dubins_traffic.campaign.folder import kept
+    from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cli.progress import progress
 
     total = 0

@@ -30,7 +30,7 @@ def check(
 
     Labels and contacts are found again from poses and commands, whatever the records say of them.
     """
-    from dubins_traffic.campaign.sources import load_record
+    from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.notice import assumption_notice
     from dubins_traffic.scoring.score import ScoreSheet, score
     from dubins_traffic.verification.contacts import from_poses

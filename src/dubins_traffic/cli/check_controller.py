@@ -11,7 +11,7 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.checkup import Checkup
+    from dubins_traffic.checkup.checkup import Checkup
 
 EXAMPLES = options.examples(
     "check-controller lanes",
@@ -52,7 +52,7 @@ def check_controller(
     Does it start, survive odd instances, answer in time, send finite commands within bounds, do the same again, and
     end cleanly?
     """
-    from dubins_traffic.campaign.checkup import check_controller as check
+    from dubins_traffic.checkup.checkup import check_controller as check
 
     found = check(controller, None if over is None else over.value)
     if json:

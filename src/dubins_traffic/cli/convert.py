@@ -50,15 +50,15 @@ def convert(
     A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
     ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
-    from dubins_traffic.campaign.bag_reader import bag_to_records, is_bag
-    from dubins_traffic.campaign.bags import write_bag
-    from dubins_traffic.campaign.lcm_log import is_log, log_to_records
-    from dubins_traffic.campaign.sources import load
     from dubins_traffic.files import is_stream
+    from dubins_traffic.interchange.bag_reader import bag_to_records, is_bag
+    from dubins_traffic.interchange.bags import write_bag
+    from dubins_traffic.interchange.lcm_log import is_log, log_to_records
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.network import RoadNetwork
+    from dubins_traffic.runs.sources import load
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
     if not is_stream(file) and (is_bag(file) or is_log(file)):

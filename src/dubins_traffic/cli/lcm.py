@@ -34,10 +34,10 @@ def run(
     ] = False,
 ) -> None:
     """Run trials whose ego, or some of whose e-agents, are driven over LCM. Ctrl-C keeps all finished trials."""
-    from dubins_traffic.campaign.lcm import run_over_lcm
+    from dubins_traffic.sessions.lcm import run_over_lcm
 
-    todo = asked.programme()
-    session.conduct(todo, run_over_lcm(todo, asked.pace(), url=url, wait=wait), json=asked.json)
+    todo = asked.session_plan()
+    session.run_session(todo, run_over_lcm(todo, asked.pace(), url=url, wait=wait), json=asked.json)
 
 
 @app.command("messages", epilog=options.examples("lcm messages -o dubins_traffic_lcm.lcm"))

@@ -26,7 +26,7 @@ def run(
     ] = 0,
 ) -> None:
     """Run trials whose ego, or some of whose e-agents, are driven over a socket. Ctrl-C keeps all finished trials."""
-    from dubins_traffic.campaign.lines import run_over_lines
+    from dubins_traffic.sessions.lines import run_over_lines
 
-    todo = asked.programme()
-    session.conduct(todo, run_over_lines(todo, asked.pace(), port=port), json=asked.json)
+    todo = asked.session_plan()
+    session.run_session(todo, run_over_lines(todo, asked.pace(), port=port), json=asked.json)

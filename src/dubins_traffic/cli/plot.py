@@ -35,8 +35,8 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a network, an instance or a recorded trial."""
-    from dubins_traffic.campaign.sources import load
     from dubins_traffic.problem.configuration import Configuration
+    from dubins_traffic.runs.sources import load
     from dubins_traffic.viewer.plot import write_plot
 
     output = output or options.beside(file, ".png")

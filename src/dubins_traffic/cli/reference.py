@@ -14,7 +14,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.catalogue import Parameter
+    from dubins_traffic.runs.catalogue import Parameter
 
 _PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """A part of a page between two marks."""
@@ -32,7 +32,7 @@ def renewed(page: str) -> str:
 
 
 def _part(name: str) -> str:
-    from dubins_traffic.campaign import catalogue
+    from dubins_traffic.runs import catalogue
 
     match name:
         case "agents":

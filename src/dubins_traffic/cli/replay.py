@@ -19,8 +19,8 @@ def replay(
     ] = None,
 ) -> None:
     """Make one self-contained page that replays a trial in a browser: play, pause, scrub, speed, trails."""
-    from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.cli.tables import summary
+    from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.marks import formula_marks
     from dubins_traffic.viewer.replay import write_replay

@@ -55,16 +55,16 @@ def run(
     ] = None,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 in one process. Ctrl-C ends it and keeps all finished trials."""
-    from dubins_traffic.campaign.ros1 import run_over_ros1
+    from dubins_traffic.sessions.ros1 import run_over_ros1
 
     _check_remappings(context.args)
     world = _is_world(simulator, poses)
-    todo = asked.programme(None if world else simulator)
+    todo = asked.session_plan(None if world else simulator)
     at = port if master else None
     results = run_over_ros1(
         todo, asked.pace(), master=at, clock=clock, world=world, poses=poses, elsewhere=elsewhere
     )
-    session.conduct(todo, results, json=asked.json)
+    session.run_session(todo, results, json=asked.json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))

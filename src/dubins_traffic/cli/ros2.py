@@ -35,9 +35,9 @@ def run(
     clock: session.Clock = False,
 ) -> None:
     """Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials."""
-    from dubins_traffic.campaign.ros2 import run_over_ros2
+    from dubins_traffic.sessions.ros2 import run_over_ros2
 
-    todo = asked.programme()
-    session.conduct(
+    todo = asked.session_plan()
+    session.run_session(
         todo, run_over_ros2(todo, asked.pace(), domain=domain, here=not wide, clock=clock), json=asked.json
     )

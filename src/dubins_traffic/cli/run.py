@@ -10,7 +10,7 @@ from dubins_traffic.cli import faults, options
 from dubins_traffic.errors import WorkerLostError
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.single import Result
+    from dubins_traffic.runs.single import Result
 
 EXAMPLES = options.examples(
     "run demo",
@@ -84,11 +84,11 @@ def run(
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
-    from dubins_traffic.campaign.many import run_trials
-    from dubins_traffic.campaign.plan import plan
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
     from dubins_traffic.record.sink import FAULTS
+    from dubins_traffic.runs.jobs import run_trials
+    from dubins_traffic.runs.plan import plan
 
     todo = plan(
         source,

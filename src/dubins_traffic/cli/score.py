@@ -18,8 +18,8 @@ def score(
     json: options.Json = False,
 ) -> None:
     """Score recorded trials, with the same code as `run` does live."""
-    from dubins_traffic.campaign.sources import load_record
     from dubins_traffic.cli.tables import show
+    from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import ScoreSheet
     from dubins_traffic.scoring.score import score as score_record
 

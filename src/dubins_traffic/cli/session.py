@@ -15,8 +15,8 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.sessions import Pace, Programme
-    from dubins_traffic.campaign.single import Result
+    from dubins_traffic.runs.single import Result
+    from dubins_traffic.sessions.plan import Pace, SessionPlan
 
 Controller = Annotated[
     str | None,
@@ -78,11 +78,11 @@ class Asked:
     shield: options.Shield = False
     json: options.Json = False
 
-    def programme(self, simulator: str | None = None) -> Programme:
+    def session_plan(self, simulator: str | None = None) -> SessionPlan:
         """Return what the session shall run."""
-        from dubins_traffic.campaign.sessions import programme
+        from dubins_traffic.sessions.plan import session_plan
 
-        todo = programme(
+        todo = session_plan(
             self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
             remote=self.remote or (), data=options.trial_data(self.data, self.data_over),
             overwrite_data=self.data is None, records=self.records, simulator=simulator, shield=self.shield,
@@ -91,7 +91,7 @@ class Asked:
 
     def pace(self) -> Pace:
         """Return how drivers are waited for."""
-        from dubins_traffic.campaign.sessions import Pace
+        from dubins_traffic.sessions.plan import Pace
         from dubins_traffic.transports.patience import Patience
 
         patience = Patience(begin=self.begin, silence=self.silence)
@@ -121,7 +121,7 @@ def shared(own: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def conduct(todo: Programme, session: Iterable[Result], *, json: bool) -> None:
+def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> None:
     """Run a session's trials, say how each ended and show the scores; SIGTERM ends it as Ctrl-C does."""
     from dubins_traffic.cli.tables import show
     from dubins_traffic.record.sink import FAULTS

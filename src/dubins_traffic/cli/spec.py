@@ -14,9 +14,9 @@ from dubins_traffic.cli import options
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
+    from dubins_traffic.logic.exports import Specification
+    from dubins_traffic.logic.formula import Formula, FormulaError
     from dubins_traffic.problem.instance import Instance
-    from dubins_traffic.spec.logic.exports import Specification
-    from dubins_traffic.spec.logic.formula import Formula, FormulaError
 
 EXAMPLES = options.examples(
     "spec first.json",
@@ -69,7 +69,7 @@ def spec(
     output: options.Output = None,
 ) -> None:
     """Print the task of a problem as temporal logic: what is assumed of the others, and what the ego guarantees."""
-    from dubins_traffic.spec.task import task
+    from dubins_traffic.rules.task import task
 
     if period is not None and not 0.0 < period < math.inf:
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
@@ -87,9 +87,9 @@ def spec(
 
 
 def _instance(source: str) -> Instance:
-    from dubins_traffic.campaign.sources import load
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.reader import Record
+    from dubins_traffic.runs.sources import load
 
     found = load(source)
     if isinstance(found, Record):
@@ -101,7 +101,7 @@ def _instance(source: str) -> Instance:
 
 def _part(whole: Specification, assumption: bool | None) -> Specification:
     """Return the assumptions of a task (true), its guarantees (false) or both, and their propositions."""
-    from dubins_traffic.spec.logic.formula import propositions
+    from dubins_traffic.logic.formula import propositions
 
     assumptions = () if assumption is False else whole.assumptions
     guarantees = () if assumption else whole.guarantees
@@ -112,7 +112,7 @@ def _part(whole: Specification, assumption: bool | None) -> Specification:
 
 def _own(spec: Specification, joint: str) -> str:
     """Return a specification in the syntax that we read ourselves, its conjuncts joined by `joint`."""
-    from dubins_traffic.spec.logic.printer import to_spin
+    from dubins_traffic.logic.printer import to_spin
 
     sides = [
         joint.join(f"({to_spin(formula)})" for formula in formulas).replace("[] <>", "[]<>")
@@ -130,8 +130,8 @@ def _told(spec: Specification, format: Format, period: float, source: str) -> st
     InputError
         If it can't say it; names the formula.
     """
-    from dubins_traffic.spec.logic.exports import FORMATS
-    from dubins_traffic.spec.logic.formula import FormulaError
+    from dubins_traffic.logic.exports import FORMATS
+    from dubins_traffic.logic.formula import FormulaError
 
     if format in ONE_FORMULA and not spec.guarantees:
         spec = replace(spec, assumptions=(), guarantees=spec.assumptions)
@@ -150,7 +150,7 @@ def _told(spec: Specification, format: Format, period: float, source: str) -> st
 
 def _parts(spec: Specification) -> Iterator[tuple[Formula, Specification]]:
     """Yield each formula of a specification, and a specification of it alone."""
-    from dubins_traffic.spec.logic.formula import propositions
+    from dubins_traffic.logic.formula import propositions
 
     outputs = set(spec.outputs)
     for place, formula in enumerate((*spec.assumptions, *spec.guarantees)):
@@ -164,7 +164,7 @@ def _refusal(
     error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str
 ) -> InputError:
     """Return what to say of a formula that can't be said, given what would have to change for the whole."""
-    from dubins_traffic.spec.logic.printer import to_spin
+    from dubins_traffic.logic.printer import to_spin
 
     return InputError(
         error.problem,

@@ -126,11 +126,11 @@ def synth(
 
 def _instance(source: str, seed: int, trial: int) -> Instance:
     """Return the instance at a source; that of a trial, if it is a configuration."""
-    from dubins_traffic.campaign.sources import load
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.problem.draw import draw
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.reader import Record
+    from dubins_traffic.runs.sources import load
 
     found = load(source, seed=seed)
     if isinstance(found, Configuration):

@@ -1,7 +1,7 @@
 """The controller `lanes`: the shortest round through the goals in the right lane, with regard for other cars.
 
 Planning is plain Python and rare: once at the start, and when the way has been blocked for long. What happens every
-tick is the compiled law `controllers.lanes_law`.
+tick is the compiled law `policies.lanes.policy`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.controllers import lanes_desk as columns
-from dubins_traffic.controllers.lanes_desk import Desk
-from dubins_traffic.controllers.lanes_law import decide
-from dubins_traffic.driving.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
-from dubins_traffic.driving.paths import FIELDS, LANE, LENGTH, PathMaker
-from dubins_traffic.driving.tours import LaneGraph, Round, find_round
-from dubins_traffic.driving.turns import IMPOSSIBLE, can_pivot
+from dubins_traffic.policies.lanes import knowledge as columns
+from dubins_traffic.policies.lanes.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
+from dubins_traffic.policies.lanes.knowledge import Knowledge
+from dubins_traffic.policies.lanes.paths import FIELDS, LANE, LENGTH, PathMaker
+from dubins_traffic.policies.lanes.policy import decide
+from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import pack
+from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 
 FOLLOW = 1.3
 """Gap kept behind cars, centre to centre, metres: the e-agent of 2016 stands while the ego is within 1 m."""
@@ -38,7 +38,7 @@ class Lanes:
 
     Notes
     -----
-    The round is the shortest closed route along lanes (`driving.tours.find_round`), in whatever order of the goals
+    The round is the shortest closed route along lanes (`routing.tours.find_round`), in whatever order of the goals
     that needs; goals that the car can't reach on the road, having too large a turning radius, are left out. It is
     joined where that is nearest. Without goals, or if none can be reached, the car stands.
 
@@ -53,7 +53,7 @@ class Lanes:
     """
 
     def __init__(self) -> None:
-        self._desk: Desk | None = None
+        self._known: Knowledge | None = None
 
     def start(self, problem: Problem) -> None:
         """Find the round."""
@@ -65,27 +65,27 @@ class Lanes:
         self._graph = LaneGraph(problem.network, self._maker.turn_cost)
         self._round = self._find_round()
         self._roads = pack([problem.network], [2.0 * problem.car.w])
-        self._desk = None
+        self._known = None
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
         if self._round is None:
             return Command(0.0, 0.0)
-        desk = self._desk
-        if desk is None:
-            desk = self._desk = self._furnish(observation.pose)
+        known = self._known
+        if known is None:
+            known = self._known = self._furnish(observation.pose)
         elif self._blocked or self._closed:
-            desk = self._desk = self._remember(desk, observation)
-        ego, others = desk.ego[0], desk.others[0]
+            known = self._known = self._remember(known, observation)
+        ego, others = known.ego[0], known.others[0]
         ego[:] = observation.pose
         others[:, O_SEEN] = 0.0
         for car in observation.others:
             others[car.index - 1, :O_STILL] = (*car.pose, *car.twist)
             others[car.index - 1, O_SEEN] = 1.0
-        decide(desk, self._roads)
-        if desk.blocker[0] != NOBODY:
-            self._detour(observation, int(desk.blocker[0]))
-        speed, yaw_rate = desk.command[0].tolist()
+        decide(known, self._roads)
+        if known.blocker[0] != NOBODY:
+            self._detour(observation, int(known.blocker[0]))
+        speed, yaw_rate = known.command[0].tolist()
         return Command(speed, yaw_rate)
 
     def _find_round(self) -> Round | None:
@@ -98,7 +98,7 @@ class Lanes:
         found = find_round(self._graph, [goal for goal in goals if lengths[goal] < IMPOSSIBLE])
         return found if found is not None and found.length < IMPOSSIBLE else None
 
-    def _furnish(self, pose: Pose) -> Desk:
+    def _furnish(self, pose: Pose) -> Knowledge:
         problem = self._problem
         car = pack_cars([problem.car])
         obstacles = pack_obstacles([problem.obstacles])
@@ -117,7 +117,7 @@ class Lanes:
             problem.period,
             max(FOLLOW, 2.0 * reach + 0.5),
         )
-        desk = Desk(
+        known = Knowledge(
             path=np.zeros((1, FIELDS)),
             span=np.zeros((1, 3), dtype=np.int64),
             row=np.zeros(1, dtype=np.int64),
@@ -132,10 +132,10 @@ class Lanes:
             command=np.zeros((1, 2)),
             blocker=np.full(1, NOBODY, dtype=np.int64),
         )
-        return self._plan(desk, pose)
+        return self._plan(known, pose)
 
-    def _plan(self, desk: Desk, pose: Pose) -> Desk:
-        """Return the desk with the cheapest way from `pose` to the round as its path."""
+    def _plan(self, known: Knowledge, pose: Pose) -> Knowledge:
+        """Return the known with the cheapest way from `pose` to the round as its path."""
         tours = self._round
         assert tours is not None
         best = (inf, 0, 0.0, 0.0, -1)
@@ -159,7 +159,7 @@ class Lanes:
         memory[0, columns.RAMP] = 0.2 + 0.8 * abs(left)
         memory[0, columns.UNTIL] = memory[0, columns.RAMP]
         span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
-        return desk._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
+        return known._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
 
     def _entries(self, pose: Pose) -> list[tuple[int, float, float, float]]:
         """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""
@@ -200,29 +200,31 @@ class Lanes:
             cost += DETOUR
         return cost
 
-    def _reroute(self, desk: Desk, pose: Pose) -> Desk:
-        """Find the round again, with regard for what is blocked now, and return the desk with the way to it."""
+    def _reroute(self, known: Knowledge, pose: Pose) -> Knowledge:
+        """Find the round again, with regard for what is blocked now, and return the known with the way to it."""
         before = self._round
         self._graph = LaneGraph(self._network, self._cost)
         self._round = self._find_round() or before
-        return self._plan(desk, pose)
+        return self._plan(known, pose)
 
-    def _remember(self, desk: Desk, observation: Observation) -> Desk:
-        """Forget blocked places in time; the desk has a new path if one was forgotten and this is a place to change."""
+    def _remember(self, known: Knowledge, observation: Observation) -> Knowledge:
+        """Forget blocked places in time; the known has a new path if one was forgotten and this is a place to
+        change.
+        """
         time = observation.time
         old = [place for places in (self._blocked, self._closed) for place in places if places[place] <= time]
-        row = desk.path[desk.row[0]]
-        if not old or row[LANE] < 0 or desk.memory[0, columns.SIGMA] > 0.3 * row[LENGTH]:
-            return desk
+        row = known.path[known.row[0]]
+        if not old or row[LANE] < 0 or known.memory[0, columns.SIGMA] > 0.3 * row[LENGTH]:
+            return known
         self._blocked = {lane: until for lane, until in self._blocked.items() if until > time}
         self._closed = {vertex: until for vertex, until in self._closed.items() if until > time}
-        return self._reroute(desk, observation.pose)
+        return self._reroute(known, observation.pose)
 
     def _detour(self, observation: Observation, blocker: int) -> None:
         """Note where the way is blocked, and plan again."""
-        desk = self._desk
-        assert desk is not None
-        x, y = desk.others[0, blocker, :2] if blocker >= 0 else desk.part[-1 - blocker, :2]
+        known = self._known
+        assert known is not None
+        x, y = known.others[0, blocker, :2] if blocker >= 0 else known.part[-1 - blocker, :2]
         until = observation.time + FORGET
         point = np.array((float(x), float(y)))
         vertex, far = self._network.nearest_intersection(point)
@@ -237,4 +239,4 @@ class Lanes:
             self._blocked[2 * segment + (1 if float(left) > 0.0 else 0)] = until
             if hypot(point[0] - pose.x, point[1] - pose.y) < 3.0:
                 self._blocked[2 * segment + (0 if ahead > 0.0 else 1)] = until
-        self._desk = self._reroute(desk, pose)
+        self._known = self._reroute(known, pose)

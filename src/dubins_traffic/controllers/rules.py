@@ -8,27 +8,27 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
-from dubins_traffic.driving.fitness import check_fit
-from dubins_traffic.driving.lane_graph import nearest_stage
-from dubins_traffic.driving.law import decide
-from dubins_traffic.driving.law_tables import (
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.policy import decide
+from dubins_traffic.policies.rules.tables import (
     FIRST,
     KIND,
     LAST,
     PLACE,
     ROUND,
     SPEED,
-    Desk,
     Drivers,
+    Scratch,
     blank,
     build_of,
-    desk,
     no_ways,
+    scratch,
 )
-from dubins_traffic.driving.rounds import stages
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.routing.lane_graph import nearest_stage
+from dubins_traffic.routing.rounds import stages
 
 
 class Rules:
@@ -36,7 +36,7 @@ class Rules:
 
     Notes
     -----
-    The goals are visited in the order of the shortest closed route along lanes (`driving.tours.find_round`), each by
+    The goals are visited in the order of the shortest closed route along lanes (`routing.tours.find_round`), each by
     the lane that this route takes; from wherever the car is, it goes the shortest way there. It enters a crossing when
     it is its turn and there is room behind it; in time it takes another exit if there is none. A last look before
     every tick rules out all motions that could bring about a contact. Without goals that can be reached it stands.
@@ -56,7 +56,7 @@ class Rules:
         self._command = np.zeros((1, cars, 2))
         self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._desk: Desk = desk(cars, len(problem.network.segments))
+        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
         if not len(stage):
             return
         ints[EGO, [KIND, FIRST, LAST]] = (ROUND, 0, len(stage))
@@ -73,7 +73,7 @@ class Rules:
             stage=stage,
             distance=distance,
         )
-        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._desk)
+        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._scratch)
         self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
 
     def act(self, observation: Observation) -> Command:

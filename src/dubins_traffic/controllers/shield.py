@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import registry
-from dubins_traffic.driving.guard import Guard
-from dubins_traffic.driving.shield_tables import Overtakes
 from dubins_traffic.protocols import Closes, Controller, Reports
 from dubins_traffic.record.sink import SHIELD
+from dubins_traffic.shield.filter import ShieldFilter
+from dubins_traffic.shield.tables import Overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -34,7 +34,7 @@ class Shield:
 
     Attributes
     ----------
-    guard : Guard
+    shield_filter : ShieldFilter
         What keeps the ego within the rules, and counts how often it had to.
 
     Notes
@@ -52,12 +52,12 @@ class Shield:
 
     def __init__(self, controller: Controller | str, *, overtakes: Overtakes = "sure") -> None:
         self._controller = registry.load(controller) if isinstance(controller, str) else controller
-        self.guard = Guard(overtakes=overtakes)
+        self.shield_filter = ShieldFilter(overtakes=overtakes)
         self._events: list[tuple[str, str]] = []
 
     def start(self, problem: Problem) -> None:
         """Start the other controller; InputError if the car can't keep the rules."""
-        self.guard.start(problem)
+        self.shield_filter.start(problem)
         self._events = []
         self._controller.start(problem)
 
@@ -66,8 +66,8 @@ class Shield:
         asked = self._controller.act(observation)
         if asked is None:
             return None
-        given = self.guard.filter(observation, asked)
-        found = self.guard.intervention
+        given = self.shield_filter.filter(observation, asked)
+        found = self.shield_filter.intervention
         if found is not None:
             self._events.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given

@@ -12,20 +12,20 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import told
-from dubins_traffic.driving.exits import BACK
-from dubins_traffic.driving.guard import Guard
-from dubins_traffic.driving.lane_graph import nearest_stage
-from dubins_traffic.driving.law_tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
-from dubins_traffic.driving.room import MARGIN
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.policies.rules.exits import BACK
+from dubins_traffic.policies.rules.room import MARGIN
+from dubins_traffic.policies.rules.tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
 from dubins_traffic.record.sink import SHIELD
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.routing.lane_graph import nearest_stage
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.shield.filter import ShieldFilter
 from dubins_traffic.synthesis.advice import Advice, advise
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
-from dubins_traffic.synthesis.road_play import RoadPlay, Terms
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
@@ -86,7 +86,7 @@ class Synthesized(Rules):
         super().__init__()
         self._strategy = strategy
         self._course: _Course | None = None
-        self._guard = Guard(overtakes="law")
+        self._shield_filter = ShieldFilter(overtakes="law")
 
     def start(self, problem: Problem) -> None:
         """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
@@ -96,7 +96,7 @@ class Synthesized(Rules):
         if drivers is None or not problem.e_agents:
             return
         strategy = _solved(problem) if self._strategy is None else _fitting(self._strategy, problem)
-        self._guard.start(problem)
+        self._shield_filter.start(problem)
         rules = RuleParameters.from_mapping(problem.rules)
         self._period = problem.period
         self._edge = problem.intersection_radius + problem.car.body.reach + MARGIN
@@ -105,7 +105,7 @@ class Synthesized(Rules):
         vertices: list[int] = drivers.stage.tolist()
         self._course = _Course(
             strategy,
-            RoadPlay(strategy.board, _terms(problem), ("ego", *problem.e_agents)),
+            RoadPlay(strategy.board, _sight(problem), ("ego", *problem.e_agents)),
             _ways(drivers, [arena.network.arms(v) for v in vertices]),
             [arena.goals.index(v) for v in vertices],
             vertices,
@@ -187,8 +187,8 @@ class Synthesized(Rules):
 
     def _guarded(self, course: _Course, seen: Observation, command: Command) -> Command:
         """Return what the shield makes of a command."""
-        given = self._guard.filter(seen, command)
-        found = self._guard.intervention
+        given = self._shield_filter.filter(seen, command)
+        found = self._shield_filter.intervention
         if found is not None:
             course.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given
@@ -217,8 +217,8 @@ def _liked(free: Sequence[int], exits: Sequence[int], distance: Floats) -> list[
     return [*free, *sorted(set(exits) - set(free), key=lambda lane: (distance[lane], lane))]
 
 
-def _terms(problem: Problem) -> Terms:
-    return Terms(
+def _sight(problem: Problem) -> Sight:
+    return Sight(
         sight=problem.sensing_radius,
         margin=problem.intersection_radius + problem.car.body.reach,
         look=max(1, round(LOOK * problem.rate)),

@@ -55,7 +55,11 @@ class KernelFiles:
             _say_damaged(path)
             path.unlink(missing_ok=True)
             return None
-        saved_key, value = pickle.loads(payload)
+        try:
+            saved_key, value = pickle.loads(payload)
+        except (ImportError, AttributeError):
+            # A type among the arguments was defined where it is no more: another version of this package saved it.
+            return None
         return value if saved_key == key else None
 
     def save(self, key: object, value: object) -> None:

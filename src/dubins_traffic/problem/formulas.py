@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import AfterValidator, Field
 
+from dubins_traffic.logic.formula import Formula, FormulaError, propositions
+from dubins_traffic.logic.parse import parse, place_of
 from dubins_traffic.problem.faults import fault
-from dubins_traffic.spec.logic.formula import Formula, FormulaError, propositions
-from dubins_traffic.spec.logic.parse import parse, place_of
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -52,8 +52,8 @@ def check_formulas(problem: Problem, names: tuple[str, ...]) -> None:
     """
     if not problem.formulas:
         return
-    from dubins_traffic.spec.logic.monitor import Monitors
-    from dubins_traffic.spec.vocabulary import Vocabulary
+    from dubins_traffic.logic.monitor import Monitors
+    from dubins_traffic.rules.vocabulary import Vocabulary
 
     formulas = {name: read_formula(name, text) for name, text in problem.formulas.items()}
     vocabulary = Vocabulary(problem, names)

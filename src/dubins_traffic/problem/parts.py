@@ -29,7 +29,7 @@ from dubins_traffic.cars.body import (
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault
 from dubins_traffic.problem.instance import Disturbances, Laser
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
 
 Length = Annotated[float, Field(ge=limits.LEAST, le=limits.METRES)]
 Width = Annotated[float, Field(ge=limits.WIDTHS[0], le=limits.WIDTHS[1])]

@@ -15,7 +15,7 @@ import numpy as np
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.problem.lines import Lines, band, chord
+from dubins_traffic.problem.lane_lines import Lines, band, chord
 from dubins_traffic.problem.overlap import Point, Shape, contains, edges
 from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.network import RoadNetwork

@@ -10,10 +10,7 @@ from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import Configuration, check_goal, pose_of
-from dubins_traffic.problem.demands import check_demands
-from dubins_traffic.problem.formulas import check_formulas
-from dubins_traffic.problem.instance import EAgent, Instance, Problem
-from dubins_traffic.problem.pieces import (
+from dubins_traffic.problem.drawing import (
     Stream,
     agent_wishes,
     complete_agents,
@@ -22,11 +19,14 @@ from dubins_traffic.problem.pieces import (
     drawn_cycle,
     origin_start,
 )
+from dubins_traffic.problem.formulas import check_formulas
+from dubins_traffic.problem.instance import EAgent, Instance, Problem
+from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.problem.starts import Areas, Ground, Wish, areas_of, check_given, draw_starts
 from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
+from dubins_traffic.roads.formats.rnd import grid_segments
 from dubins_traffic.roads.generate import random_network, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.rnd import grid_segments
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.placing import Lots

@@ -25,9 +25,9 @@ from dubins_traffic.problem.parts import (
     RoadReference,
     Rules,
 )
+from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import MOST_INTERSECTIONS
-from dubins_traffic.roads.weave import most_segments
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
 
 NAME = r"^[A-Za-z][A-Za-z0-9_/]*$"
 

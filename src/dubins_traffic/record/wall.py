@@ -133,3 +133,9 @@ _TYPES: Final[Mapping[str, tuple[Callable[[object], bool], str]]] = {
     "transport": (lambda value: isinstance(value, dict), "an object"),
 }
 """What the fields of a sidecar must be."""
+
+
+def remove_record(record: Path) -> None:
+    """Remove a record and its sidecar."""
+    record.unlink(missing_ok=True)
+    sidecar(record).unlink(missing_ok=True)

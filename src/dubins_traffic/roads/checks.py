@@ -12,7 +12,7 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.cells import covered, pairs
-from dubins_traffic.roads.rnd import Segment, extent
+from dubins_traffic.roads.formats.rnd import Segment, extent
 
 LARGEST_DEGREE = 4
 OFF_LATTICE = 0.37

@@ -8,10 +8,10 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.clearance import LEAST_RADIUS, ROUNDING, SEGMENT_SLACK, Clearances, clearances
-from dubins_traffic.roads.growth import Sketch
+from dubins_traffic.roads.formats.rnd import extent
+from dubins_traffic.roads.from_grid import most_segments, spanning, weave
+from dubins_traffic.roads.incremental import Sketch
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.rnd import extent
-from dubins_traffic.roads.weave import most_segments, spanning, weave
 
 STREAM = 1
 """The stream of `Draws` from which networks come."""

@@ -10,7 +10,7 @@ from math import sqrt
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.paving import MIXED, ON
+from dubins_traffic.roads.road_raster import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
 INFINITE = float("inf")
@@ -170,7 +170,7 @@ def _nearest_segments(
 
 
 @jit
-def patch(t: RoadTable, net: int, x: float, y: float, radius: float, row: Floats) -> None:
+def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, row: Floats) -> None:
     """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
 
     The rectangle (x from row[0] to row[1], y from row[2] to row[3], its edges not included) lies within the cell of the

@@ -16,9 +16,9 @@ from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads import rnd
 from dubins_traffic.roads.checks import check
-from dubins_traffic.roads.rnd import Segment
+from dubins_traffic.roads.formats import rnd
+from dubins_traffic.roads.formats.rnd import Segment
 from dubins_traffic.roads.routes import Routes, arms, shortest
 from dubins_traffic.roads.surface import Surface
 

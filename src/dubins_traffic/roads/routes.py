@@ -14,7 +14,7 @@ from math import inf
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.rnd import Segment
+from dubins_traffic.roads.formats.rnd import Segment
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ FEW = 1 << 14
 """Up to so many pairs of a cell and an item all are looked at, which is sooner done."""
 
 if TYPE_CHECKING:
-    from dubins_traffic.roads.paving import Paving
+    from dubins_traffic.roads.road_raster import Paving
 
 Distance2 = Callable[[Floats, Floats, Ints], Floats]
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.paving import pave
+from dubins_traffic.roads.road_raster import pave
 
 
 class RoadTable(NamedTuple):
@@ -48,7 +48,7 @@ class RoadTable(NamedTuple):
     pave_dim : array (K, 3)
         Columns and rows of the cells of `pave`, and the number of the first.
     pave : array
-        What the road makes of a cell, see `roads.paving`.
+        What the road makes of a cell, see `roads.road_raster`.
     """
 
     half_width: Floats

@@ -9,8 +9,8 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.propositions import LEFT, ON_ROAD
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.propositions import LEFT, ON_ROAD
 
 
 @dataclass(frozen=True, slots=True)

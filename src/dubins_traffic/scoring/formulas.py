@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 
 from dubins_traffic.cars.state import Frames
+from dubins_traffic.logic.automaton import FALSE, TRUE, VERDICTS
+from dubins_traffic.logic.formula import propositions
+from dubins_traffic.logic.monitor import Monitors
+from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.spec.logic.automaton import FALSE, TRUE, VERDICTS
-from dubins_traffic.spec.logic.formula import propositions
-from dubins_traffic.spec.logic.monitor import Monitors
-from dubins_traffic.spec.logic.parse import parse
 
 if TYPE_CHECKING:
-    from dubins_traffic.spec.valuation import Valuation
+    from dubins_traffic.rules.valuation import Valuation
 
 Status = Literal["true", "presumably true", "presumably false", "false"]
 
@@ -34,7 +34,7 @@ class FormulaVerdict:
     time : float or None
         Seconds: since which frame the verdict has been true or false for good; None while it is presumed.
     early : bool
-        Whether that is said as early as can be; else false may be said later (`spec.logic.monitor`).
+        Whether that is said as early as can be; else false may be said later (`logic.monitor`).
     """
 
     name: str
@@ -71,7 +71,7 @@ class FormulaVerdicts:
         self._valuation: Valuation | None = None
         if not self._texts:
             return
-        from dubins_traffic.spec.valuation import (
+        from dubins_traffic.rules.valuation import (
             Valuation,
         )  # compiles; only where there is something to judge
 

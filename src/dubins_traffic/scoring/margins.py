@@ -14,15 +14,15 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
+from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.clearance import Clearance
-from dubins_traffic.spec.parameters import RuleParameters
 
 MEASURED: Final = ("1.road", "2.left", "2.return")
 """The rules whose margins `find_margins` finds, in the order of its columns."""
 
 
 class Margins:
-    """The robustness of the ego's rules 1 and 2 (`spec.logic.robustness`), in metres.
+    """The robustness of the ego's rules 1 and 2 (`logic.robustness`), in metres.
 
     The signals are the gap to the nearest other body, the distance of the centre to the edge of the road, and how far
     the body reaches beyond the line at which `left` rises (or, once it has risen, falls); `overtaking` is infinite. The

@@ -9,16 +9,16 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.logic.formula import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.spec.logic.formula import ticks
-from dubins_traffic.spec.propositions import LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dubins_traffic.cars.tables import CarTable
-    from dubins_traffic.spec.parameters import RuleParameters
+    from dubins_traffic.rules.parameters import RuleParameters
 
 INFINITE = float("inf")
 LEFT_SET, LEFT_RELEASE = 0, 1

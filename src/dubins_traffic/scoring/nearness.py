@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dubins_traffic.cars.state import EGO
 
 if TYPE_CHECKING:
-    from dubins_traffic.spec.judge import Breach
+    from dubins_traffic.rules.referee import Breach
 
 
 def is_near(breaches: Sequence[Breach], back: int, seen: Callable[[int, int], bool]) -> bool:

@@ -13,6 +13,8 @@ from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach, Pending, accused, order
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
@@ -40,14 +42,12 @@ from dubins_traffic.scoring.tally import (
     Tally,
 )
 from dubins_traffic.scoring.verdict import reach_verdict
-from dubins_traffic.spec.judge import Breach, Running, accused, order
-from dubins_traffic.spec.parameters import RuleParameters
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 
-class Tallied:
+class BatchScores:
     """What a batch has counted of some trials that have ended.
 
     Parameters
@@ -80,7 +80,7 @@ class Tallied:
         contacts: Sequence[Contact],
         breaches: Sequence[Breach],
         seen: Set[tuple[int, int]],
-        running: Running,
+        running: Pending,
         ending: Ending,
         rules: RuleParameters,
         controller: str,
@@ -88,7 +88,7 @@ class Tallied:
     ) -> Score:
         """Return the score of trial b, which ended with `ending`, whose ego was driven by `controller`.
 
-        `contacts`, with `at_fault`, and the `breaches` of the docket are in order of time; `seen` holds (car, tick)
+        `contacts`, with `at_fault`, and the `breaches` of the breach_log are in order of time; `seen` holds (car, tick)
         of each breach by an e-agent that was within the sensing radius then; `running` is what hung over the cars in
         the last frame.
         """

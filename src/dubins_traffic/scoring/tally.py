@@ -15,11 +15,11 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.propositions import LEFT, ON_ROAD
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
 from dubins_traffic.scoring.icra2016 import counts as counts_in_2016
-from dubins_traffic.spec.judged import kinds_of
-from dubins_traffic.spec.parameters import RuleParameters
-from dubins_traffic.spec.propositions import LEFT, ON_ROAD
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.problem.demands import check_demands
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.rules.exceptions import Exceptions
+from dubins_traffic.rules.parameters import EDITION, RuleParameters
+from dubins_traffic.rules.tables import ticks
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import Visiting, Visits
 from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.nearness import is_near
-from dubins_traffic.spec.exceptions import Exceptions
-from dubins_traffic.spec.parameters import EDITION, RuleParameters
-from dubins_traffic.spec.tables import ticks
 
 if TYPE_CHECKING:
-    from dubins_traffic.spec.judge import Breach, Running
+    from dubins_traffic.rules.referee import Breach, Pending
 
 EGO_NAME = "ego"
 """Name of the ego among the cars."""
@@ -206,7 +206,7 @@ class Judging:
             problem.sensing_radius,
             self._rules.to_mapping(),
         )
-        from dubins_traffic.spec.judge import Referee  # compiles; only where there is something to judge
+        from dubins_traffic.rules.referee import Referee  # compiles; only where there is something to judge
 
         self._referee = Referee([instance])
         self._breaches: list[Breach] = []
@@ -272,7 +272,7 @@ def reach_verdict(
     visited_now: Sequence[bool],
     was_sensed: Callable[[int, int, int], bool],
     seen: Callable[[int, int], bool],
-    running: Running,
+    running: Pending,
     margins: dict[str, float | None],
     *,
     whole: bool,
@@ -301,7 +301,7 @@ def reach_verdict(
     whole
         Whether the trial ran its whole planned duration.
     """
-    from dubins_traffic.driving.rounds import round_time  # compiles; only where there is something to judge
+    from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
 
     rate = instance.problem.rate
     violations = tuple([_violation(instance, breach) for breach in breaches])
@@ -354,7 +354,7 @@ def _formulas(
     breaches: Sequence[Breach],
     visits: Visits,
     visited_now: Sequence[bool],
-    running: Running,
+    running: Pending,
 ) -> dict[str, Status]:
     found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
     for rule in running.ego.intersection(EGO_RULES):
@@ -388,7 +388,7 @@ def assumed(rules: RuleParameters) -> tuple[str, ...]:
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
     """Return which part of the assumption falls first, and with which breach; None if it holds.
 
-    Breaches of E1 that a car is allowed (`spec.exceptions`) don't count.
+    Breaches of E1 that a car is allowed (`rules.exceptions`) don't count.
     """
     made = assumed(rules)
     exceptions = Exceptions(rules, rate)

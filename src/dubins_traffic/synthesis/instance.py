@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
-from dubins_traffic.spec.parameters import RuleParameters
+from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board

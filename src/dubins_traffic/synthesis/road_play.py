@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dubins_traffic.spec.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.rules.propositions import FIRST, FORFEITED, STOPPED
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
@@ -28,7 +28,7 @@ NEW_TICKET: Final = "new_ticket"
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
+class Sight:
     """How the road is seen.
 
     Attributes
@@ -79,7 +79,7 @@ class RoadPlay:
     ----------
     board : Board
         The game.
-    terms : Terms
+    sight : Sight
         How the road is seen.
     names : sequence of str
         Of the cars, the ego first.
@@ -98,7 +98,7 @@ class RoadPlay:
         How many moves have been looked up in the game, and how often an assumed place has been changed.
     """
 
-    def __init__(self, board: Board, terms: Terms, names: Sequence[str]) -> None:
+    def __init__(self, board: Board, sight: Sight, names: Sequence[str]) -> None:
         self.ground = Ground(board.arena)
         self.moves = MoveList(board)
         self.position: int | None = None
@@ -107,7 +107,7 @@ class RoadPlay:
         self.checked = 0
         self.revised = 0
         self._board = board
-        self._terms = terms
+        self._sight = sight
         self._names = names
         self._signature: object = None
         self._again = 0
@@ -124,7 +124,7 @@ class RoadPlay:
             return False
         self._signature = signature
         self._seen = {car.car: car for car in cars}
-        self._again = tick + self._terms.look
+        self._again = tick + self._sight.look
         cells = {car.car: self._cell(car) for car in cars}
         shown = self._holders(cells)
         self._assume(shown)
@@ -172,14 +172,14 @@ class RoadPlay:
         """Find places for the cars that are not shown, where those that are shown have been and are not in the way."""
         now = set(shown.values())
         taken = set(self._shown.values()) | now
-        if EGO_CAR not in shown and not self._terms.assume_ego:
+        if EGO_CAR not in shown and not self._sight.assume_ego:
             taken.add(self.cells[EGO_CAR])
         ego = self.cells[EGO_CAR]
         avoided = set(self._board.arena.following(ego)) if ego != NOWHERE else set[int]()
         for cell in tuple(avoided):
             avoided.update(self._board.arena.following(cell))
         nodes = len(self._board.arena.nodes)
-        for car in range(0 if self._terms.assume_ego else 1, len(self.cells)):
+        for car in range(0 if self._sight.assume_ego else 1, len(self.cells)):
             cell = self.cells[car]
             if car in self._shown and (car in shown or cell not in now):
                 continue
@@ -191,7 +191,7 @@ class RoadPlay:
             taken.add(cell)
 
     def _would_be_seen(self, cell: int) -> bool:
-        return self.ground.within(cell, self._seen[EGO_CAR].pose, self._terms.sight, self._terms.margin)
+        return self.ground.within(cell, self._seen[EGO_CAR].pose, self._sight.sight, self._sight.margin)
 
     def _elsewhere(self, car: int, cell: int, taken: set[int], avoided: set[int]) -> int:
         start = max(cell, 0)
@@ -247,7 +247,7 @@ class RoadPlay:
         for car, cell in shown.items():
             if self.cells[car] != cell or car not in self._shown:
                 self._put(car, cell)
-        if EGO_CAR not in shown and cells[EGO_CAR] != NOWHERE and not self._terms.assume_ego:
+        if EGO_CAR not in shown and cells[EGO_CAR] != NOWHERE and not self._sight.assume_ego:
             self._put(EGO_CAR, cells[EGO_CAR])
         self._shown = shown
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
 from dubins_traffic.cars.state import Pose, Propositions
-from dubins_traffic.spec.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.rules.propositions import FIRST, FORFEITED, STOPPED
 from dubins_traffic.synthesis.arena import Arena
 
 WAITS: Final = STOPPED | FIRST | FORFEITED

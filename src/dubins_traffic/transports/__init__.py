@@ -13,5 +13,5 @@ To add a transport, write one class with the methods of `protocols.Transport`, i
 
 Bounded memory, floods, silence, lateness, reconnection and pauses are the link's and need no word in a transport. A
 subclass of `tests.conformance.transport.TransportConformance` of some lines then tests it like every other one, and
-`campaign.remote.run_remote` runs trials over it.
+`sessions.remote.run_remote` runs trials over it.
 """

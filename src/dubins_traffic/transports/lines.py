@@ -17,7 +17,7 @@ from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.errors import TransportError
-from dubins_traffic.problem.told import problem_to_document
+from dubins_traffic.problem.public_problem import problem_to_document
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.observed import observation_to_document
 

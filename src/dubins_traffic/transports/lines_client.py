@@ -6,7 +6,7 @@ import json
 import socket
 from typing import Any, cast
 
-from dubins_traffic.problem.told import problem_from_document
+from dubins_traffic.problem.public_problem import problem_from_document
 from dubins_traffic.protocols import Closes, Controller
 from dubins_traffic.transports.observed import observation_from_document
 

@@ -8,8 +8,8 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import EGO, Labels, Observation, State
-from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import PeerError
+from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Clock, End, Ending, Polled, Streams, Transport, View
 from dubins_traffic.record.wall import summary

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
-from dubins_traffic.driving.senses import Senses
 from dubins_traffic.errors import ControllerError, DubinsTrafficError
+from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
-from dubins_traffic.spec.labeller import Labeller
+from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import agent_fault, checked_command, collision_detail

@@ -1,1 +1,1 @@
-"""."""
+"""Pictures, replays and what notebooks show."""

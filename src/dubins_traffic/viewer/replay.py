@@ -23,8 +23,8 @@ from dubins_traffic.files import replace_file
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.rules.propositions import NAMES
 from dubins_traffic.scoring.verdict import Verdict
-from dubins_traffic.spec.propositions import NAMES
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.marks import (
     Mark,

@@ -13,13 +13,13 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.many import Job
 from dubins_traffic.campaign.report.metrics import words
 from dubins_traffic.campaign.table import places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
 from dubins_traffic.record.sink import FAULTS, End
+from dubins_traffic.runs.jobs import Job
 from dubins_traffic.scoring.score import score
 from dubins_traffic.viewer.replay import write_replay
 

@@ -12,8 +12,8 @@ from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
+from dubins_traffic.campaign.report.csv_tables import sheets
 from dubins_traffic.campaign.report.page import page
-from dubins_traffic.campaign.report.sheets import sheets
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError

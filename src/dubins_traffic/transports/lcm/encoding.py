@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, Observation, Pose, Propositions, SensedCar, State, Twist
-from dubins_traffic.problem.told import problem_from_document, problem_to_document
+from dubins_traffic.problem.public_problem import problem_from_document, problem_to_document
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import car_t, instance_t, state_t, world_t
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from xmlrpc.client import Error as XmlRpcError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.ros1.desk import Desk, Told
+from dubins_traffic.transports.ros1.maestro_services import MaestroServices, Told
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join
 from dubins_traffic.transports.ros1.world import Topics, World
@@ -80,7 +80,7 @@ class Ros1:
         self._rospy = join(self._uri, NAME if self._foreign is None else REFEREE)
         self._mailbox = mailbox
         self._topics = Topics(self._rospy)
-        self._desk = Desk(
+        self._services = MaestroServices(
             self._rospy,
             mailbox,
             self._maestro,
@@ -97,14 +97,14 @@ class Ros1:
         with self._guarded():
             self._topics.retain(instance.names)
             self._world = World(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
-            self._desk.describe(instance)
+            self._services.describe(instance)
             self._listen(remote)
         self._stamps.begin()
 
     def announce(self, instance: Instance) -> None:
         """Publish the problem instance."""
         with self._guarded():
-            self._desk.announce(instance, self._stamps.now())
+            self._services.announce(instance, self._stamps.now())
 
     def frame(self, view: View) -> None:
         """Publish a frame."""
@@ -117,7 +117,7 @@ class Ros1:
     def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
         """Publish the empty instance that ends a trial."""
         with self._guarded():
-            self._desk.end(self._stamps.now())
+            self._services.end(self._stamps.now())
 
     def close(self) -> None:
         """Take back what this session has put into the graph; the node itself stays until the process ends."""
@@ -128,7 +128,7 @@ class Ros1:
         with self._guarded():
             self._topics.close()
             self._listen(())
-            self._desk.close(forget=not self._lost)
+            self._services.close(forget=not self._lost)
 
     def _listen(self, remote: Sequence[str]) -> None:
         """Subscribe to the commands of the cars `remote`, and to no others."""

@@ -10,8 +10,8 @@ from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import Ending, Mailbox, View
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.desk import AT_ONCE, INSTANCE, Desk
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
+from dubins_traffic.transports.ros2.maestro_services import AT_ONCE, INSTANCE, MaestroServices
 from dubins_traffic.transports.ros2.world import World, moment
 from dubins_traffic.transports.stamps import Stamps
 
@@ -77,12 +77,12 @@ class Ros2:
             self.close()
             raise
         self._world = World(self._graph, clock=self._clock)
-        self._desk = Desk(self._graph, mailbox, self._maestro)
+        self._services = MaestroServices(self._graph, mailbox, self._maestro)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars `remote`."""
         self._stamps.begin()
-        self._desk.begin()
+        self._services.begin()
         self._world.begin(instance)
         for car in [car for car in self._readers if car not in remote]:
             self._graph.drop(self._readers.pop(car))
@@ -94,7 +94,7 @@ class Ros2:
 
     def announce(self, instance: Instance) -> None:
         """Publish the problem instance."""
-        self._desk.announce(instance, moment(self._stamps.now()))
+        self._services.announce(instance, moment(self._stamps.now()))
 
     def frame(self, view: View) -> None:
         """Publish a frame."""
@@ -106,13 +106,13 @@ class Ros2:
 
     def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
         """Publish the empty instance that ends a trial."""
-        self._desk.end(moment(self._stamps.now()))
+        self._services.end(moment(self._stamps.now()))
 
     def receive(self, seconds: float) -> None:
         """Take what has come, or comes within so long."""
         if seconds > 0.0:
             self._graph.wait(seconds)
-        self._desk.serve()
+        self._services.serve()
         for car, reader in self._readers.items():
             for twist in self._graph.take(reader, m.Twist, AT_ONCE):
                 self._mailbox.command(car, twist.linear.x, twist.angular.z)

@@ -7,10 +7,10 @@ from math import floor
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import State
-from dubins_traffic.driving.senses import Senses
+from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.protocols import View
-from dubins_traffic.spec.labels import Caption
+from dubins_traffic.rules.labels import Caption
 from dubins_traffic.transports.quaternion import half
 from dubins_traffic.transports.ros1.world import BASE, ODOMETRY
 from dubins_traffic.transports.ros2 import messages as m

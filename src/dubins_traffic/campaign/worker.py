@@ -1,0 +1,147 @@
+"""The work of a campaign, chunk by chunk: what runs in a worker, wherever that is."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.chunks import Chunk
+from dubins_traffic.campaign.records import Keep, Records
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.engine.batch import run_together
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.problem.draw import draw_many
+from dubins_traffic.record.wall import remove_record
+from dubins_traffic.runs.jobs import Job
+
+if TYPE_CHECKING:
+    from multiprocessing.synchronize import Event
+
+    from dubins_traffic.problem.configuration import Configuration
+
+TOGETHER = 64
+"""So many trials run at a time, if they can."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What workers share: which records are kept, and where modules of controllers are looked up."""
+
+    records: Records | None
+    paths: tuple[str, ...]
+
+    @staticmethod
+    def here(records: Records | None = None) -> Surroundings:
+        """Return those of this process."""
+        return Surroundings(records, (str(Path.cwd()), *sys.path))
+
+
+def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | None = None) -> rows.Columns:
+    """Run the trials of a chunk and return their rows, whatever becomes of each.
+
+    A trial that can't be drawn, run or scored is a row with its reason. `cancelled` interrupts the chunk.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller here: a fault of this machine, not of a trial.
+    KeyboardInterrupt
+        If it was interrupted; nothing of the chunk counts then.
+    """
+    if records is not None:
+        records.check()
+    with contextlib.suppress(controllers.ConstructionError):  # that is the fault of a trial
+        controllers.load(chunk.controller)
+    chunk = replace(chunk, configuration=_known(chunk.configuration))
+    found: dict[int, rows.Row] = {}
+    together = [k for k in range(chunk.count) if not _is_alone(chunk, k, records)]
+    for first in range(0, len(together), TOGETHER):
+        found |= _together(chunk, together[first : first + TOGETHER], cancelled)
+    for k in range(chunk.count):
+        if k not in found or (records is not None and _is_recorded(records, chunk.number + k, found[k])):
+            found[k] = _row(chunk, k, records, cancelled)
+    return rows.columns([found[k] for k in range(chunk.count)])
+
+
+def run_part(chunk: Chunk, around: Surroundings, cancelled: Event | None = None) -> bytes:
+    """Run a chunk and return its part of the table, a Parquet file."""
+    for path in around.paths:
+        if path not in sys.path:
+            sys.path.append(path)
+    return rows.encoded(run_chunk(chunk, around.records, cancelled))
+
+
+def _is_alone(chunk: Chunk, k: int, records: Records | None) -> bool:
+    """Tell whether a trial is run by itself from the first.
+
+    That is against the clock, and where a record is wanted whatever becomes of it: also of a trial that is run without
+    others because it is suspected of ending its process.
+    """
+    if chunk.deadline is not None:
+        return True
+    if records is None or (records.keep is Keep.FAILURES and chunk.count > 1):
+        return False
+    return records.path(chunk.number + k) is not None
+
+
+def _is_recorded(records: Records, number: int, row: rows.Row) -> bool:
+    """Tell whether a trial that has been run without a record is one of which a record is kept."""
+    return records.path(number) is not None and records.keeps(row)
+
+
+def _together(chunk: Chunk, some: Sequence[int], cancelled: Event | None) -> dict[int, rows.Row]:
+    """Run trials of a chunk together; return the rows of those that could be.
+
+    What is wrong with the others is found out when they are run by themselves.
+    """
+    found: dict[int, rows.Row] = {}
+    try:
+        instances = list(draw_many(chunk.configuration, chunk.seed, [chunk.trial + k for k in some]))
+        stop = (lambda: False) if cancelled is None else cancelled.is_set
+        for outcome in run_together(instances, chunk.controller, stop):
+            k = outcome.instance.trial - chunk.trial
+            found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
+    except (Exception, SystemExit):  # whose fault it is shows when each is run by itself
+        return {}
+    return found
+
+
+def _known(configuration: Configuration) -> Configuration:
+    """Return the configuration of an earlier chunk if it is the same, with what has been worked out of it."""
+    if not _last or _last[0] != configuration:
+        _last[:] = [configuration]
+    return _last[0]
+
+
+_last: list[Configuration] = []
+
+
+def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Event | None) -> rows.Row:
+    number, trial = chunk.number + k, chunk.trial + k
+    if cancelled is not None and cancelled.is_set():
+        raise KeyboardInterrupt
+    record = None if records is None else records.path(number)
+    job = Job(
+        trial,
+        chunk.seed,
+        chunk.controller,
+        configuration=chunk.configuration,
+        record=record,
+        overwrite=True,
+        deadline=chunk.deadline,
+    )
+    try:
+        result = job.run(cancelled)
+        found = rows.row(number, result.ending, result.score, result.wall.act_s)
+    except DubinsTrafficError as error:
+        found = rows.failure(number, rows.FAILED, str(error))
+    except (Exception, SystemExit) as error:  # one bad trial is a row, never the end of the campaign
+        found = rows.failure(number, rows.FAILED, f"{type(error).__name__}: {error}")
+    if records is not None and record is not None and not records.keeps(found):
+        remove_record(record)
+    return found

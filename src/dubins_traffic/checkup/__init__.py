@@ -1,0 +1,1 @@
+"""What a competition would say of a controller: scenarios, passes over them, verdicts."""

@@ -1,0 +1,1 @@
+"""Batches: many trials stepped together in one compiled pass, judged and scored."""

@@ -1,0 +1,339 @@
+"""Many trials at once: drawn, run together, judged and scored, the same numbers as one by one."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
+
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.engine.batch_records import chosen, folder_of
+from dubins_traffic.engine.controlled import Maker, ask, grouped
+from dubins_traffic.engine.group import Group, Outcome
+from dubins_traffic.errors import InputError
+from dubins_traffic.files import locked
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.draw import draw, draw_many
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
+from dubins_traffic.runs.record_folder import claim
+from dubins_traffic.runs.record_folder import name as record_name
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.viewer.notebook import Sheeted
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+ASKED = 16
+"""So many trials of a campaign's chunk run at a time where a controller is asked in every tick."""
+UNDER_WAY = 3
+"""Groups under way for each thread: while the oldest is waited for, the others go on."""
+LEAST = 4
+"""Trials in the smallest of the last groups, which still hide what it costs to begin one."""
+Progress = Callable[[int], object]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Batch(Sheeted):
+    """What came of the trials of a batch, by their numbers; of trials that have a record their scores name it."""
+
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def sheet(self) -> ScoreSheet:
+        """The scores."""
+        return ScoreSheet(tuple(outcome.score for outcome in self.outcomes))
+
+
+def run_batch(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    *,
+    trials: int | None = None,
+    first: int = 0,
+    seed: int = 0,
+    batch: int = 64,
+    threads: int = 1,
+    keep: str = "none",
+    records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
+    progress: Progress | None = None,
+) -> Batch:
+    """Run trials of a configuration, `batch` at a time.
+
+    Every score and verdict equals that of `run_trial` on the same instance, bit for bit, whatever `batch` and
+    `threads`.
+
+    Parameters
+    ----------
+    configuration : Configuration, path or name
+        What to draw the trials from.
+    controller : str or callable
+        `rules` runs compiled. Others, by name, as ``module:Class`` or ``path/to/file.py:Class``, or as a callable that
+        makes one, are asked every tick: one object for each trial, or one for all if it also has the methods
+        `start_batch` and `act_batch` (`engine.controlled.BatchController`).
+    trials, first : int
+        Trials `first` to ``first + trials - 1``; by default as many as the configuration says, from 0.
+    seed : int
+        What all random numbers follow from.
+    batch : int
+        Trials that are stepped together; when one ends another takes its place.
+    threads : int
+        Batches that run at a time, where the controller is compiled.
+    keep : str
+        Of which trials a record is kept: ``none``, ``all``, ``failures`` (a rule broken and not excused, a fault, or in
+        trials that are not judged a collision), or ``sample:K``: K of them, evenly spaced. These trials are run once
+        more by themselves, since the same seed gives the same bytes; so a controller must do the same in the same
+        trial.
+    records : path
+        Folder for the records, made if missing; one that holds records is refused, unless one of the following.
+    overwrite : bool
+        Whether records that the folder holds are removed before.
+    append : bool
+        Whether they stay, and are not made again; they must be of the same controller and instances.
+    progress : callable, optional
+        Told how many trials have ended, each time.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong, or an instance can't be drawn.
+    """
+    found: list[Outcome] = []
+    for outcome in run_each(
+        configuration, controller, trials=trials, first=first, seed=seed, batch=batch, threads=threads, keep=keep,
+        records=records, overwrite=overwrite, append=append,
+    ):  # fmt: skip
+        found.append(outcome)
+        if progress is not None:
+            progress(len(found))
+    return in_order(found)
+
+
+def in_order(found: Iterable[Outcome]) -> Batch:
+    """Return what came of some trials as a batch."""
+    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
+
+
+def run_each(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    *,
+    trials: int | None = None,
+    first: int = 0,
+    seed: int = 0,
+    batch: int = 64,
+    threads: int = 1,
+    keep: str = "none",
+    records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
+) -> Iterator[Outcome]:
+    """Run trials as `run_batch` does, and yield what came of each as it ends; nothing is kept of it here.
+
+    The parameters are those of `run_batch`, whose `progress` is not needed here. Outcomes come in the order in which
+    trials end; `in_order` makes a `Batch` of them.
+
+    Raises
+    ------
+    InputError
+        As `run_batch`, when the first outcome is asked for.
+    """
+    if not isinstance(configuration, Configuration):
+        configuration = load_config(configuration)
+    count = configuration.number_trials if trials is None else trials
+    for name, value in (("trials", count), ("batch", batch), ("threads", threads)):
+        if value < 1:
+            raise InputError("too few", field=name, value=value, expected="at least 1")
+    kept, folder = chosen(keep, count), folder_of(keep, records)
+    instances = draw_many(configuration, seed, range(first, first + count))
+    each = outcomes(instances, controller, batch=batch, threads=threads)
+    if folder is None:
+        yield from each
+        return
+    own = partial(draw, configuration, seed)
+    there = claim(folder, called(controller), own, overwrite=overwrite, append=append)
+    with locked(folder):
+        for outcome in each:
+            record = folder / record_name(outcome.instance.trial)
+            if not kept(outcome.instance.trial - first, outcome):
+                yield outcome
+            elif record.name in there:
+                yield replace(outcome, score=replace(outcome.score, record=str(record)))
+            else:
+                yield _recorded(outcome, controller, record)
+
+
+def called(controller: str | Maker) -> str:
+    """Return what a controller is called that is given by name, or by what makes one."""
+    return controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+
+
+def outcomes(
+    instances: Iterable[Instance], controller: str | Maker = COMPILED, *, batch: int = 64, threads: int = 1
+) -> Iterator[Outcome]:
+    """Run trials of instances, `batch` at a time, and yield what came of each as it ends.
+
+    The parameters are those of `run_batch`. Instances are drawn from their iterator as they are needed. Trials that
+    can't be stepped with others (another simulator, formulas of the user's) run by themselves.
+    """
+    name = called(controller)
+    make = _maker(controller)
+    make()
+    source = iter(instances)
+    if controller != COMPILED:
+        yield from _apart(source, make, name, lambda rest: ask(rest, make, name, batch))
+        return
+    cancelled = Event()
+    waiting: deque[Future[list[Outcome]]] = deque()
+    groups = _groups(source, batch, threads)
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            while True:
+                for taken in islice(groups, UNDER_WAY * threads - len(waiting)):
+                    waiting.append(pool.submit(_compiled_or_alone, taken, cancelled))
+                if not waiting:
+                    return
+                yield from waiting.popleft().result()
+        finally:
+            cancelled.set()
+
+
+def _maker(controller: str | Maker) -> Maker:
+    return partial(controllers.load, controller) if isinstance(controller, str) else controller
+
+
+def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[list[Instance]]:
+    """Cut instances into groups of `batch`; several threads get smaller ones in the end, to end together."""
+    ahead: deque[Instance] = deque()
+    while True:
+        ahead.extend(islice(source, batch * (threads + 1) - len(ahead)))
+        if not ahead:
+            return
+        last = threads > 1 and len(ahead) <= batch * threads
+        count = max(LEAST, -(-len(ahead) // (2 * threads))) if last else batch
+        yield [ahead.popleft() for _ in range(min(count, batch, len(ahead)))]
+
+
+def run_together(
+    instances: Sequence[Instance], controller: str, cancelled: Callable[[], bool]
+) -> Iterator[Outcome]:
+    """Run the trials of those instances that can be stepped together, and yield what came of each.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When `cancelled`, which is asked every now and then.
+    """
+    fit = _fitness()
+    able = [own for own in instances if _can_share(own) and (controller != COMPILED or fit(own))]
+    if controller == COMPILED:
+        yield from _compiled(able, cancelled)
+    else:
+        yield from ask(able, partial(controllers.load, controller), controller, ASKED, cancelled)
+    if cancelled():
+        raise KeyboardInterrupt
+
+
+def _compiled_or_alone(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
+    """Run the trials of instances whose egos keep the rules."""
+    fit = _fitness()
+    able = [_can_share(instance) and fit(instance) for instance in instances]
+    alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
+    together = [own for own, shares in zip(instances, able, strict=True) if shares]
+    return [
+        *(_alone(own, _maker(COMPILED), COMPILED) for own in alone),
+        *_compiled(together, cancelled.is_set),
+    ]
+
+
+def _compiled(instances: Sequence[Instance], cancelled: Callable[[], bool]) -> Iterator[Outcome]:
+    for own in grouped([instance for instance in instances if _undisturbed(instance)]):
+        group = Group(own, keeps_rules=True)
+        group.finish(cancelled)
+        if not cancelled():
+            yield from group.outcomes(range(len(own)), COMPILED)
+    asked = [instance for instance in instances if not _undisturbed(instance)]
+    if asked:
+        yield from ask(asked, partial(controllers.load, COMPILED), COMPILED, len(asked), cancelled)
+
+
+def _fitness() -> Callable[[Instance], bool]:
+    """Return a function that does as `_is_fit`, and looks at trials that are alike in this once."""
+    known: dict[tuple[float, ...], bool] = {}
+
+    def fit(instance: Instance) -> bool:
+        problem = instance.problem
+        own = problem.network, problem.rules, problem.car, instance.e_agents
+        key = *map(id, own), problem.intersection_radius
+        if key not in known:
+            known[key] = _is_fit(instance)
+        return known[key]
+
+    return fit
+
+
+def _apart(
+    source: Iterator[Instance], make: Maker, name: str, run: Callable[[Iterator[Instance]], Iterator[Outcome]]
+) -> Iterator[Outcome]:
+    """Run the trials that can't be stepped with others, and hand on the rest."""
+    done: list[Outcome] = []
+
+    def rest() -> Iterator[Instance]:
+        for instance in source:
+            if _can_share(instance):
+                yield instance
+            else:
+                done.append(_alone(instance, make, name))
+
+    for outcome in run(rest()):
+        while done:
+            yield done.pop(0)
+        yield outcome
+    yield from done
+
+
+def _can_share(instance: Instance) -> bool:
+    apart = any(agent.kind in (COUNTER, REMOTE) for agent in instance.e_agents)
+    return instance.simulator == "embedded" and not instance.problem.formulas and not apart
+
+
+def _is_fit(instance: Instance) -> bool:
+    """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
+    lawful = any(agent.kind in KEEP_RULES for agent in instance.e_agents)
+    try:
+        check_fit(instance.problem, owes=False)
+        if lawful:
+            check_fit(instance.problem, owes=True)
+    except InputError:
+        return False
+    return True
+
+
+def _undisturbed(instance: Instance) -> bool:
+    own = instance.disturbances
+    noise = own.position_noise > 0.0 or own.heading_noise > 0.0
+    return not noise and own.command_delay == 0 and own.command_loss == 0.0
+
+
+def _alone(instance: Instance, make: Maker, name: str) -> Outcome:
+    result = run_trial(instance, controllers.made(make), name=name)
+    return Outcome(instance, result.ending, result.score)
+
+
+def _recorded(outcome: Outcome, controller: str | Maker, record: Path) -> Outcome:
+    """Run a trial once more for its record."""
+    instance = outcome.instance
+    driver = controllers.made(_maker(controller))
+    result = run_trial(instance, driver, record=record, overwrite=record.exists(), name=called(controller))
+    return replace(outcome, ending=result.ending, score=result.score)

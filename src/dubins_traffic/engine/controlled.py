@@ -1,0 +1,316 @@
+"""Trials of a batch whose egos are driven by controllers in Python: one for each trial, or one for all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.controllers import blame
+from dubins_traffic.controllers.registry import made
+from dubins_traffic.engine.group import Group, Outcome
+from dubins_traffic.errors import ControllerError, InputError
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.observations.senses import Senses
+from dubins_traffic.protocols import Controller, End, Reports
+from dubins_traffic.record.sink import SHIELD
+from dubins_traffic.record.wall import summary
+from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.trial.endings import checked_command
+from dubins_traffic.trial.run import close, told
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance, Problem
+
+
+class BatchView(NamedTuple):
+    """What a vectorised controller is shown of all trials that are running.
+
+    Attributes
+    ----------
+    trial : (K,) int64
+        Number of each trial, by which `start_batch` has announced it.
+    tick : (K,) int64
+        Its present frame.
+    state : State
+        Poses and twists, (K, N): car 0 is the ego. What the ego does not see is NaN.
+    labels : Labels
+        Propositions, (K, N). Of what the ego does not see: 0 for `segment` and `bits`, else -1.
+    seen : (K, N) bool
+        Which places hold the ego or a car within its sensing radius.
+    """
+
+    trial: Ints
+    tick: Ints
+    state: State
+    labels: Labels
+    seen: npt.NDArray[np.bool_]
+
+
+@runtime_checkable
+class BatchController(Controller, Protocol):
+    """Drives the egos of many trials at once; one object drives all trials of a batch.
+
+    It has `start` and `act` as well, by which a trial can be run by itself, and must do the same then.
+    """
+
+    def start_batch(self, trials: Sequence[int], problems: Sequence[Problem]) -> None:
+        """Learn the problems of trials that are about to begin."""
+        ...
+
+    def act_batch(self, view: BatchView) -> Floats:
+        """Return speed (m/s) and yaw rate (rad/s) of each ego for the coming tick, (K, 2), in the order of `view`."""
+        ...
+
+
+Maker = Callable[[], Controller]
+
+
+class _Seats:
+    """The egos of one group of trials."""
+
+    def __init__(self, instances: Sequence[Instance], make: Maker, shared: BatchController | None) -> None:
+        self.group = Group(instances, keeps_rules=False)
+        self._lines = [CommandLine(instance) for instance in instances]
+        self._senses = [Senses(instance) for instance in instances] if shared is None else []
+        self._views = [self._of_trial(b) for b in range(len(instances))]
+        self._drivers: list[Controller] = []
+        self._answer: object = None
+        self._begin: dict[int, float | None] = {}
+        self._latencies: list[list[float]] = [[] for _ in instances]
+        self._told = np.zeros(len(instances), dtype=bool)
+        self._reports: list[Callable[[], Sequence[tuple[str, str]]] | None] = []
+        self._interventions = [0] * len(instances)
+        self._trials = np.array([instance.trial for instance in instances])
+        if shared is not None:
+            problems = [instance.problem for instance in instances]
+            self._try(None, lambda: shared.start_batch(self._trials.tolist(), problems))
+            return
+        for b, instance in enumerate(instances):
+            self._seat(b, make, instance.problem)
+
+    def _seat(self, b: int, make: Maker, problem: Problem) -> None:
+        """Make the controller of trial b and tell it the problem; what that raises is its fault."""
+        driver = made(make)
+        self._drivers.append(driver)
+        self._reports.append(driver.report if isinstance(driver, Reports) else None)
+        started = perf_counter()
+        if self._try(b, lambda: driver.start(problem)):
+            self._begin[b] = perf_counter() - started
+
+    def ask_each(self) -> None:
+        """Let each ego's own controller choose its command."""
+        group = self.group
+        active: list[int] = group.active.tolist()
+        for b in active:
+            tick = int(group.ticks[b])
+            seen = self._senses[b].observe(tick, *self._views[b])
+            driver = self._drivers[b]
+            started = perf_counter()
+            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)):
+                continue
+            elapsed = perf_counter() - started
+            if not self._listen(b):
+                continue
+            self._latencies[b].append(elapsed)
+            if self._answer is None:
+                group.end(b, End.GAVE_UP, f"the controller gave up at tick {tick}")
+                continue
+            self.take(b, tick, self._answer)
+
+    def _listen(self, b: int) -> bool:
+        """Count how often a shield has stepped in; tell whether the trial goes on."""
+        report = self._reports[b]
+        if report is None:
+            return True
+        answer = self._answer
+        heard = self._try(b, lambda: told(report()))
+        if heard:
+            pairs = cast("Sequence[tuple[str, str]]", self._answer)
+            self._interventions[b] += sum(kind == SHIELD for kind, _ in pairs)
+        self._answer = answer
+        return heard
+
+    def take(self, b: int, tick: int, command: object) -> None:
+        """Let a command take effect, or end the trial if it is none."""
+        try:
+            asked = checked_command(command, tick)
+        except ControllerError as error:
+            self.group.end(b, End.CONTROLLER_FAULT, error.detail)
+            return
+        line = self._lines[b]
+        self.group.commands[b, EGO] = asked if line.clear else line.carry(tick, asked)
+
+    def view(self, places: int) -> BatchView:
+        """Return what a vectorised controller is shown of these trials, with `places` for cars."""
+        group = self.group
+        b = group.active
+        missing = places - group.state.x.shape[1]
+        arrays: list[Any] = [array[b] for array in (*group.state[:6], *group.labels)]
+        if missing:
+            arrays = [np.pad(array, ((0, 0), (0, missing))) for array in arrays]
+        x, y = arrays[0], arrays[1]
+        radii = np.array([instance.problem.sensing_radius for instance in group.instances])
+        radius = radii[b][:, None]
+        count = group.state.count[b]
+        dx, dy = x - x[:, :1], y - y[:, :1]
+        seen = (dx * dx + dy * dy <= radius * radius) & (np.arange(places) < count[:, None])
+        hidden = ~seen
+        for array, nothing in zip(arrays, (*[np.nan] * 6, 0, -1, -1, -1, 0), strict=True):
+            array[hidden] = nothing
+        state, labels = State(*arrays[:6], count=count), Labels(*arrays[6:])
+        return BatchView(self._trials[b], group.ticks[b], state, labels, seen)
+
+    def fail(self, error: BaseException) -> None:
+        """End all trials as a fault of their controller."""
+        for b in self.group.active.tolist():
+            self.group.end(b, End.CONTROLLER_FAULT, blame.told(error, int(self.group.ticks[b])))
+
+    def step(self, controller: str) -> Iterator[Outcome]:
+        """Take all trials to their next frame; yield what came of those that have ended."""
+        self.group.advance()
+        ended: list[int] = np.flatnonzero(
+            ~self._told & [ending is not None for ending in self.group.endings]
+        ).tolist()
+        for b in ended:
+            self._told[b] = True
+            ending = self.group.endings[b]
+            if self._drivers and ending is not None:
+                self.group.endings[b] = close(self._drivers[b], ending)
+        for b, outcome in zip(ended, self.group.outcomes(ended, controller, self._begin), strict=True):
+            score = replace(outcome.score, interventions=self._interventions[b])
+            yield replace(outcome, score=score, act_s=summary(self._latencies[b]))
+
+    def _of_trial(self, b: int) -> tuple[State, Labels]:
+        """Return the state and labels of trial b alone; they follow those of the group."""
+        group, cars = self.group, len(self.group.instances[b].starts)
+        reals: list[Any] = [array[b : b + 1, :cars] for array in group.state[:6]]
+        whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
+        return State(*reals, count=group.state.count[b : b + 1]), Labels(*whole)
+
+    def _try(self, b: int | None, call: Callable[[], object]) -> bool:
+        """Call a controller; what it raises is its fault and ends its trial, or all if it is that of all."""
+        try:
+            self._answer = call()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            blame.show(error)
+            if b is None:
+                self.fail(error)
+            else:
+                detail = blame.told(error, int(self.group.ticks[b]))
+                self.group.end(b, End.CONTROLLER_FAULT, detail)
+            return False
+        return True
+
+
+def ask(
+    instances: Iterable[Instance],
+    make: Maker,
+    controller: str,
+    batch: int,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Iterator[Outcome]:
+    """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
+
+    When `cancelled`, which is asked in every tick, it raises KeyboardInterrupt.
+
+    Parameters
+    ----------
+    instances
+        One a trial.
+    make
+        Makes the controller: one for each trial, or one for all if it is a `BatchController`.
+    controller
+        Its name.
+    batch
+        How many trials run at a time.
+    """
+    made = make()
+    shared = made if isinstance(made, BatchController) else None
+    waiting = iter(instances)
+    seats: list[_Seats] = []
+    while True:
+        if cancelled():
+            raise KeyboardInterrupt
+        free = batch - sum(len(own.group.active) for own in seats)
+        taken = list(islice(waiting, free)) if 8 * free >= batch else []
+        for own in grouped(taken):
+            if shared is not None:
+                _check_clear(own)
+            seats.append(_Seats(own, make, shared))
+        if not seats:
+            return
+        if shared is None:
+            for own in seats:
+                own.ask_each()
+        else:
+            _ask_all(seats, shared)
+        for own in seats:
+            yield from own.step(controller)
+        seats = [own for own in seats if len(own.group.active)]
+
+
+def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
+    """Return instances in groups that can be stepped together: of one control rate, width, and reach of memory."""
+    groups: dict[tuple[float, float, float], list[Instance]] = {}
+    for instance in instances:
+        gap = max((agent.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
+        groups.setdefault((instance.problem.rate, instance.problem.car.w, gap), []).append(instance)
+    return list(groups.values())
+
+
+def _ask_all(seats: Sequence[_Seats], controller: BatchController) -> None:
+    """Let one controller choose the commands of all egos."""
+    seats = [own for own in seats if len(own.group.active)]
+    if not seats:
+        return
+    places = max(own.group.state.x.shape[1] for own in seats)
+    views = [own.view(places) for own in seats]
+    whole = BatchView(
+        np.concatenate([view.trial for view in views]),
+        np.concatenate([view.tick for view in views]),
+        State(*_joined([view.state for view in views])),
+        Labels(*_joined([view.labels for view in views])),
+        np.concatenate([view.seen for view in views]),
+    )
+    try:
+        answer = np.asarray(controller.act_batch(whole), dtype=np.float64)
+        if answer.shape != (len(whole.trial), 2):
+            raise TypeError(f"act_batch returned {answer.shape}, not {(len(whole.trial), 2)}")
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        blame.show(error)
+        for own in seats:
+            own.fail(error)
+        return
+    row = 0
+    for own, view in zip(seats, views, strict=True):
+        for b, tick in zip(own.group.active.tolist(), view.tick.tolist(), strict=True):
+            own.take(b, tick, answer[row].tolist())
+            row += 1
+
+
+def _joined(tables: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Return the arrays of several tables, one after another, column by column."""
+    return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
+
+
+def _check_clear(instances: Sequence[Instance]) -> None:
+    for instance in instances:
+        noise = instance.disturbances
+        if noise.position_noise > 0.0 or noise.heading_noise > 0.0:
+            raise InputError(
+                "a controller of whole batches is shown poses without noise",
+                field="disturbances",
+                value=noise,
+                expected="no noise, or a controller with start and act",
+            )

@@ -1,0 +1,265 @@
+"""Trials that are stepped together: their tables, the compiled tick, and what came of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.agents.fleet import PAIRS, pack_agents
+from dubins_traffic.agents.lawful import pack_drivers
+from dubins_traffic.agents.tables import workspace as agent_workspace
+from dubins_traffic.cars.near import Spacing, spacing
+from dubins_traffic.cars.rows import TOGETHER
+from dubins_traffic.cars.state import EGO, Contact, Labels, State
+from dubins_traffic.engine.batch_kernel import (
+    COLLIDED,
+    COURSE,
+    ENDED,
+    ENDS,
+    FAULTY,
+    LAST,
+    LAWFUL,
+    NO_PAIRS,
+    NO_SIGHT,
+    OTHERS,
+    STATUS,
+    TICK,
+    Progress,
+    World,
+    run_trials,
+)
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
+from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
+from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
+from dubins_traffic.protocols import End, Ending
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.routing.lane_graph import nearest_stage
+from dubins_traffic.routing.rounds import stages
+from dubins_traffic.rules.breach_log import OF_TRIAL, BreachLog
+from dubins_traffic.rules.fault import with_fault_by
+from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
+from dubins_traffic.rules.tables import NET
+from dubins_traffic.scoring.margins_kernel import margin_table
+from dubins_traffic.scoring.outcome import BatchScores
+from dubins_traffic.scoring.score import Score
+from dubins_traffic.scoring.tally import new_tally
+from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
+from dubins_traffic.trial.endings import agent_fault, collision_detail
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+FRAMES = 16
+"""For how many frames in which all goes wrong there is room in the breach_log."""
+WORK = 500_000
+"""Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a trial of a group; `act_s` sums up the latencies of its controller's `act`, where there is one."""
+
+    instance: Instance
+    ending: Ending
+    score: Score
+    act_s: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
+
+    def __repr__(self) -> str:
+        return f"<Outcome: {self.instance.title}, {self.score.summary}>"
+
+
+class Group:
+    """Some trials of one control rate on their way.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial; with the embedded simulator, without formulas of the user's and without remote cars.
+    keeps_rules : bool
+        Whether the controller `rules` drives the egos, compiled; else `commands` says what they do.
+
+    Attributes
+    ----------
+    state, labels : State, Labels
+        The present frame of each trial, (B, N).
+    commands : (B, N, 2)
+        Speed and yaw rate of each car; those of the egos may be written between the ticks.
+    endings : list of Ending or None
+        How each trial has ended, None while it runs.
+    """
+
+    def __init__(self, instances: Sequence[Instance], *, keeps_rules: bool) -> None:
+        self.instances = tuple(instances)
+        self._rate = instances[0].problem.rate
+        problems = [instance.problem for instance in instances]
+        simulator = Embedded()
+        self.state: State = simulator.reset(instances, TOGETHER if keeps_rules else 1)
+        trials, places = self.state.x.shape
+        labeller = Labeller(instances)
+        labeller.begin(trials, places)
+        roads, beside, rules = labeller.tables
+        net = rules.whole[:, NET].copy()
+        cars, obstacles, rows, work = simulator.tables
+        terms = terms_of(problems)
+        breach_log = BreachLog.empty(trials, places, len(terms.goal))
+        breach_log = breach_log._replace(
+            row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
+        )
+        rounds = [stages(problem) for problem in problems] if keeps_rules else ()
+        segments = int(np.diff(roads.seg_off).max())
+        self._world = World(
+            self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
+            labeller.memory, breach_log, pack_drivers(instances, places, net, rounds), scratch(places, segments),
+            pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
+            new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
+            spacing(trials, places, rows.far - cars.reach),
+        )  # fmt: skip
+        kinds, index = kinds_of(problems)
+        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+        frames = self._world.tally.pose.shape[1]
+        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
+        numbers: list[int] = index.tolist()
+        self._rules = [rules[k] for k in numbers]
+        self.labels: Labels = labeller.labels
+        self.commands: Floats = np.zeros((trials, places, 2))
+        self.endings: list[Ending | None] = [None] * trials
+        self._going = np.ones(trials, dtype=bool)
+        self._contacts: list[list[Contact]] = [[] for _ in instances]
+        self._breaches: list[list[Breach]] = [[] for _ in instances]
+        self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
+        self._run(self.active, 1)
+        self._aim()
+
+    @property
+    def ticks(self) -> Ints:
+        """The present frame of each trial, (B,)."""
+        return self._world.progress.ints[:, TICK]
+
+    @property
+    def spacing(self) -> Spacing:
+        """How far apart the cars are known to be."""
+        return self._world.spacing
+
+    @property
+    def active(self) -> Ints:
+        """The trials that have not ended."""
+        return np.flatnonzero(self._going)
+
+    def advance(self, most: int = 1) -> None:
+        """Take each trial that has not ended up to `most` ticks farther."""
+        active = self.active
+        if len(active):
+            self._run(active, most)
+
+    def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
+        """Run all trials to their ends, about `WORK` steps of cars at a time; stop in between when `cancelled`."""
+        while len(active := self.active) and not cancelled():
+            self._run(active, max(1, WORK // (len(active) * self.state.x.shape[1])))
+
+    def end(self, b: int, end: End, detail: str = "") -> None:
+        """End trial b for a reason of its driver's."""
+        self.endings[b] = Ending(end, int(self.ticks[b]), detail)
+        self._going[b] = False
+
+    def outcomes(
+        self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
+    ) -> list[Outcome]:
+        """Return what came of some trials, which have ended; `begin` tells their times to begin, where measured."""
+        if not trials:
+            return []
+        world, begin, name = self._world, begin or {}, bare_name(controller)
+        rows = np.array(trials, dtype=np.int64)
+        endings = [ending for b in trials if (ending := self.endings[b]) is not None]
+        frames = np.array([ending.ticks + 1 for ending in endings])
+        scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
+        found: list[Outcome] = []
+        for b, ending, hanging in zip(
+            trials, endings, running(rows, world.terms, world.breach_log), strict=True
+        ):
+            score = scores.score(
+                self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
+                self._rules[b], name, begin.get(b),
+            )  # fmt: skip
+            found.append(Outcome(self.instances[b], ending, score))
+        return found
+
+    def _progress(self, contacts: int, breaches: int) -> Progress:
+        ints = np.zeros((len(self.instances), COURSE), dtype=np.int64)
+        ints[:, TICK] = -1
+        ints[:, LAST] = [max(1, instance.ticks) for instance in self.instances]
+        ints[:, ENDS] = [instance.end_on_collision for instance in self.instances]
+        fleets, whose = distinct([id(instance.e_agents) for instance in self.instances])
+        kinds = [{agent.kind for agent in self.instances[b].e_agents} for b in fleets]
+        ints[:, OTHERS] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
+        radii = np.array([instance.problem.sensing_radius for instance in self.instances])
+        places = np.zeros((breaches, 2))
+        return Progress(ints, radii * radii, np.zeros((contacts, 5), dtype=np.int64), places)
+
+    def _aim(self) -> None:
+        """Let the egos that keep the rules begin with the goal nearest to where they start."""
+        world = self._world
+        drivers, labels = world.drivers, world.labels
+        world.progress.ints[:, LAWFUL] = drivers.active
+        for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
+            own = drivers.ints[b, EGO]
+            lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
+            own[PLACE] = nearest_stage(drivers.distance, int(own[FIRST]), int(own[LAST_STAGE]), lane, segment)
+
+    def _run(self, active: Ints, most: int) -> None:
+        goal = self.ticks[active] + most
+        while len(active):
+            left = int((goal - self.ticks[active]).max())
+            run_trials(active, left, 1.0 / self._rate, self.commands, self._world)
+            self._drain()
+            self._mind(active)
+            going = self._going[active] & (self.ticks[active] < goal)
+            active, goal = active[going], goal[going]
+
+    def _mind(self, active: Ints) -> None:
+        """Enlarge what was too small, and write down how trials ended."""
+        status = self._world.progress.ints[active, STATUS]
+        if (status == NO_PAIRS).any():
+            self._world = self._world._replace(work=enlarged(self._world.work))
+        if (status == NO_SIGHT).any():
+            room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
+            self._world = self._world._replace(space=self._world.space._replace(pair=room))
+        numbers: list[int] = active.tolist()
+        for b, why in zip(numbers, status.tolist(), strict=True):
+            if why == ENDED:
+                self.end(b, End.DURATION)
+            elif why == FAULTY:
+                self.end(b, End.AGENT_FAULT, agent_fault(self.instances[b], self.commands[b]))
+            elif why == COLLIDED:
+                tick = int(self.ticks[b])
+                mine = [own for own in self._contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
+                self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))
+
+    def _drain(self) -> None:
+        """Take over the contacts and breaches that have been found, and make room."""
+        world = self._world
+        found, filled = int(world.work.found[0]), int(world.breach_log.filled[0])
+        notes = zip(world.work.contact[:found].tolist(), world.progress.contact[:found].tolist(), strict=True)
+        for row, (tick, own, other, own_seen, other_seen) in notes:
+            b, contact = int(row[0]), contact_of(row, tick, self._rate)
+            self._contacts[b].append(with_fault_by(contact, own, other))
+            pair = ((contact.car, own_seen), (contact.other, other_seen))
+            self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
+        rows: list[list[int]] = world.breach_log.row[:filled].tolist()
+        for row, (x, y) in zip(rows, world.progress.place[:filled].tolist(), strict=True):
+            b, breach = row[OF_TRIAL], breach_of(row, x, y)
+            self._breaches[b].append(breach)
+            if self._is_seen(b, breach):
+                self._seen[b].add((breach.car, breach.tick))
+        world.work.found[0] = world.breach_log.filled[0] = 0
+
+    def _is_seen(self, b: int, breach: Breach) -> bool:
+        """Tell whether the car of a breach was within the ego's sensing radius in that frame."""
+        dx, dy = self._world.tally.pose[b, breach.tick, :2] - (breach.x, breach.y)
+        return bool(dx * dx + dy * dy <= self._world.progress.sight2[b])

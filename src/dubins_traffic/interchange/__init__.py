@@ -1,0 +1,1 @@
+"""Bags and logs of other tools, to and from records."""

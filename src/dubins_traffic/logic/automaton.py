@@ -1,0 +1,299 @@
+"""From a formula to a deterministic table with four verdicts (after Bauer, Leucker and Schallhart, TOSEM 2011).
+
+A state is the memory of the past operators and what is left of the formula: a disjunction of sets of obligations. Its
+verdict is *false* if no set can be met by any infinite continuation, *true* if the same holds of the negation, else
+what the finite word so far satisfies when every next (and until) is strong and every weak next (and release) weak.
+
+Where clocks run, what is left depends on their values too. A state can be met if it can when every clock has run as
+unfavourably as may be, and can't if it can't under the most favourable values; where neither is so the verdict would
+depend on the value of a clock, and the formula is refused in this form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.logic.emptiness import MAX_STATES as MAX_SOUGHT
+from dubins_traffic.logic.emptiness import Emptiness
+from dubins_traffic.logic.formula import FUTURE, Formula, FormulaError, Op, subformulas
+from dubins_traffic.logic.moves import STRONG, Stepper
+from dubins_traffic.logic.obligations import DONE, Atom, Moves, Table
+
+MAX_STATES: Final = 2048
+"""Most states of one table before it is made smaller."""
+MAX_CLOCKS: Final = 3
+"""Most clocks of one table."""
+
+FALSE: Final = 0
+PRESUMABLY_FALSE: Final = 1
+PRESUMABLY_TRUE: Final = 2
+TRUE: Final = 3
+VERDICTS: Final = ("false", "presumably false", "presumably true", "true")
+"""The names of the verdicts, which are the numbers 0 to 3."""
+
+State: TypeAlias = tuple[tuple[bool, ...], Moves]
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """A monitor as tables.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The propositions; bit i of a valuation is the value of number i.
+    letter : (2**P,) int64
+        The letter of each valuation.
+    target, reset : (S, L, 2**C) int64
+        The next state, and which clocks start (bit set), by state, letter and which of the clocks have run out.
+    verdict : (S,) int64
+        See `VERDICTS`; state 0 is the first.
+    clocks : (C,) int64
+        Lengths, ticks: a clock that starts at tick t has run out at tick t + length.
+    """
+
+    names: tuple[str, ...]
+    letter: Ints
+    target: Ints
+    reset: Ints
+    verdict: Ints
+    clocks: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How large things may grow while a table is built.
+
+    Attributes
+    ----------
+    states : int
+        States of the table before it is made smaller.
+    cells : int
+        Its states times the letters and what is known of its clocks.
+    sought : int
+        States of the Büchi automaton in which it is asked what can still be met.
+    choices : int
+        Letters times the ways to meet or put off each operator other than G and X.
+    """
+
+    states: int = MAX_STATES
+    cells: int = 1 << 30
+    sought: int = MAX_SOUGHT
+    choices: int = 1 << 62
+
+
+FULL: Final = Limits()
+
+
+def automaton(formula: Formula, period: float, unroll: int, limits: Limits = FULL) -> Automaton:
+    """Return the table of one formula.
+
+    Parameters
+    ----------
+    formula : Formula
+        Not split further.
+    period : float
+        Seconds between positions.
+    unroll : int
+        Bounds up to this many ticks are counted in states, longer ones by clocks.
+    limits : Limits
+        What is too large.
+
+    Raises
+    ------
+    FormulaError
+        If the table would be too large, or the verdict would depend on the values of clocks, or one clock does not
+        do for a bounded operator.
+    """
+    table = Table(period, unroll)
+    table.add(formula)
+    if len(table.clocks) > MAX_CLOCKS:
+        raise FormulaError(
+            "too many long bounds in one part", value=len(table.clocks), expected=f"at most {MAX_CLOCKS}"
+        )
+    return _Builder(table, formula, limits).build()
+
+
+class _Builder:
+    def __init__(self, table: Table, formula: Formula, limits: Limits) -> None:
+        self._table = table
+        self._limits = limits
+        self._stepper = Stepper(table)
+        self._letter, self._outcomes = table.letters()
+        chosen = sum(part.op in FUTURE - {Op.G, Op.X} for part in subformulas(formula))
+        if len(self._outcomes) << chosen > limits.choices:
+            raise FormulaError("too many choices to be monitored", expected="fewer operators")
+        self._emptiness = Emptiness(self._stepper, self._outcomes, limits.sought)
+        self._verdicts: dict[State, int] = {}
+        self._bounds: dict[tuple[int, bool], int] = {}
+
+    def build(self) -> Automaton:
+        table = self._table
+        width = 1 << len(table.clocks)
+        most = min(self._limits.states, self._limits.cells // (width * len(self._outcomes)))
+        start = self._sunk((table.remembered(), frozenset([frozenset([table.root << 2])])))
+        number = {start: 0}
+        states = [start]
+        rows: list[list[list[tuple[int, int]]]] = []
+        for state in states:
+            row: list[list[tuple[int, int]]] = []
+            for tests in self._outcomes:
+                cells: list[tuple[int, int]] = []
+                for expired in range(width):
+                    target, reset = self._step(state, tests, expired)
+                    if target not in number:
+                        if len(states) >= most:
+                            raise FormulaError(
+                                "too large to be monitored",
+                                expected=f"at most {most} states in each part",
+                            )
+                        number[target] = len(states)
+                        states.append(target)
+                    cells.append((number[target], reset))
+                row.append(cells)
+            rows.append(row)
+        filled = np.array(rows, dtype=np.int64)
+        verdict = np.array([self._verdict(state) for state in states], dtype=np.int64)
+        return _reduced(table, self._letter, filled[..., 0], filled[..., 1], verdict)
+
+    def _step(self, state: State, tests: tuple[bool, ...], expired: int) -> tuple[State, int]:
+        memory, left = state
+        if left in ((), DONE) or not left:
+            return state, 0
+        letter, after = self._table.letter(tests, memory, expired)
+        moves: list[frozenset[Atom]] = []
+        for conjunction in left:
+            moves.extend(self._stepper.step_all(sorted({atom >> 2 for atom in conjunction}), letter))
+        return self._started(after, self._stepper.smallest(moves))
+
+    def _started(self, memory: tuple[bool, ...], moves: Moves) -> tuple[State, int]:
+        """Return the state with clocks that have just started as running, and which those are."""
+        nodes = self._table.nodes
+        ages: dict[int, set[int]] = {}
+        for atom in {atom for move in moves for atom in move}:
+            node = nodes[atom >> 2]
+            if node.clock >= 0 and node.running:
+                ages.setdefault(node.clock, set()).add(node.running)
+        if any(len(found) > 1 for found in ages.values()):
+            raise FormulaError(
+                "a bounded operator can be asked for again while it is pending, in a way that one clock can't follow",
+                expected="shorter bounds, bounds from 0, or fewer operators inside each other",
+            )
+        reset = sum(1 << clock for clock, found in ages.items() if found == {1})
+        changed = self._stepper.smallest(
+            self._stepper.conjunction(frozenset(self._running(atom) for atom in move)) for move in moves
+        )
+        return self._sunk((memory, changed)), reset
+
+    def _running(self, atom: Atom) -> Atom:
+        node = self._table.nodes[atom >> 2]
+        number = self._table.node(node._replace(running=2)) if node.running else atom >> 2
+        return number << 2 | atom & STRONG
+
+    def _sunk(self, state: State) -> State:
+        """Return the one state for a final verdict, else `state` itself."""
+        verdict = self._verdict(state)
+        if verdict in (FALSE, TRUE):
+            sink: State = (), (DONE if verdict == TRUE else frozenset())
+            self._verdicts[sink] = verdict
+            return sink
+        return state
+
+    def _verdict(self, state: State) -> int:
+        found = self._verdicts.get(state)
+        if found is None:
+            found = self._verdicts[state] = self._judged(state)
+        return found
+
+    def _judged(self, state: State) -> int:
+        memory, left = state
+        if not self._meetable(memory, left):
+            return FALSE
+        if frozenset[int]() in left or not self._meetable(memory, self._negated(left)):
+            return TRUE
+        weak = any(not any(atom & STRONG for atom in conjunction) for conjunction in left)
+        return PRESUMABLY_TRUE if weak else PRESUMABLY_FALSE
+
+    def _negated(self, left: Moves) -> Moves:
+        moves = DONE
+        for conjunction in left:
+            moves = self._stepper.both(
+                moves, frozenset(frozenset([self._table.dual(atom >> 2) << 2]) for atom in conjunction)
+            )
+        return moves
+
+    def _meetable(self, memory: tuple[bool, ...], moves: Moves) -> bool:
+        if not self._table.clocks:
+            return any(self._emptiness.meetable(memory, _numbers(move)) for move in moves)
+        if any(self._emptiness.meetable(memory, self._replaced(move, False)) for move in moves):
+            return True
+        if any(self._emptiness.meetable(memory, self._replaced(move, True)) for move in moves):
+            raise FormulaError(
+                "its verdict depends on how far a long bound has run",
+                expected="shorter bounds or simpler parts",
+            )
+        return False
+
+    def _replaced(self, move: frozenset[Atom], kindly: bool) -> frozenset[int]:
+        return frozenset(self._replace(atom >> 2, kindly) for atom in move)
+
+    def _replace(self, number: int, kindly: bool) -> int:
+        """Return an obligation without clocks that is implied by this one (`kindly`) or implies it."""
+        key = number, kindly
+        found = self._bounds.get(key)
+        if found is not None:
+            return found
+        node = self._table.nodes[number]
+        parts = tuple(self._replace(part, kindly) for part in node.parts)
+        if node.kind in ("and", "or"):
+            parts = tuple(sorted(set(parts)))
+        changed = node._replace(parts=parts)
+        if node.clock >= 0:
+            changed = changed._replace(clock=-1, length=-1, running=0)
+            if node.kind == "next":
+                kind, left = ("until", self._table.true) if kindly else ("release", self._table.false)
+                changed = changed._replace(kind=kind, parts=(left, parts[0]), strong=True)
+            elif (node.kind == "until") != kindly:
+                self._bounds[key] = parts[1]
+                return parts[1]
+        found = self._bounds[key] = self._table.node(changed)
+        return found
+
+
+def _numbers(move: frozenset[Atom]) -> frozenset[int]:
+    return frozenset(atom >> 2 for atom in move)
+
+
+def _reduced(table: Table, letter: Ints, target: Ints, reset: Ints, verdict: Ints) -> Automaton:
+    """Merge states that behave alike (Moore's refinement), then letters that do."""
+    states = len(verdict)
+    block = verdict - verdict.min()
+    count = 0
+    while True:
+        rows = np.concatenate(
+            [block[:, None], block[target].reshape(states, -1), reset.reshape(states, -1)], axis=1
+        )
+        _, first, block = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        block = block.reshape(-1)
+        if len(first) == count:
+            break
+        count = len(first)
+    order = np.concatenate([[block[0]], np.delete(np.arange(count), block[0])])
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    kept = first[order]
+    target, reset = place[block[target[kept]]], reset[kept]
+    columns = np.concatenate([target, reset], axis=2).transpose(1, 0, 2).reshape(target.shape[1], -1)
+    _, chosen, merged = np.unique(columns, axis=0, return_index=True, return_inverse=True)
+    return Automaton(
+        names=table.names,
+        letter=merged.reshape(-1)[letter].astype(np.int64),
+        target=np.ascontiguousarray(target[:, chosen]),
+        reset=np.ascontiguousarray(reset[:, chosen]),
+        verdict=verdict[kept],
+        clocks=np.array(table.clocks, dtype=np.int64),
+    )

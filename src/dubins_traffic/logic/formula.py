@@ -1,0 +1,328 @@
+"""Formulas of linear temporal logic with past and bounded operators, over named propositions.
+
+Formulas are immutable and shared: equal formulas are one object, so `==` and `hash` cost nothing. Conjunctions and
+disjunctions have any number of parts and never stand directly inside one of their own kind.
+
+========  =====================  =================================================================
+letter    function               meaning at position t of an infinite word
+========  =====================  =================================================================
+``X``     `next_`                p holds at t + 1
+``F``     `eventually`           p holds now or later; with bounds [a, b], within them
+``G``     `always`               p holds from now on; with bounds [a, b], at all positions in them
+``U``     `until`                q holds now or later (within the bounds), and p until then
+``R, V``  `release`              not (not p U not q)
+``W``     `weak_until`           p U q, or p for ever
+``M``     `strong_release`       q U (p and q)
+``Y``     `yesterday`            t > 0, and p held at t - 1
+``Z``     `weak_yesterday`       t = 0, or p held at t - 1
+``O``     `once`                 p holds now or held before
+``H``     `historically`         p holds now and held always before
+``S``     `since`                q holds now or held before, and p has held since
+``T``     `trigger`              not (not p S not q)
+========  =====================  =================================================================
+
+Bounds are in seconds. At period T the bound d means ceil(d/T - 1e-9) ticks.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from enum import Enum
+from threading import Lock
+from typing import Any, Final, TypeAlias
+from weakref import WeakValueDictionary
+
+from dubins_traffic.errors import InputError
+
+MAX_DEPTH: Final = 100
+"""Deepest nesting of operators in a formula."""
+MAX_SIZE: Final = 20_000
+"""Most operators and propositions in a formula written out."""
+LONGEST_BOUND: Final = 1e9
+"""Longest bound, seconds: some thirty years."""
+
+Bounds: TypeAlias = tuple[float, float]
+
+
+class FormulaError(InputError):
+    """A formula can't be read or used.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong.
+    line, column : int, optional
+        Where in the text, both from 1.
+    file, field, value, expected
+        As in `InputError`.
+    """
+
+    def __init__(
+        self, problem: str, *, line: int | None = None, column: int | None = None, **context: Any
+    ) -> None:
+        self.line = line
+        self.column = column
+        self.context = context
+        place = "" if line is None else f"line {line}, column {column}: "
+        super().__init__(place + problem, **context)
+
+    def within(self, *, file: str | None = None, field: str | None = None) -> FormulaError:
+        """Return the same error placed in `file` and below the field `field`."""
+        placed = super().within(file=file, field=field)
+        context: dict[str, Any] = self.context | {"file": placed.file, "field": placed.field}
+        error = FormulaError(placed.problem, **context)
+        error.line, error.column = self.line, self.column
+        return error
+
+
+class Op(Enum):
+    """What stands at the top of a formula."""
+
+    TRUE = "true"
+    FALSE = "false"
+    PROP = "prop"
+    NOT = "!"
+    AND = "&&"
+    OR = "||"
+    IMPLIES = "->"
+    IFF = "<->"
+    X = "X"
+    F = "F"
+    G = "G"
+    U = "U"
+    R = "R"
+    W = "W"
+    M = "M"
+    Y = "Y"
+    Z = "Z"
+    O = "O"  # noqa: E741
+    H = "H"
+    S = "S"
+    T = "T"
+
+
+PAST: Final = frozenset({Op.Y, Op.Z, Op.O, Op.H, Op.S, Op.T})
+FUTURE: Final = frozenset({Op.X, Op.F, Op.G, Op.U, Op.R, Op.W, Op.M})
+BOUNDABLE: Final = frozenset({Op.F, Op.G, Op.U, Op.R})
+RESERVED: Final = frozenset({op.value for op in PAST | FUTURE} | {"V", "true", "false"})
+"""Words that can't be names of propositions."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+
+
+class Formula:
+    """A formula; made by the functions of this module, never directly.
+
+    Attributes
+    ----------
+    op : Op
+        What stands at the top.
+    args : tuple of Formula
+        The parts.
+    name : str
+        The name of a proposition, else empty.
+    bounds : (float, float) or None
+        Seconds, for F, G, U and R.
+    depth, size : int
+        Levels of operators, and operators and propositions written out.
+    """
+
+    __slots__ = ("__weakref__", "args", "bounds", "depth", "name", "op", "size")
+
+    op: Op
+    args: tuple[Formula, ...]
+    name: str
+    bounds: Bounds | None
+    depth: int
+    size: int
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"formulas don't change: {name}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return make, (self.op, self.args, self.name, self.bounds)
+
+    def __and__(self, other: Formula) -> Formula:
+        return conj(self, other)
+
+    def __or__(self, other: Formula) -> Formula:
+        return disj(self, other)
+
+    def __invert__(self) -> Formula:
+        return negation(self)
+
+    def __str__(self) -> str:
+        from dubins_traffic.logic.printer import to_ascii
+
+        return to_ascii(self)
+
+    def __repr__(self) -> str:
+        return f"<Formula {self}>"
+
+
+_Key: TypeAlias = tuple[Op, tuple[Formula, ...], str, Bounds | None]
+_known: WeakValueDictionary[_Key, Formula] = WeakValueDictionary()
+_lock = Lock()
+
+
+def make(op: Op, args: tuple[Formula, ...] = (), name: str = "", bounds: Bounds | None = None) -> Formula:
+    """Return the one formula with these parts.
+
+    Raises
+    ------
+    FormulaError
+        If it is nested too deeply or too long, or if its bounds are no interval.
+    """
+    key = (op, args, name, bounds)
+    with _lock:
+        found = _known.get(key)
+        if found is None:
+            found = _known[key] = _new(op, args, name, bounds)
+        return found
+
+
+def _new(op: Op, args: tuple[Formula, ...], name: str, bounds: Bounds | None) -> Formula:
+    depth = 1 + max((part.depth for part in args), default=0)
+    size = 1 + sum(part.size for part in args)
+    if depth > MAX_DEPTH:
+        raise FormulaError("nested too deeply", expected=f"at most {MAX_DEPTH} levels of operators")
+    if size > MAX_SIZE:
+        raise FormulaError("too long", expected=f"at most {MAX_SIZE} operators and propositions")
+    formula = object.__new__(Formula)
+    values = {"op": op, "args": args, "name": name, "bounds": bounds, "depth": depth, "size": size}
+    for attribute, value in values.items():
+        object.__setattr__(formula, attribute, value)
+    return formula
+
+
+TRUE: Final = make(Op.TRUE)
+FALSE: Final = make(Op.FALSE)
+
+
+def prop(name: str) -> Formula:
+    """Return the proposition `name`: letters, digits and underscores, no digit first, not a reserved word."""
+    if not _NAME.match(name) or name in RESERVED:
+        raise FormulaError("not a name of a proposition", value=name, expected="a word that is not reserved")
+    return make(Op.PROP, name=name)
+
+
+def negation(part: Formula) -> Formula:
+    """Return the negation of `part`."""
+    return make(Op.NOT, (part,))
+
+
+def conj(*parts: Formula) -> Formula:
+    """Return the conjunction of `parts`; of none, true."""
+    return _joined(Op.AND, TRUE, parts)
+
+
+def disj(*parts: Formula) -> Formula:
+    """Return the disjunction of `parts`; of none, false."""
+    return _joined(Op.OR, FALSE, parts)
+
+
+def _joined(op: Op, empty: Formula, parts: tuple[Formula, ...]) -> Formula:
+    flat = tuple(inner for part in parts for inner in (part.args if part.op is op else (part,)))
+    if len(flat) < 2:
+        return flat[0] if flat else empty
+    return make(op, flat)
+
+
+def implies(left: Formula, right: Formula) -> Formula:
+    """Return `left` -> `right`."""
+    return make(Op.IMPLIES, (left, right))
+
+
+def iff(left: Formula, right: Formula) -> Formula:
+    """Return `left` <-> `right`."""
+    return make(Op.IFF, (left, right))
+
+
+def _unary(op: Op) -> Callable[[Formula], Formula]:
+    def build(part: Formula) -> Formula:
+        return make(op, (part,))
+
+    build.__doc__ = f"Return {op.value} `part`."
+    return build
+
+
+def _binary(op: Op) -> Callable[[Formula, Formula], Formula]:
+    def build(left: Formula, right: Formula) -> Formula:
+        return make(op, (left, right))
+
+    build.__doc__ = f"Return `left` {op.value} `right`."
+    return build
+
+
+next_ = _unary(Op.X)
+yesterday = _unary(Op.Y)
+weak_yesterday = _unary(Op.Z)
+once = _unary(Op.O)
+historically = _unary(Op.H)
+weak_until = _binary(Op.W)
+strong_release = _binary(Op.M)
+since = _binary(Op.S)
+trigger = _binary(Op.T)
+
+
+def eventually(part: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return F `part`, within `bounds` (seconds) if given."""
+    return make(Op.F, (part,), bounds=interval(bounds))
+
+
+def always(part: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return G `part`, within `bounds` (seconds) if given."""
+    return make(Op.G, (part,), bounds=interval(bounds))
+
+
+def until(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return `left` U `right`, `right` within `bounds` (seconds) if given."""
+    return make(Op.U, (left, right), bounds=interval(bounds))
+
+
+def release(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return `left` R `right`, `right` asked for within `bounds` (seconds) only if given."""
+    return make(Op.R, (left, right), bounds=interval(bounds))
+
+
+def interval(bounds: Bounds | None) -> Bounds | None:
+    """Return `bounds` as floats.
+
+    Raises
+    ------
+    FormulaError
+        If they are not 0 <= a <= b <= `LONGEST_BOUND`.
+    """
+    if bounds is None:
+        return None
+    low, high = float(bounds[0]), float(bounds[1])
+    if not 0.0 <= low <= high <= LONGEST_BOUND:
+        expected = f"[a, b] with 0 <= a <= b <= {LONGEST_BOUND:g}, seconds"
+        raise FormulaError("not an interval", value=list(bounds), expected=expected)
+    return low + 0.0, high + 0.0
+
+
+def ticks(seconds: float, period: float) -> int:
+    """Return how many ticks a duration takes: ceil(seconds / period - 1e-9)."""
+    return max(0, math.ceil(seconds / period - 1e-9))
+
+
+def subformulas(formula: Formula) -> Iterator[Formula]:
+    """Yield each distinct subformula once, parts before wholes."""
+    seen: set[Formula] = set()
+    stack = [(formula, False)]
+    while stack:
+        item, opened = stack.pop()
+        if opened:
+            yield item
+        elif item not in seen:
+            seen.add(item)
+            stack.append((item, True))
+            stack.extend((part, False) for part in reversed(item.args))
+
+
+def propositions(formula: Formula) -> tuple[str, ...]:
+    """Return the names of the propositions in `formula`, sorted."""
+    return tuple(sorted(part.name for part in subformulas(formula) if part.op is Op.PROP))

@@ -1,0 +1,327 @@
+"""Monitors: formulas judged frame by frame over a batch of trials, by table look-up.
+
+A formula is split into the parts of its conjunction (G distributes over it). Parts that share propositions are put
+together again where their table stays small (`TOGETHER`), and each group is monitored by a table of its own; the
+verdict of the whole is the least one. A group is *true* as soon as every infinite continuation satisfies it and *false*
+as soon as none does, and so is the whole, since groups without common propositions can't contradict each other.
+
+Where parts that share propositions stay apart they may contradict each other on every continuation though each could
+be met alone. Then *false* comes when the first part is lost, possibly later than the whole was (`Monitors.late`).
+*True* is as early as ever; a part that is decided counts as decided in what is presumed of the whole.
+
+Bounds of at most `UNROLL` ticks are counted in the states of a table, longer ones by clocks beside it, so tables
+don't grow with the bounds. Where a clock doesn't do, requests go through a delay line (`delays`), or the bound is
+counted if the table stays within its limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.logic.automaton import Automaton, Limits, automaton
+from dubins_traffic.logic.delays import Line, delayed, line
+from dubins_traffic.logic.formula import (
+    FUTURE,
+    PAST,
+    Formula,
+    FormulaError,
+    Op,
+    always,
+    conj,
+    implies,
+    propositions,
+    subformulas,
+)
+from dubins_traffic.logic.obligations import MAX_PROPOSITIONS
+from dubins_traffic.logic.packing import Piece, packed_lines, packed_tables
+from dubins_traffic.logic.rewrite import renamed
+
+if TYPE_CHECKING:
+    from dubins_traffic.logic.kernel import Lines, Tables
+
+UNROLL: Final = 4
+"""Longest bound, ticks, that is counted in states though a clock would do."""
+LONGEST: Final = 400
+"""Longest bound, ticks, that is counted in states where a clock does not do."""
+MAX_PARTS: Final = 512
+"""Most parts of one formula."""
+LONGEST_DELAY: Final = 1_000_000
+"""Most ticks that a bound may begin later, where requests wait in a delay line."""
+TOGETHER: Final = Limits(states=256, cells=4_096, sought=1_000, choices=8_192)
+"""How large a table may grow in which several parts are put together."""
+
+
+def parts(formula: Formula) -> tuple[Formula, ...]:
+    """Return formulas whose conjunction is equivalent to `formula`; what has no temporal operator stays together.
+
+    Raises
+    ------
+    FormulaError
+        If there are more than `MAX_PARTS`.
+    """
+    split = dict.fromkeys(_split(formula, True))
+    plain = [part for part in split if not any(inner.op in FUTURE | PAST for inner in subformulas(part))]
+    if plain and len(propositions(conj(*plain))) <= MAX_PROPOSITIONS:
+        found = (conj(*plain), *(part for part in split if part not in plain))
+    else:
+        found = tuple(split)
+    if len(found) > MAX_PARTS:
+        raise FormulaError("too many parts", value=len(found), expected=f"at most {MAX_PARTS} conjuncts")
+    return found
+
+
+def _split(formula: Formula, positive: bool) -> list[Formula]:
+    """Return the conjuncts of `formula` or of its negation."""
+    if formula.op is Op.NOT:
+        return _split(formula.args[0], not positive)
+    if formula.op is (Op.AND if positive else Op.OR):
+        return [part for arg in formula.args for part in _split(arg, positive)]
+    if formula.op is Op.IMPLIES and not positive:
+        return _split(formula.args[0], True) + _split(formula.args[1], False)
+    if formula.op is Op.IMPLIES:
+        conclusions = _split(formula.args[1], True)
+        return (
+            [formula] if len(conclusions) == 1 else [implies(formula.args[0], part) for part in conclusions]
+        )
+    if formula.op in (Op.G, Op.F) and (formula.op is Op.G) == positive:
+        return [always(part, formula.bounds) for part in _split(formula.args[0], positive)]
+    return [formula if positive else ~formula]
+
+
+def groups(split: Sequence[Formula]) -> list[list[Formula]]:
+    """Return the parts in groups; parts of two groups have no proposition in common."""
+    found: list[tuple[set[str], list[Formula]]] = []
+    for part in split:
+        names, members = set(propositions(part)), [part]
+        apart: list[tuple[set[str], list[Formula]]] = []
+        for other, own in found:
+            if names & other:
+                names, members = names | other, own + members
+            else:
+                apart.append((other, own))
+        found = [*apart, (names, members)]
+    return [members for _, members in found]
+
+
+def together(group: Sequence[Formula], period: float) -> Automaton | None:
+    """Return one table for all parts of a group, exact in every verdict; None if it would be too large."""
+    formula = conj(*group)
+    names = propositions(formula)
+    if len(names) > MAX_PROPOSITIONS:
+        return None
+    found = _together(renamed(formula, _plain(names)), period)
+    return None if found is None else replace(found, names=names)
+
+
+@lru_cache(maxsize=1024)
+def _together(formula: Formula, period: float) -> Automaton | None:
+    for unroll in (UNROLL, LONGEST):
+        try:
+            return automaton(formula, period, unroll, TOGETHER)
+        except FormulaError:
+            continue
+    return None
+
+
+def _plain(names: Sequence[str]) -> dict[str, str]:
+    """Return a name for each proposition by its place, the same for all formulas of one shape."""
+    return {name: f"p{place:03d}" for place, name in enumerate(names)}
+
+
+def compiled(formula: Formula, period: float, unroll: int = UNROLL) -> Automaton:
+    """Return the table of one formula in one piece.
+
+    Parameters
+    ----------
+    formula : Formula
+        With at most `obligations.MAX_PROPOSITIONS` propositions.
+    period : float
+        Seconds between frames, > 0.
+    unroll : int
+        Bounds up to this many ticks are counted in states, longer ones by clocks.
+
+    Raises
+    ------
+    FormulaError
+        If it can't be monitored in this form, saying why.
+    """
+    names = propositions(formula)
+    try:
+        found = _compiled(renamed(formula, _plain(names)), period, unroll)
+    except FormulaError as error:
+        raise FormulaError(f"{error.problem}, in {_short(formula)}", **error.context) from None
+    return replace(found, names=names)
+
+
+@lru_cache(maxsize=1024)
+def _compiled(formula: Formula, period: float, unroll: int) -> Automaton:
+    return automaton(formula, period, unroll)
+
+
+def _short(formula: Formula, limit: int = 80) -> str:
+    text = str(formula)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+class Monitors:
+    """Judges formulas over a batch of trials, one compiled call a frame.
+
+    Parameters
+    ----------
+    formulas : mapping of str to Formula
+        By name.
+    names : sequence of str
+        The propositions, in the order of the input's columns.
+    period : float
+        Seconds between frames.
+    split : bool, optional
+        Whether all parts of conjunctions stay apart (true), or none (false); if not given, as above.
+
+    Attributes
+    ----------
+    formulas : tuple of str
+        The names of the formulas, in the order of the verdicts' columns.
+    late : frozenset of str
+        The formulas for which *false* may come later than it could.
+    tables : int
+        How many table look-ups a frame of one trial takes.
+    lines : int
+        How many delay lines there are.
+    verdicts : (B, F) int64
+        The verdicts after the last frame (`automaton.VERDICTS`); before the first, what holds of the empty word.
+
+    Raises
+    ------
+    FormulaError
+        If a formula uses a proposition that `names` lacks, or is too large to be monitored.
+    """
+
+    def __init__(
+        self,
+        formulas: Mapping[str, Formula],
+        names: Sequence[str],
+        period: float,
+        *,
+        split: bool | None = None,
+    ) -> None:
+        if not period > 0.0:
+            raise FormulaError("not a period", value=period, expected="seconds > 0")
+        self.formulas = tuple(formulas)
+        self._column = {name: column for column, name in enumerate(names)}
+        self._pieces: list[Piece] = []
+        self._delays: list[tuple[Line, int]] = []
+        late: set[str] = set()
+        for number, (name, formula) in enumerate(formulas.items()):
+            try:
+                if not self._take(number, formula, period, split):
+                    late.add(name)
+            except FormulaError as error:
+                raise error.within(field=name) from None
+        self.late = frozenset(late)
+        self.tables = len(self._pieces)
+        self.lines = len(self._delays)
+        self._tables = packed_tables(self._pieces)
+        self._lines = packed_lines(self._delays, self._column)
+        self._kernel: tuple[Tables, Lines] | None = None
+        self.reset(0)
+
+    def _take(self, number: int, formula: Formula, period: float, split: bool | None) -> bool:
+        """Monitor a formula; say whether *false* comes as early as it can."""
+        lines = len(self._delays)
+        if split is False:
+            self._add(number, formula, period)
+            return len(self._delays) == lines
+        early = True
+        for group in groups(parts(formula)):
+            table = together(group, period) if len(group) > 1 and split is None else None
+            if table is not None:
+                self._place(number, table)
+                continue
+            early = early and len(group) == 1
+            for part in group:
+                self._add(number, part, period)
+        return early and len(self._delays) == lines
+
+    def _add(self, number: int, part: Formula, period: float) -> None:
+        """Monitor a part: with clocks, else with a delay line, else by counting its bounds."""
+        try:
+            self._place(number, compiled(part, period))
+            return
+        except FormulaError as error:
+            refused = error
+        found = delayed(part, period)
+        if found is not None:
+            others, late = found
+            if late.length > LONGEST_DELAY:
+                raise FormulaError(
+                    "begins too late", value=late.length, expected=f"at most {LONGEST_DELAY} ticks from now"
+                )
+            for other in others:
+                self._add(number, other, period)
+            table = compiled(late.formula, period)
+            self._delays.append((line(late.request, period), late.length))
+            self._place(number, table, late.name, late.strong)
+            return
+        try:
+            self._place(number, compiled(part, period, LONGEST))
+        except FormulaError:
+            raise refused from None
+
+    def _place(self, number: int, table: Automaton, request: str = "", strong: bool = False) -> None:
+        """Add a table; `request` is its proposition that comes out of the last delay line."""
+        for name in table.names:
+            if name != request and name not in self._column:
+                raise FormulaError(
+                    "unknown proposition", value=name, expected="one of the problem's propositions"
+                )
+        last = len(self._delays) - 1
+        columns = tuple(
+            len(self._column) + last if name == request else self._column[name] for name in table.names
+        )
+        self._pieces.append(Piece(number, table, columns, last if strong else -1))
+
+    def reset(self, trials: int) -> None:
+        """Begin anew with `trials` trials."""
+        tables = self._tables
+        self._state = np.zeros((trials, self.tables), dtype=np.int64)
+        self._clocks = np.zeros((trials, len(tables["clock_length"])), dtype=np.int64)
+        self._memory = np.zeros((trials, len(self._delays), 3), dtype=np.int64)
+        self._rings = np.zeros((trials, sum(length for _, length in self._delays)), dtype=np.int64)
+        self._frame = np.zeros((trials, len(self._column) + len(self._delays)), dtype=np.int64)
+        first = np.full(len(self.formulas), 3, dtype=np.int64)
+        np.minimum.at(first, tables["part_of"], tables["verdict"][tables["verdict_at"]])
+        self.verdicts = np.tile(first, (trials, 1))
+
+    def update(self, values: npt.NDArray[Any]) -> Ints:
+        """Take one frame into account.
+
+        Parameters
+        ----------
+        values : (B, P) array of int64 or bool
+            The propositions, in the order of `names`.
+
+        Returns
+        -------
+        (B, F) int64
+            `verdicts`, updated in place.
+        """
+        from dubins_traffic.logic.kernel import Lines, Tables, advance, delay
+
+        width = len(self._column)
+        if values.shape != (len(self._state), width):
+            raise ValueError(f"values: shape {values.shape}, expected {(len(self._state), width)}")
+        if self._kernel is None:
+            self._kernel = Tables(**self._tables), Lines(**self._lines)
+        tables, lines = self._kernel
+        self._frame[:, :width] = values
+        if self._delays:
+            delay(self._frame, lines, self._memory, self._rings)
+        advance(self._frame, tables, self._memory, self._state, self._clocks, self.verdicts)
+        return self.verdicts

@@ -1,0 +1,143 @@
+"""Quantitative robustness: by how much a formula holds on signals, in the units of the signals.
+
+Each proposition is a real-valued signal that is positive where it holds: a distance to what is forbidden, the time
+that is left. And is the least, or the greatest, not the negative; a positive value of a formula means that it holds,
+a negative one that it doesn't, and changing every signal by less than the absolute value leaves it so (Fainekos and
+Pappas, 2009; Donzé and Maler, 2010). Signals end: nothing is eventually so beyond the end, everything always. For
+safety and bounded formulas the value at frame 0 is final once the bounds have passed; for others it is the value so
+far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.logic.formula import Formula, FormulaError, Op, subformulas, ticks
+
+
+def robustness(formula: Formula, signals: Mapping[str, Floats], period: float) -> Floats:
+    """Return the robustness of a formula at every frame.
+
+    Parameters
+    ----------
+    formula : Formula
+        Any; past operators look at the frames before.
+    signals : mapping of str to (..., K) float64
+        One signal per proposition, all of one shape; the last axis is time, no value is NaN.
+    period : float
+        Seconds between frames.
+
+    Returns
+    -------
+    (..., K) float64
+        In the units of the signals; infinite where the signals don't matter.
+
+    Raises
+    ------
+    FormulaError
+        If a proposition has no signal.
+    """
+    shapes = {np.shape(signal) for signal in signals.values()}
+    if len(shapes) > 1:
+        raise FormulaError("signals of different shapes", value=sorted(shapes), expected="one shape")
+    shape = shapes.pop() if shapes else (1,)
+    values: dict[Formula, Floats] = {}
+    for part in subformulas(formula):
+        if part.op is Op.PROP:
+            if part.name not in signals:
+                raise FormulaError(
+                    "no signal for a proposition", value=part.name, expected="one of the signals"
+                )
+            values[part] = np.asarray(signals[part.name], dtype=np.float64)
+        elif part.op in (Op.TRUE, Op.FALSE):
+            values[part] = np.full(shape, np.inf if part.op is Op.TRUE else -np.inf)
+        else:
+            values[part] = _value(part, [values[arg] for arg in part.args], period)
+    return values[formula]
+
+
+def _value(part: Formula, args: list[Floats], period: float) -> Floats:
+    op, first, last = part.op, args[0], args[-1]
+    if op is Op.AND:
+        return np.minimum.reduce(args)
+    if op is Op.OR:
+        return np.maximum.reduce(args)
+    if op is Op.NOT:
+        return -first
+    if op is Op.IMPLIES:
+        return np.maximum(-first, last)
+    if op is Op.IFF:
+        return np.minimum(np.maximum(-first, last), np.maximum(first, -last))
+    if op in (Op.X, Op.Y, Op.Z):
+        return _shifted(first, 1 if op is Op.X else -1, np.inf if op is Op.Z else -np.inf)
+    if op in (Op.O, Op.H, Op.S, Op.T):
+        return _past(op, first, last)
+    span = None if part.bounds is None else tuple(ticks(bound, period) for bound in part.bounds)
+    return _future(op, first, last, span)
+
+
+def _past(op: Op, first: Floats, last: Floats) -> Floats:
+    if op is Op.O:
+        return np.maximum.accumulate(last, axis=-1)
+    if op is Op.H:
+        return np.minimum.accumulate(last, axis=-1)
+    if op is Op.S:
+        return _until(first[..., ::-1], last[..., ::-1])[..., ::-1]
+    return -_past(Op.S, -first, -last)
+
+
+def _future(op: Op, first: Floats, last: Floats, span: tuple[int, ...] | None) -> Floats:
+    if op is Op.F:
+        return _eventually(first, span)
+    if op is Op.G:
+        return -_eventually(-first, span)
+    if op is Op.R:
+        return -_future(Op.U, -first, -last, span)
+    if op is Op.W:
+        return np.maximum(_until(first, last), -_eventually(-first, None))
+    if op is Op.M:
+        return _until(last, np.minimum(first, last))
+    if span is None:
+        return _until(first, last)
+    low, high = span
+    held = _shifted(_until(first, last), low, -np.inf)
+    if low > 0:
+        held = np.minimum(held, -_eventually(-first, (0, low - 1)))
+    return np.minimum(held, _eventually(last, (low, high)))
+
+
+def _until(first: Floats, last: Floats) -> Floats:
+    out = np.empty_like(last)
+    held = np.full(last.shape[:-1], -np.inf)
+    for frame in range(last.shape[-1] - 1, -1, -1):
+        held = np.maximum(last[..., frame], np.minimum(first[..., frame], held))
+        out[..., frame] = held
+    return out
+
+
+def _eventually(signal: Floats, span: tuple[int, ...] | None) -> Floats:
+    """Return the greatest value at the frames from t + a to t + b; windows are doubled until they are long enough."""
+    if span is None:
+        return np.maximum.accumulate(signal[..., ::-1], axis=-1)[..., ::-1]
+    low, high = span
+    wanted = min(high - low + 1, signal.shape[-1])
+    width, best = 1, signal
+    while width < wanted:
+        more = min(width, wanted - width)
+        best = np.maximum(best, _shifted(best, more, -np.inf))
+        width += more
+    return _shifted(best, low, -np.inf)
+
+
+def _shifted(signal: Floats, count: int, beyond: float) -> Floats:
+    """Return the signal `count` frames later, or earlier if negative; `beyond` stands for what there is none of."""
+    out = np.full(signal.shape, beyond)
+    size = signal.shape[-1]
+    if count >= 0:
+        out[..., : max(0, size - count)] = signal[..., count:]
+    else:
+        out[..., -count:] = signal[..., : max(0, size + count)]
+    return out

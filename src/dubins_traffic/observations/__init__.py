@@ -1,0 +1,1 @@
+"""What a driver is told: observations from the state of a trial."""

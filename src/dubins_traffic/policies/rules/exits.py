@@ -1,0 +1,281 @@
+"""Which lane a car takes at the end of its own, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.random import below, uniform
+from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
+from dubins_traffic.policies.rules.tables import (
+    ASIDE,
+    BLOCKS,
+    FIRST,
+    GOAL,
+    HOLD,
+    KEPT_OUT,
+    KIND,
+    LANE,
+    LAST,
+    LEFT_SIDE,
+    LEFTS,
+    LOOP,
+    NEMESIS,
+    NEXT,
+    PARK_TIME,
+    PARKS,
+    PERIOD,
+    PLACE,
+    PLACES,
+    ROLLING,
+    ROLLS,
+    ROUND,
+    TAILGATES,
+    TAILGATING,
+    TURN,
+    VIOLATIONS,
+    WITHIN,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.routing.lane_graph import FAR, aim_for, place_of, spread
+
+DRAW = 20
+"""First of the draws of the law: exits take four, moods five, places one."""
+BACK = 30.0
+"""What turning round at a crossing counts, metres (for a nemesis STEP)."""
+UNREACHABLE = 1e6
+BACK_IN_BEND = 2e6
+"""What turning round in a bend counts, metres: more than any way on that is not barred."""
+BARRED = 1e7
+"""What a lane counts in which an obstacle can't be passed, metres."""
+STEP = 3.0
+"""What a lane counts in choosing between exits, metres."""
+BLOCK_TIME = 9.0
+"""For how long a car that blocks stands in an intersection, seconds."""
+
+
+@jit
+def take_lane(
+    b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
+    ints = drivers.ints[b, n]
+    floats = drivers.floats[b, n]
+    seed = drivers.seed[b]
+    trial = drivers.trial[b]
+    before = ints[LANE]
+    ints[LANE] = lane
+    ints[TURN] = 0
+    ints[KEPT_OUT] = 0
+    ints[WITHIN] = 0
+    floats[ASIDE] = 0.0
+    if ints[KIND] == LOOP:
+        following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
+        if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
+            following = place_of(lane, ints[FIRST], ints[LAST], drivers.stage)
+        ints[PLACE] = following
+    v = lane_end(roads, drivers.net[b], lane)
+    violations = 0
+    floats[HOLD] = 0.0
+    if floats[ROLLS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < floats[ROLLS]:
+        violations |= ROLLING
+    if floats[LEFTS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < floats[LEFTS]:
+        violations |= LEFT_SIDE
+    if floats[TAILGATES] > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < floats[TAILGATES]:
+        violations |= TAILGATING
+    if floats[BLOCKS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < floats[BLOCKS]:
+        floats[HOLD] = BLOCK_TIME
+    if (
+        floats[PARKS] > 0.0
+        and is_goal(v, ints, drivers)
+        and uniform(seed, trial, n, tick, DRAW + 8) < floats[PARKS]
+    ):
+        floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
+    ints[VIOLATIONS] = violations
+    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+    ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
+
+
+@jit_inline
+def is_goal(v: int, ints: Any, drivers: Drivers) -> bool:
+    """Tell whether v is among the goals that the car knows."""
+    if ints[KIND] == LOOP:
+        return False
+    found = False
+    for k in range(ints[FIRST], ints[LAST]):
+        found = found or drivers.stage[k] == v
+    return found
+
+
+@jit_inline
+def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scratch) -> int:
+    """Return the cheapest exit of v of those with their bit in `allowed`, -1 if there is none."""
+    best = -1
+    for k in range(roads.degree[offset + v]):
+        if allowed & (1 << k) != 0 and (best < 0 or scratch.cost[k] < scratch.cost[best]):
+            best = k
+    return roads.arms[offset + v, best] if best >= 0 else -1
+
+
+@jit
+def price_exits(
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    lane = ints[LANE]
+    v = lane_end(roads, net, lane)
+    row = roads.vert_off[net] + v
+    kind = ints[KIND]
+    on_loop = kind == LOOP and ints[PLACE] >= 0
+    follow = -1
+    if on_loop:
+        follow = drivers.stage[ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]]
+    known = aim(b, n, tick, v, state, labels, roads, drivers, scratch)
+    for k in range(roads.degree[row]):
+        out = roads.arms[row, k]
+        cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
+        if kind == ROUND and ints[PLACE] >= 0:
+            place = ints[PLACE]
+            if drivers.stage[place] == v:
+                place = place + 1 if place + 1 < ints[LAST] else ints[FIRST]
+            cost = min(drivers.distance[place, out], UNREACHABLE)
+        elif on_loop and out == follow:
+            cost = -1.0
+        elif known:
+            cost += STEP * scratch.hops[out] if scratch.hops[out] != FAR else UNREACHABLE
+        if out == lane ^ 1 and roads.degree[row] > 1:
+            at_crossing = STEP if kind == NEMESIS else BACK
+            cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
+        if obstacles.off[b] != obstacles.off[b + 1] and (
+            is_shut(b, lane, int(out), roads, obstacles, drivers)
+            or leads_nowhere(b, int(out), roads, obstacles, drivers)
+        ):
+            cost += BARRED
+        scratch.cost[k] = cost
+
+
+@jit
+def aim(
+    b: int, n: int, tick: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
+    scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
+    net = drivers.net[b]
+    ints = drivers.ints[b, n]
+    kind = ints[KIND]
+    if kind == PLACES and (ints[GOAL] < 0 or ints[GOAL] == v):
+        count = roads.vert_off[net + 1] - roads.vert_off[net]
+        ints[GOAL] = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
+    elif kind == NEMESIS:
+        ints[GOAL] = foreseen(b, state, labels, roads, drivers, ints)
+    seeks_loop = kind == LOOP and ints[PLACE] < 0 and ints[LAST] > ints[FIRST]
+    if not seeks_loop and (kind not in (PLACES, NEMESIS) or ints[GOAL] < 0):
+        return False
+    if seeks_loop:
+        forget(net, roads, scratch)
+        found = 0
+        for k in range(ints[FIRST], ints[LAST]):
+            found = aim_for(drivers.stage[k], scratch.hops, scratch.queue, found)
+        spread(roads, net, scratch.hops, scratch.queue, found)
+        return True
+    seek(net, ints[GOAL], roads, scratch)
+    if kind == NEMESIS:
+        seek_ego(b, net, labels, roads, scratch)
+    return True
+
+
+@jit
+def forget(net: int, roads: RoadTable, scratch: Scratch) -> None:
+    """Make all lanes of a network far from everywhere."""
+    for k in range(2 * (roads.seg_off[net + 1] - roads.seg_off[net])):
+        scratch.hops[k] = FAR
+
+
+@jit
+def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
+    """Fill `scratch.hops` with the lanes from each lane to intersection v."""
+    forget(net, roads, scratch)
+    row = roads.vert_off[net] + v
+    found = 0
+    for k in range(roads.degree[row]):
+        found = aim_for(roads.arms[row, k] ^ 1, scratch.hops, scratch.queue, found)
+    spread(roads, net, scratch.hops, scratch.queue, found)
+
+
+@jit
+def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratch) -> None:
+    """Turn hops to the ego's goal into hops to the next lanes on its way there."""
+    lane = labels.lane[b, 0]
+    v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
+    count = 0
+    while v >= 0 and count < scratch.chain.shape[0]:
+        row = roads.vert_off[net] + v
+        best = -1
+        for k in range(roads.degree[row]):
+            out = roads.arms[row, k]
+            back = lane >= 0 and out == lane ^ 1 and roads.degree[row] > 1
+            if not back and (best < 0 or scratch.hops[out] < scratch.hops[best]):
+                best = out
+        scratch.chain[count] = best
+        count += 1
+        if scratch.hops[best] == 0:
+            break
+        lane = best
+        v = lane_end(roads, net, lane)
+    if count == 0:
+        return
+    forget(net, roads, scratch)
+    found = 0
+    for k in range(count):
+        found = aim_for(scratch.chain[k], scratch.hops, scratch.queue, found)
+    spread(roads, net, scratch.hops, scratch.queue, found)
+
+
+@jit
+def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, ints: Any) -> int:
+    """Return the goal to which the ego is nearest, but for the one it is at; -1 without goals."""
+    net = drivers.net[b]
+    best = -1
+    least = 1e300
+    for k in range(ints[FIRST], ints[LAST]):
+        goal = drivers.stage[k]
+        if goal == labels.at[b, 0] or (goal == ints[PLACE] and ints[LAST] - ints[FIRST] > 1):
+            continue
+        dx = roads.vert[roads.vert_off[net] + goal, 0] - state.x[b, 0]
+        dy = roads.vert[roads.vert_off[net] + goal, 1] - state.y[b, 0]
+        if dx * dx + dy * dy < least:
+            least = dx * dx + dy * dy
+            best = goal
+    return best
+
+
+@jit_inline
+def watch_ego(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
+    """A nemesis remembers in PLACE the goal at which the ego has been last."""
+    ints = drivers.ints[b, n]
+    at = labels.at[b, 0]
+    if at >= 0 and is_goal(at, ints, drivers):
+        ints[PLACE] = at
+
+
+@jit_inline
+def count_visit(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
+    """A car on its round takes the next goal once it is at this one."""
+    ints = drivers.ints[b, n]
+    if ints[PLACE] >= 0 and labels.at[b, n] == drivers.stage[ints[PLACE]]:
+        ints[PLACE] = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
+
+
+@jit_inline
+def ticks_of(seconds: float, build: Any) -> int:
+    """Return a duration in whole ticks, rounded down."""
+    return int(seconds / build[PERIOD] + 1e-9)

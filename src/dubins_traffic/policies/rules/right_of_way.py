@@ -1,0 +1,269 @@
+"""Whether a car may enter the disc at the end of its lane: its turn at a crossing, and room behind it (compiled)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
+from dubins_traffic.policies.rules.exits import ticks_of
+from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
+from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
+from dubins_traffic.policies.rules.tables import (
+    APPROACHES,
+    CROSSING,
+    DISC,
+    FORFEIT,
+    GOAL_FIRST,
+    GOAL_LAST,
+    GOAL_TIME,
+    HALF_WIDTH,
+    KEPT_OUT,
+    KIND,
+    LANE,
+    LEFT_SIDE,
+    MIDDLE,
+    NEMESIS,
+    NEXT,
+    OWED,
+    PERIOD,
+    REACH,
+    REST_TIME,
+    ROLLING,
+    ROUND,
+    ROUNDING,
+    TAILGATING,
+    TURN,
+    VIOLATIONS,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
+from dubins_traffic.roads.lookup import INFINITE, lane_end
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.propositions import CLEAR, FIRST, FORFEITED, LEFT, STOPPED
+
+CHOOSY = 1.0
+"""Seconds for which a car whose turn it is waits for room in the lane it wants."""
+BUDGET = 4.0
+"""Metres of detour that a car on its round accepts for each second it has waited for room."""
+SOON = 0.5
+"""Who is this near to a bend comes into it before one who turns round there, metres."""
+DUTY = 0.8
+"""An e-agent that has lost its place once enters after this share of the time in which it would lose it again, though
+there is room nowhere: else it breaks E3."""
+PATIENT = 0.5
+"""An e-agent that has stood for this share of the time that E5 allows before a bend or dead end enters as soon as an
+exit is free, though those in it may stop."""
+HUSH = 0.2
+"""For this share of every half of the time in which each goal has to be free once (E6) e-agents enter a bend that is
+a goal one after another."""
+LINGER = 0.8
+"""For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
+TRAIL = 3.5
+"""A nemesis minds the ego within this, metres."""
+GOES_NOW = STOPPED | FIRST | CLEAR
+
+
+@jit_inline
+def yield_at_line(
+    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: ReferencePath,
+    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch:
+    Scratch,
+) -> float:  # fmt: skip
+    """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
+    net = drivers.net[b]
+    build = drivers.build[b]
+    ints = drivers.ints[b, n]
+    if not faces_gate(b, n, part, labels, roads, drivers):
+        return speed
+    bits = np.int64(labels.bits[b, n])
+    its_turn = count_turn(bits, drivers.way[b, n], ints)
+    line = to_line(left, x, y, way, build)
+    minds = n != EGO and ints[VIOLATIONS] & TAILGATING == 0
+    behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
+    if behind and drivers.way[b, n, CROSSING] != 0.0:
+        line -= build[APPROACHES]
+        its_turn = False
+    if line >= speed * build[PERIOD]:
+        return speed
+    v = lane_end(roads, net, ints[LANE])
+    if drivers.way[b, n, CROSSING] != 0.0:
+        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+        free = free or ints[VIOLATIONS] & ROLLING != 0
+    else:
+        free = may_enter_bend(b, n, tick, v, way, near, state, labels, roads, obstacles, drivers, scratch)
+    if bits & LEFT != 0 and ints[VIOLATIONS] & LEFT_SIDE == 0:
+        free = False
+    return speed if free else max(0.0, line) / build[PERIOD]
+
+
+@jit
+def may_enter_bend(
+    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
+
+    An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone; who has waited for that
+    for long takes the way on.
+    """
+    build = drivers.build[b]
+    ints = drivers.ints[b, n]
+    degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
+    turns = turns_round(ints)
+    hushed = is_hushed(tick, v, ints, build, drivers)
+    inside = 0
+    held = False
+    for k in range(near):
+        j = scratch.near[k]
+        if labels.crosses[b, j] == v:
+            inside += 1 if turns else shares_way(b, j, way, degree, state, build)
+            held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.ints[b, j])))
+        elif turns and degree > 1:
+            held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
+    long = ints[KIND] != ROUND and ints[KEPT_OUT] * build[PERIOD] > PATIENT * build[REST_TIME]
+    if held or (inside > 0 and (turns or degree != 2)):
+        free = False
+    else:
+        free = has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, scratch)
+        if long and inside == 0:
+            free = free or is_free(b, n, ints[NEXT], state, roads, drivers, scratch)
+    if long and not free and turns and degree == 2:
+        take_way_on(b, n, state, roads, obstacles, drivers, scratch)
+    ints[KEPT_OUT] = 0 if free else ints[KEPT_OUT] + 1
+    return free
+
+
+@jit_inline
+def is_hushed(tick: int, v: int, ints: Any, build: Any, drivers: Drivers) -> bool:
+    """Tell whether now is a time at which a car that minds goals enters the bend v only if nobody is in it.
+
+    Without such times cars that follow one another through a bend without end would never leave it free.
+    """
+    half = ticks_of(0.5 * build[GOAL_TIME], build)
+    if half <= 0 or tick % half < (1.0 - HUSH) * half:
+        return False
+    found = False
+    for k in range(ints[GOAL_FIRST], ints[GOAL_LAST]):
+        found = found or drivers.stage[k] == v
+    return found
+
+
+@jit_inline
+def faces_gate(b: int, n: int, part: int, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
+    """Tell whether a car is before the disc at the end of its lane."""
+    return part == BEFORE and labels.crosses[b, n] != lane_end(
+        roads, drivers.net[b], drivers.ints[b, n, LANE]
+    )
+
+
+@jit_inline
+def count_turn(bits: Any, way: Any, ints: Any) -> bool:
+    """Tell whether it is the turn of a car before a disc, and count for how long; `way` is its row of `Drivers.way`."""
+    its_turn = way[CROSSING] != 0.0 and bits & GOES_NOW == GOES_NOW
+    ints[TURN] = ints[TURN] + 1 if its_turn else 0
+    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
+    return its_turn
+
+
+@jit_inline
+def to_line(left: float, x: float, y: float, way: ReferencePath, build: Any) -> float:
+    """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
+    edge = build[DISC] + build[REACH] + MARGIN
+    aside = left - build[MIDDLE]
+    return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
+
+
+@jit_inline
+def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, build: Any) -> int:
+    """Return 1 if a car in the disc is on this way, or in a disc that is no bend."""
+    if degree != 2:
+        return 1
+    _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+    return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+
+
+@jit_inline
+def is_behind_ego(
+    b: int, n: int, x: float, y: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers
+) -> bool:
+    """Tell whether the ego is ahead in a car's lane.
+
+    Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
+    again, and then bars the way of who would be first.
+    """
+    if labels.lane[b, EGO] != drivers.ints[b, n, LANE]:
+        return False
+    return way_to_go(way, state.x[b, EGO], state.y[b, EGO]) > way_to_go(way, x, y)
+
+
+@jit_inline
+def turns_round(ints: Any) -> bool:
+    """Tell whether a car that the law drives is about to turn round at the end of its lane, or does it."""
+    return ints[NEXT] >= 0 and ints[NEXT] == ints[LANE] ^ 1
+
+
+@jit_inline
+def comes_first(
+    b: int, n: int, j: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers
+) -> bool:
+    """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
+    lane, net = labels.lane[b, j], drivers.net[b]
+    if lane < 0 or lane == drivers.ints[b, n, LANE] or lane_end(roads, net, int(lane)) != v:
+        return False
+    row = roads.vert_off[net] + v
+    dx = state.x[b, j] - roads.vert[row, 0]
+    dy = state.y[b, j] - roads.vert[row, 1]
+    near = drivers.build[b, DISC] + drivers.build[b, REACH] + SOON
+    first = n == EGO or j < n or not turns_round(drivers.ints[b, j])
+    return dx * dx + dy * dy < near * near and first
+
+
+@jit
+def may_go(
+    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
+    ints = drivers.ints[b, n]
+    build = drivers.build[b]
+    bits = np.int64(labels.bits[b, n])
+    due = ints[KIND] != ROUND and is_due(ints[TURN], bits, build)
+    if (
+        ints[KIND] == NEMESIS
+        and bits & FORFEITED == 0
+        and ints[TURN] < ticks_of(LINGER * build[FORFEIT], build)
+    ):
+        dx = state.x[b, 0] - state.x[b, n]
+        dy = state.y[b, 0] - state.y[b, n]
+        if dx * dx + dy * dy < TRAIL * TRAIL:
+            return False
+    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
+        return True
+    waited = ints[OWED] - ticks_of(CHOOSY, build)
+    if not due and (waited < 0 or waited % 8 != 0):
+        return False
+    budget = BUDGET * ints[OWED] * build[PERIOD] if ints[KIND] == ROUND else INFINITE
+    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
+        return True
+    if due and take_last_resort(b, n, state, labels, roads, obstacles, drivers, scratch):
+        return True
+    if due:
+        take_widest(b, n, state, labels, roads, obstacles, drivers, scratch)
+    return due
+
+
+@jit_inline
+def is_due(turn: int, bits: Any, build: Any) -> bool:
+    """Tell whether an e-agent whose turn it is has to enter now, or it loses its place a second time."""
+    if bits & FORFEITED == 0:
+        return False
+    forfeit = ticks_of(build[FORFEIT], build)
+    since = turn - forfeit if turn >= forfeit else turn
+    return since > ticks_of(DUTY * build[FORFEIT], build)

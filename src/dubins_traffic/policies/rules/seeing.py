@@ -1,0 +1,278 @@
+"""What is ahead of a car on its way, and the gap to keep from it (compiled)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.policies.rules.tables import (
+    ASIDE,
+    DISC,
+    FASTEST,
+    HALF_WIDTH,
+    KIND,
+    PERIOD,
+    REACH,
+    ROUND,
+    ROUNDING,
+    TAILGATING,
+    UNTIL,
+    VIOLATIONS,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
+from dubins_traffic.roads.lookup import lane_end, lane_start
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.propositions import APPROACH, EXCUSED, LEFT, STANDS
+
+QUEUE_GAP = 0.12
+"""Gap kept behind a car that waits, metres."""
+MOVING_GAP = 0.25
+"""Gap kept behind a car that drives, metres."""
+STANDING_GAP, NEAR_ENOUGH = 0.72, 1.4
+"""Gap kept behind what stands where there is room: enough to pull out, and for the e-agent of 2016 to drive off; and
+the largest distance between centres, at which it still counts as blocking the lane, metres.
+"""
+FACING_GAP = 0.8
+"""Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
+OBSTACLE_GAP = 0.04
+"""Gap kept in a disc from an obstacle behind it, metres: it never moves, and who comes near may pass it then."""
+CLOSE_GAP = 0.06
+"""Gap kept by a car that tailgates, metres."""
+SIDE, NARROW = 0.04, 0.02
+"""What is kept free beside the body along the way, metres; the same beside obstacles, which never move."""
+BACKWARD = -0.9
+"""Cosine of the angle between two lanes below which the way between them counts as turning round."""
+HALF_TURN = 3.1
+"""Length of the arc in which a car turns round, in units of its radius."""
+SIGHT = 3.0
+"""What is farther away than this does not matter to a car's next tick, metres."""
+HELD = 1e9
+CLOSE = 0.2
+"""The gap up to which a car is looked at for whether a motion might bring about a contact, metres."""
+AWARE = 0.06
+"""A car takes note of what is up to this much farther away than the gap it keeps, metres."""
+
+
+@jit_inline
+def way_to_go(way: ReferencePath, x: float, y: float) -> float:
+    """Return minus the metres along the lane to the intersection at its end."""
+    return (x - way.x) * way.tx + (y - way.y) * way.ty
+
+
+@jit_inline
+def alone(build: Any) -> float:
+    """Return metres between the centres beyond which another car makes no difference to one that just drives on."""
+    widest = max(MOVING_GAP, STANDING_GAP, FACING_GAP)
+    return 2.0 * build[REACH] + widest + AWARE + build[FASTEST] * build[PERIOD]
+
+
+@jit_inline
+def corridor(left: float, wide: float) -> tuple[float, float]:
+    """Return from where to where, left of the way, a car at `left` minds what is ahead: `wide` about it and the way."""
+    return left - wide if left < 0.0 else -wide, left + wide if left > 0.0 else wide
+
+
+@jit_inline
+def meets_nobody(
+    b: int,
+    n: int,
+    part: int,
+    key: float,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    state: State,
+    build: Any,
+) -> bool:
+    """Tell whether no car of the trial makes a difference to one that just drives on: is close, or ahead on its way."""
+    far, touch = alone(build), 2.0 * build[REACH] + CLOSE
+    low, high = corridor(left, 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE)
+    for j in range(state.count[b]):
+        dx = state.x[b, j] - x
+        dy = state.y[b, j] - y
+        d2 = dx * dx + dy * dy
+        if d2 > far * far or j == n:
+            continue
+        there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+        behind = there < part or (there == part and its_key <= key)
+        if d2 < touch * touch or not (behind or its_left < low or its_left > high):
+            return False
+    return True
+
+
+@jit_inline
+def gather(
+    b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, labels: Labels, roads: RoadTable,
+    drivers: Drivers, scratch: Scratch,
+) -> int:  # fmt: skip
+    """List the cars on the car's segment, and on those that meet it where it is near an end; return how many."""
+    net = drivers.net[b]
+    disc = drivers.build[b, DISC]
+    count = add_segment(labels.segment[b, n], n, 0, scratch)
+    if labels.segment[b, n] != lane >> 1:
+        count = add_segment(lane >> 1, n, count, scratch)
+    to_go = -way_to_go(way, x, y)
+    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
+    for end in range(2):
+        far = to_go if end == 0 else length - to_go
+        if far > disc + (1.0 if end == 0 else 0.8):
+            continue
+        v = lane_end(roads, net, lane) if end == 0 else lane_start(roads, net, lane)
+        row = roads.vert_off[net] + v
+        for k in range(roads.degree[row]):
+            segment = roads.arms[row, k] >> 1
+            if segment != lane >> 1 and segment != labels.segment[b, n]:
+                count = add_segment(int(segment), n, count, scratch)
+    return count
+
+
+@jit_inline
+def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
+    """Add the cars of a segment but n to `scratch.near`; return how many there are now."""
+    other = scratch.head[segment]
+    while other >= 0:
+        if other != n:
+            scratch.near[count] = other
+            count += 1
+        other = scratch.link[other]
+    return count
+
+
+@jit_inline
+def look_ahead(
+    b: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, near: int,
+    state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, scratch: Scratch,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
+
+    `who` is a car, or -2 - p for obstacle part p.
+    """
+    reach = build[REACH]
+    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE
+    low, high = corridor(left, wide)
+    passing = floats[ASIDE] != 0.0
+    if passing and way_to_go(way, x, y) < floats[UNTIL]:
+        on_right = floats[ASIDE] < 0.0
+        low = floats[ASIDE] - wide if on_right else min(left, floats[ASIDE]) - 0.1
+        high = max(left, floats[ASIDE]) + 0.1 if on_right else floats[ASIDE] + wide
+    gap = HELD
+    who = -1
+    close = False
+    touch = 2.0 * reach + CLOSE
+    for k in range(near):
+        j = scratch.near[k]
+        dx = state.x[b, j] - x
+        dy = state.y[b, j] - y
+        d2 = dx * dx + dy * dy
+        if d2 > SIGHT * SIGHT:
+            continue
+        if d2 < touch * touch:
+            close = True
+        there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
+        if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
+            continue
+        passed = floats[ASIDE] > 0.0 and labels.bits[b, j] & STANDS != 0
+        if passed and its_left < floats[ASIDE] - wide + SIDE:
+            continue
+        far = sqrt(d2)
+        if there - part == 2:
+            far = max(far, its_key - key + around(way))
+        its_gap = far - 2.0 * reach
+        if its_gap < gap:
+            gap = its_gap
+            who = j
+    return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, build, floats)
+
+
+@jit_inline
+def around(way: ReferencePath) -> float:
+    """Return metres of the arc of a way that turns round, 0 of others."""
+    return HALF_TURN * way.radius if way.tx * way.ux + way.ty * way.uy < BACKWARD else 0.0
+
+
+@jit_inline
+def chord(way: ReferencePath) -> float:
+    """Return metres between the ends of the arc of a way: it is at least so long."""
+    return way.radius * sqrt(2.0 * max(1.0 - way.tx * way.ux - way.ty * way.uy, 0.0))
+
+
+@jit_inline
+def see_obstacles(
+    b: int, part: int, key: float, x: float, y: float, way: ReferencePath, low: float, high: float,
+    gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
+    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING])
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        dx = row[0] - x
+        dy = row[1] - y
+        d2 = dx * dx + dy * dy
+        far = SIGHT + row[7]
+        if d2 > far * far:
+            continue
+        if d2 < (build[REACH] + row[7] + 0.2) * (build[REACH] + row[7] + 0.2):
+            close = True
+        there, its_key, its_left, _, _ = on_way(way, row[0], row[1])
+        aside = row[7] - build[HALF_WIDTH] - build[ROUNDING] + NARROW - SIDE
+        if there < part or (there == part and its_key <= key):
+            continue
+        if there > part and abs(its_left) > wide + SIDE + aside:
+            continue
+        if its_left < low - aside or its_left > high + aside:
+            continue
+        if floats[ASIDE] > 0.0 and its_left < floats[ASIDE] - wide - aside:
+            continue
+        distance = sqrt(d2)
+        if there - part == 2:
+            distance = max(distance, its_key - key + max(around(way), chord(way)))
+        its_gap = distance - build[REACH] - row[7]
+        if its_gap < gap:
+            gap = its_gap
+            who = -2 - p
+    return gap, who, close
+
+
+@jit_inline
+def wanted_gap(
+    b: int,
+    n: int,
+    who: int,
+    way: ReferencePath,
+    state: State,
+    labels: Labels,
+    ints: Any,
+    part: int,
+    reach: float,
+) -> float:
+    """Return the gap to keep from `who`."""
+    if who == -1:
+        return 0.0
+    standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)
+    if labels.bits[b, n] & LEFT != 0:
+        standing = QUEUE_GAP
+    if who < -1:
+        return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
+    if ints[VIOLATIONS] & TAILGATING != 0:
+        return CLOSE_GAP
+    its = np.int64(labels.bits[b, who])
+    _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
+    along = state.c[b, who] * px + state.s[b, who] * py
+    stands_facing = labels.crosses[b, n] >= 0 and abs(state.speed[b, who]) < 0.05
+    if along < -0.3 and labels.crosses[b, who] < 0 and not stands_facing:
+        return FACING_GAP if labels.bits[b, n] & LEFT == 0 else MOVING_GAP
+    in_disc = labels.crosses[b, n] >= 0
+    waits = its & EXCUSED != 0 or its & APPROACH != 0
+    if in_disc or waits:
+        return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
+    if its & STANDS != 0 or (ints[KIND] == ROUND and part == BEFORE):
+        return standing
+    return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 else MOVING_GAP

@@ -1,0 +1,108 @@
+"""Whether what a car passes is sure to stand in the next frame too, so that it may cross the centre line (compiled)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.policies.rules.passing import along, aside, half_width
+from dubins_traffic.policies.rules.tables import (
+    BEHIND,
+    FORE,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    LANE,
+    MIDDLE,
+    NEEDED,
+    OVER,
+    PERIOD,
+    ROUNDING,
+    STAND_TIME,
+    WATCH_X,
+    WATCH_Y,
+    WATCHED,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
+from dubins_traffic.rules.blocking import narrows
+from dubins_traffic.rules.propositions import APPROACH, OVERTAKING, STANDS, STOPPED
+from dubins_traffic.rules.shape import half_extent
+
+LINE, SURE = 0.002, 0.03
+"""What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
+
+
+@jit
+def stays_right(
+    b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
+    build = drivers.build[b]
+    x, y, c, s = advance(
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, build[PERIOD]
+    )
+    half = half_extent(way.tx, way.ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
+    if aside(way, x, y) + half <= build[MIDDLE] + build[OVER] - LINE:
+        return True
+    if labels.bits[b, n] & OVERTAKING == 0:
+        return False
+    own = along(way, x, y)
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        row = obstacles.part[p]
+        key = along(way, row[0], row[1])
+        there = own - row[7] <= key <= own + row[7] + build[FORE]
+        if there and abs(aside(way, row[0], row[1])) - row[7] < build[MIDDLE]:
+            return True
+    return surely_stands(b, n, own, way, state, labels, drivers, scratch)
+
+
+@jit
+def surely_stands(
+    b: int, n: int, own: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers, scratch: Scratch
+) -> bool:  # fmt: skip
+    """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
+
+    Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
+    crossing; and it may drive off.
+    """
+    build = drivers.build[b]
+    lane = drivers.ints[b, n, LANE]
+    if drivers.ints[b, n, WATCHED] * build[PERIOD] < build[STAND_TIME] + build[PERIOD]:
+        return False
+    watch_x, watch_y = drivers.floats[b, n, WATCH_X], drivers.floats[b, n, WATCH_Y]
+    found = False
+    j = scratch.head[lane >> 1]
+    while j >= 0:
+        bits = labels.bits[b, j]
+        if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
+            return False
+        watched = state.x[b, j] == watch_x and state.y[b, j] == watch_y
+        if j != n and bits & STANDS != 0 and watched:
+            key = along(way, float(state.x[b, j]), float(state.y[b, j]))
+            left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - build[MIDDLE]
+            half = half_width(b, j, way, state, build)
+            if own - build[BEHIND] + SURE < key < own + build[FORE] - SURE:
+                found = found or narrows(left - half, left + half, 2.0 * build[MIDDLE], build[NEEDED])
+        j = scratch.link[j]
+    return found
+
+
+@jit_inline
+def watch(
+    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, scratch: Scratch
+) -> None:  # fmt: skip
+    """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
+    j = scratch.head[lane >> 1]
+    while j >= 0:
+        if j != n and state.x[b, j] == floats[WATCH_X] and state.y[b, j] == floats[WATCH_Y]:
+            ints[WATCHED] += 1
+            return
+        j = scratch.link[j]
+    ints[WATCHED] = 0
+    if who >= 0:
+        floats[WATCH_X], floats[WATCH_Y] = state.x[b, who], state.y[b, who]

@@ -1,0 +1,176 @@
+"""How a car that the law drives comes to its line: the command toward it, the lane's edge, a last look (compiled)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.narrow import within_lane
+from dubins_traffic.policies.rules.standing import stays_right
+from dubins_traffic.policies.rules.tables import (
+    ASIDE,
+    FASTEST,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    LEFT_SIDE,
+    PERIOD,
+    REACH,
+    ROUNDING,
+    SLOWEST,
+    TIGHTEST,
+    VIOLATIONS,
+    YAW_MOST,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath
+from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
+from dubins_traffic.rules.propositions import LEFT
+
+HURRY = 0.25
+"""Metres in which a car returns to its way."""
+SLANT, STEEP, ABRUPT = 0.7, 0.9, 0.8
+"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return, and when it
+is astray in a disc, where it has chosen another exit late."""
+ASTRAY = 0.18
+"""Who is this far left of its way in a disc is astray, metres."""
+ALIGNED, NIMBLE = 0.8, 0.98
+"""Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
+GAIN = 8.0
+"""Yaw rate for each unit of the sine of that angle, 1/s."""
+
+
+@jit_inline
+def move(
+    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
+    way: ReferencePath, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
+    build = drivers.build[b]
+    c, s, limit = state.c[b, n], state.s[b, n], build[YAW_MOST]
+    passes = drivers.floats[b, n, ASIDE] != 0.0
+    steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
+    if not outside and left - offset > ASTRAY:
+        steep = ABRUPT
+    aligned = NIMBLE if passes and left < offset else ALIGNED
+    allowed = slowed(allowed, bend, limit)
+    speed, yaw_rate = steer(
+        c, s, left - offset, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+    )
+    if passes or build[TIGHTEST] > 0.0:
+        speed, yaw_rate = keep_right(
+            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, scratch
+        )
+    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
+    if not safe and passes and offset == 0.0:
+        speed, yaw_rate = steer(
+            c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+        )
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
+    elif not safe and passes and within_lane(drivers.floats[b, n, ASIDE], build):
+        across = 1.0 if left > offset else -1.0
+        speed, yaw_rate = steer(
+            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, build[TIGHTEST], build[PERIOD]
+        )
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
+    if not safe:
+        speed = 0.0
+        if build[HALF_LENGTH] > 0.0 and not is_safe(
+            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch
+        ):
+            yaw_rate = 0.0
+    return speed, yaw_rate
+
+
+@jit_inline
+def keep_right(
+    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, state: State, labels: Labels,
+    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
+) -> tuple[float, float]:  # fmt: skip
+    """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
+    build = drivers.build[b]
+    bits = np.int64(labels.bits[b, n])
+    lawless = drivers.ints[b, n, VIOLATIONS] & LEFT_SIDE != 0
+    if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
+        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, scratch
+    ):  # fmt: skip
+        return speed, yaw_rate
+    leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
+    if drivers.floats[b, n, ASIDE] != 0.0 or not leans or build[SLOWEST] >= 0.0:
+        return 0.0, 0.0
+    speed = min(speed, -build[SLOWEST])
+    return -speed, -min(speed / build[TIGHTEST], build[YAW_MOST])
+
+
+@jit_inline
+def slowed(speed: float, bend: float, limit: float) -> float:
+    """Return the speed at which a car follows a line of curvature `bend`, 1/m, with a yaw rate of `limit` at most."""
+    if abs(bend) * speed > 0.8 * limit:
+        return 0.8 * limit / abs(bend)
+    return speed
+
+
+@jit_inline
+def steer(
+    c: float, s: float, left: float, px: float, py: float, bend: float, speed: float, most: float, aligned: float,
+    limit: float, tightest: float, period: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return (speed, yaw rate) of a car `left` of the line it should drive, whose direction is (px, py).
+
+    `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
+    line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
+    `limit` is its largest yaw rate. All is worked out whatever the case, so that `decide_deferred` has no
+    branches.
+    """
+    sine = min(max(-left / HURRY, -most), most)
+    cosine = sqrt(1.0 - sine * sine)
+    hx = px * cosine - py * sine
+    hy = py * cosine + px * sine
+    cross = c * hy - s * hx
+    dot = c * hx + s * hy
+    in_a_tick = abs(cross) / period
+    spin = min(limit, in_a_tick) if dot > 0.0 else limit
+    spin = spin if cross >= 0.0 else -spin
+    yaw_rate = speed * bend + GAIN * cross
+    if tightest > 0.0:
+        limit = min(limit, speed / tightest)
+        if dot < 0.0:
+            yaw_rate = limit if cross >= 0.0 else -limit
+    yaw_rate = min(max(yaw_rate, -limit), limit)
+    yaw_rate = yaw_rate if speed != 0.0 else 0.0
+    turns = dot < aligned and tightest == 0.0
+    return 0.0 if turns or speed == 0.0 else speed, spin if turns else yaw_rate
+
+
+@jit
+def is_safe(
+    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
+    obstacles: ObstacleTable, build: Any, scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    period = build[PERIOD]
+    p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
+    travel = build[FASTEST] * period
+    if p > 0.0:
+        travel += build[YAW_MOST] * reach * period
+    for k in range(near):
+        j = scratch.near[k]
+        dx = state.x[b, j] - x
+        dy = state.y[b, j] - y
+        far = 2.0 * reach + NEAR
+        if j != trusted and dx * dx + dy * dy < far * far and not motion_is_safe(
+            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel,
+        ):  # fmt: skip
+            return False
+    return not may_hit(
+        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+        obstacles.part, obstacles.off[b], obstacles.off[b + 1], NEAR, 0.0,
+    )  # fmt: skip

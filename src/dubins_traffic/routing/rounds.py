@@ -1,0 +1,38 @@
+"""The round that a car drives under the rules: its goals in order, and how far it is to each from every lane."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.routing.tours import find_round, free_round, lane_graph
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+
+def round_time(problem: Problem) -> float:
+    """Return the seconds of a round through all goals in free flow (`routing.free_flow`); inf if there is none."""
+    found = free_round(lane_graph(problem.network), problem.goal_vertices)
+    return inf if found is None else found.length / problem.car.bounds.speed
+
+
+def stages(problem: Problem) -> tuple[Ints, Floats]:
+    """Return the goals in the order of the round (M,), and the metres from the start of each lane to each (M, L).
+
+    M is 0 without goals that can be reached.
+    """
+    graph = lane_graph(problem.network)
+    found = find_round(graph, problem.goal_vertices)
+    if found is None:
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
+    kept = graph.stages.get(found)
+    if kept is None:
+        targets = [found.lanes[place] for place in found.arrivals]
+        distance = np.stack([graph.metres_to(target) for target in targets]) + np.array(graph.length)
+        kept = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
+        graph.stages[found] = kept
+    return kept

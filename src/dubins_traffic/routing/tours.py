@@ -1,0 +1,228 @@
+"""Rounds: closed routes along lanes through all goals, and ways to join them.
+
+A route is a sequence of lanes, each a successor of the one before (`RoadNetwork.successors`: turning round only at
+a dead end). It is as long as its lanes together, plus what its turns cost.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.routing.round_search import LaneTables, metres_to, room, shortest_round
+
+if TYPE_CHECKING:
+    from dubins_traffic.roads.network import RoadNetwork
+
+EXACT = 7
+"""Up to so many goals the shortest of all rounds is found; more are taken each time nearest first."""
+
+MOST_KEPT, FEWEST_KEPT = 1 << 19, 8
+"""So many numbers, about, are kept of rounds that have been found on a network, and so many rounds at least."""
+
+TurnCost = Callable[[int, int], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """A closed route: `lanes` in order, the first following the last; `arrivals` are the places in `lanes` of the
+    lanes that end in a goal as it is reached, `length` is in metres.
+    """
+
+    lanes: tuple[int, ...]
+    arrivals: tuple[int, ...]
+    length: float
+
+
+class LaneGraph:
+    """The lanes of a network with their lengths, successors and costs of turning, metres.
+
+    `turn_cost` (from lane, to lane) is asked once for each pair; without it turning is free.
+    """
+
+    def __init__(self, network: RoadNetwork, turn_cost: TurnCost | None = None) -> None:
+        lengths: list[float] = network.lengths.tolist()
+        self.count = network.lanes
+        self.length = [lengths[lane >> 1] for lane in range(self.count)]
+        self.end = [network.lane_ends(lane)[1] for lane in range(self.count)]
+        self.after: list[list[tuple[int, float]]] = []
+        self.before: list[list[tuple[int, float]]] = [[] for _ in range(self.count)]
+        for lane in range(self.count):
+            steps: list[tuple[int, float]] = []
+            for other in network.successors(lane):
+                turn = turn_cost(lane, other) if turn_cost is not None else 0.0
+                cost = max(0.0, self.length[other] + turn)
+                steps.append((other, cost))
+                self.before[other].append((lane, cost))
+            self.after.append(steps)
+        self.into: list[list[int]] = [[] for _ in range(len(network.intersections))]
+        for lane, v in enumerate(self.end):
+            self.into[v].append(lane)
+        self.rounds: dict[tuple[int, ...], Round | None] = {}
+        self.stages: dict[Round, tuple[Ints, Floats]] = {}
+
+    @cached_property
+    def tables(self) -> LaneTables:
+        """The graph as arrays."""
+        after = _offsets(self.after), *_columns(self.after)
+        before = _offsets(self.before), *_columns(self.before)
+        into = np.fromiter(chain.from_iterable(self.into), dtype=np.int64)
+        return LaneTables(*after, *before, _offsets(self.into), into)
+
+    def metres_to(self, target: int) -> Floats:
+        """Return what `distances` does, without penalties, as an array."""
+        far = np.empty(self.count)
+        work = np.empty((2, self.count), dtype=np.int64)
+        metres_to(target, self.tables, far, work[0], work[1])
+        return far
+
+    def distances(self, target: int, penalty: TurnCost | None = None) -> list[float]:
+        """Return metres from the end of each lane to the end of the lane `target`, driving on from there."""
+        found = [inf] * self.count
+        found[target] = 0.0
+        heap = [(0.0, target)]
+        while heap:
+            far, lane = heapq.heappop(heap)
+            if far > found[lane]:
+                continue
+            for other, cost in self.before[lane]:
+                total = far + cost + (penalty(other, lane) if penalty is not None else 0.0)
+                if total < found[other]:
+                    found[other] = total
+                    heapq.heappush(heap, (total, other))
+        return found
+
+    def step(
+        self, lane: int, distances: Sequence[float], penalty: TurnCost | None = None
+    ) -> tuple[int, float]:
+        """Return the next lane toward the target of `distances`, and metres to it by way of that lane (or -1, inf).
+
+        At the target itself this begins another way round to it.
+        """
+        best, least = -1, inf
+        for other, cost in self.after[lane]:
+            total = cost + distances[other] + (penalty(lane, other) if penalty is not None else 0.0)
+            if total < least:
+                best, least = other, total
+        return best, least
+
+    def route(
+        self, lane: int, target: int, distances: Sequence[float], penalty: TurnCost | None = None
+    ) -> list[int]:
+        """Return the lanes after `lane` up to `target`: at least one, so from `target` itself once round."""
+        lanes: list[int] = []
+        while lane >= 0 and (lane != target or not lanes):
+            lane = self.step(lane, distances, penalty)[0]
+            if lane >= 0:
+                lanes.append(lane)
+        return lanes
+
+
+def lane_graph(network: RoadNetwork) -> LaneGraph:
+    """Return the graph of a network's lanes in which turning is free; made once for each network."""
+    graph = network.known.get(LaneGraph)
+    if not isinstance(graph, LaneGraph):
+        graph = network.known[LaneGraph] = LaneGraph(network)
+    return graph
+
+
+def _offsets(rows: Sequence[Sequence[object]]) -> Ints:
+    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
+
+
+def _columns(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Ints, Floats]:
+    flat = list(chain.from_iterable(rows))
+    lanes = np.array([lane for lane, _ in flat], dtype=np.int64)
+    return lanes, np.array([cost for _, cost in flat], dtype=np.float64)
+
+
+def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
+    """Return a short round through the intersections `goals` (numbers; duplicates count once).
+
+    Up to `EXACT` goals it is the shortest there is: for every cyclic order of the goals and every choice of the
+    lane by which each is reached. With more goals, each time the nearest one not yet visited is taken. None without
+    goals or if no round reaches them all.
+    """
+    distinct = tuple(dict.fromkeys(goals))
+    if not distinct:
+        return None
+    if distinct not in graph.rounds:
+        if len(graph.rounds) >= max(FEWEST_KEPT, MOST_KEPT // graph.count):
+            graph.rounds.clear()
+            graph.stages.clear()
+        shortest = len(distinct) <= EXACT
+        graph.rounds[distinct] = _shortest(graph, distinct) if shortest else _nearest_first(graph, distinct)
+    return graph.rounds[distinct]
+
+
+def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
+    """Return the round of free flow through `goals`: of a single one to the nearest other intersection and back.
+
+    Only another disc makes the next visit of a goal one (RULES, rule 1), and turning round in a disc is free. Through
+    several goals it is what `find_round` finds.
+    """
+    distinct = tuple(dict.fromkeys(goals))
+    if len(distinct) != 1:
+        return find_round(graph, goals)
+    back = min(graph.into[distinct[0]], key=lambda lane: (graph.length[lane], lane), default=-1)
+    return None if back < 0 else Round((back ^ 1, back), (1,), 2.0 * graph.length[back])
+
+
+def _shortest(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
+    own = room(len(goals), graph.count)
+    lanes, length = shortest_round(np.array(goals, dtype=np.int64), graph.tables, own)
+    if not lanes:
+        return None
+    return Round(tuple(own.lane[:lanes].tolist()), tuple(own.arrival.tolist()), length)
+
+
+def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
+    first = graph.into[goals[0]][0]
+    lanes: list[int] = []
+    arrivals: list[int] = []
+    length, lane = 0.0, first
+    missing = set(goals[1:])
+    while missing:
+        leg, far = _search(graph, lane, lambda other: graph.end[other] in missing)
+        if not leg:
+            return None
+        lanes += leg
+        length += far
+        lane = leg[-1]
+        arrivals.append(len(lanes) - 1)
+        missing.discard(graph.end[lane])
+    leg, far = _search(graph, lane, lambda other: other == first)
+    lanes += leg
+    arrivals.append(len(lanes) - 1)
+    return Round(tuple(lanes), tuple(arrivals), length + far) if leg else None
+
+
+def _search(graph: LaneGraph, lane: int, wanted: Callable[[int], bool]) -> tuple[list[int], float]:
+    """Return the shortest route from the end of `lane` to the end of a wanted lane, and its metres."""
+    found: dict[int, float] = {}
+    came: dict[int, int] = {}
+    heap = [(cost, other, -1) for other, cost in graph.after[lane]]
+    heapq.heapify(heap)
+    while heap:
+        far, at, source = heapq.heappop(heap)
+        if at in found:
+            continue
+        found[at] = far
+        came[at] = source
+        if wanted(at):
+            leg = [at]
+            while came[leg[-1]] >= 0:
+                leg.append(came[leg[-1]])
+            return leg[::-1], far
+        for other, cost in graph.after[at]:
+            if other not in found:
+                heapq.heappush(heap, (far + cost, other, at))
+    return [], inf

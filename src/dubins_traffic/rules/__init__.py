@@ -1,0 +1,1 @@
+"""The rules of the road: propositions, queues, the referee, and the task as formulas (docs/rules.md)."""

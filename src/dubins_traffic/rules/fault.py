@@ -1,0 +1,43 @@
+"""Who is at fault in a collision (RULES, *Propositions*, at_fault)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dubins_traffic.cars.state import Contact
+from dubins_traffic.kernels.arrays import Bits
+from dubins_traffic.rules.propositions import BREACH3, LEFT, OVERTAKING
+
+
+def in_breach(bits: int) -> bool:
+    """Tell whether a car breaks rule 2 or 3: left and not overtaking, or in a disc entered against rule 3."""
+    return bits & (LEFT | OVERTAKING) == LEFT or bits & BREACH3 != 0
+
+
+def with_fault(contact: Contact, bits: Bits) -> Contact:
+    """Return `contact` with `at_fault` filled in.
+
+    Parameters
+    ----------
+    contact : Contact
+        Who touched whom during a tick, how fast each closed, and who moved.
+    bits : (N,) uint32
+        The flags of the trial's cars in the frame at the beginning of that tick: all drivers chose from it.
+
+    Notes
+    -----
+    Never who did not move. A car that hits an obstacle is at fault. Of two cars: those that closed; of these, those
+    in breach; if none of these or all are, all that closed.
+    """
+    own = int(bits[contact.car])
+    return with_fault_by(contact, own, int(bits[contact.other]) if contact.other >= 0 else 0)
+
+
+def with_fault_by(contact: Contact, own: int, other: int) -> Contact:
+    """Do as `with_fault`, given the flags of `contact.car` and of the other car."""
+    if contact.other < 0:
+        return replace(contact, at_fault=(contact.moved[0], False))
+    closed = [moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True)]
+    guilty = [closes and in_breach(flags) for closes, flags in zip(closed, (own, other), strict=True)]
+    first, second = guilty if any(guilty) else closed
+    return replace(contact, at_fault=(first, second))

@@ -1,0 +1,360 @@
+"""The referee: which rules of RULES are broken, by whom, when, since when and where, live or from frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.near import unknown
+from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
+from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.kernels.arrays import Bits, Ints
+from dubins_traffic.rules.breach_log import (
+    AT_TICK,
+    AT_VERTEX,
+    COLLISION,
+    EXIT_COUNTS,
+    EXIT_PAUSED,
+    EXIT_SINCE,
+    EXIT_TICKS,
+    FAULT,
+    FIRST_SINCE,
+    LEFT_SINCE,
+    OF_CAR,
+    OF_RULE,
+    OF_TRIAL,
+    ON_LANE,
+    REST_SINCE,
+    RULES,
+    SINCE_TICK,
+    BreachLog,
+    RefereeParameters,
+    pack_terms,
+)
+from dubins_traffic.rules.duties import find_ways
+from dubins_traffic.rules.fault import with_fault
+from dubins_traffic.rules.judged import Judged, Posed, kinds_of
+from dubins_traffic.rules.labeller import Labeller
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
+
+_PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_COUNTS), ("E5", REST_SINCE))
+_CLOCKS = [clock for _, clock in _PENDING]
+_ROOMY = 64
+"""For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
+
+
+class WithGoals(Judged, Protocol):
+    """What the referee asks of a problem (`problem.instance.Problem`)."""
+
+    @property
+    def goal_vertices(self) -> Sequence[int]:
+        """Numbers of the goals' intersections."""
+        ...
+
+
+class Arraigned(Posed, Protocol):
+    """What the referee asks of an instance (`problem.instance.Instance`)."""
+
+    @property
+    def problem(self) -> WithGoals:
+        """What is judged."""
+        ...
+
+
+class Breach(NamedTuple):
+    """A rule was broken: `rule` (a name in `RULES`) by the car with index `car`, in frame `tick`.
+
+    `since` is the frame in which what led to it began. (x, y) is the centre of the car in frame `tick`, or the point
+    of a contact; `vertex` the intersection that it is about and `lane` the car's lane state (-1: none).
+    """
+
+    rule: str
+    car: int
+    tick: int
+    since: int
+    x: float
+    y: float
+    vertex: int
+    lane: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """What hangs over the cars after the last frame judged: obligations not met yet, by the rules' names.
+
+    `ego` and `others` tell of the ego and of any e-agent which of these rules would be broken if all stayed as it is.
+    """
+
+    ego: frozenset[str]
+    others: frozenset[str]
+
+
+class Referee:
+    """Judges a batch of trials, tick by tick, or the frames of one trial, block by block; the same code does both.
+
+    Trials whose problem carries no rules are passed over.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One instance per trial of the batch.
+    labeller : Labeller, optional
+        The labeller of the same instances that labels every frame before it is judged. Without one the referee
+        labels the frames for himself, from poses alone.
+    """
+
+    def __init__(self, instances: Sequence[Arraigned], labeller: Labeller | None = None) -> None:
+        problems = [instance.problem for instance in instances]
+        self._own = labeller is None
+        self._labeller = labeller or Labeller(instances)
+        self._terms = terms_of(problems)
+        self._judged = [bool(problem.rules) for problem in problems]
+        self._roads, self._obstacles, self._rules = self._labeller.tables
+        self._state: State | None = None
+
+    def reset(self, state: State) -> Sequence[Sequence[Breach]]:
+        """Judge frame 0; return the breaches of each trial, in order."""
+        if self._own:
+            self._labeller.reset(state)
+        trials, cars = state.x.shape
+        self._docket = BreachLog.empty(trials, cars, len(self._terms.goal))
+        self._spacing = unknown(trials, cars)
+        self._judge(0, state)
+        return self._collect(state, [()] * trials)
+
+    def update(
+        self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
+    ) -> Sequence[Sequence[Breach]]:
+        """Judge frame `tick`, one after the last; return the breaches that begin in it, of each trial, in order.
+
+        Parameters
+        ----------
+        tick, state
+            The frame.
+        contacts
+            Those of the tick before it, of each trial; with `at_fault` filled in if a labeller has been given.
+        """
+        if self._own:
+            contacts = self._labeller.update(tick, state, contacts)
+        self._judge(tick, state)
+        return self._collect(state, contacts)
+
+    def judge(self, frames: Frames) -> tuple[list[Breach], tuple[Contact, ...]]:
+        """Judge the next block of the only trial, whose first frame is frame 0.
+
+        Returns
+        -------
+        breaches : list of Breach
+            Those that begin in the block, in order.
+        contacts : tuple of Contact
+            Those of the block, with `at_fault` as found here.
+
+        Raises
+        ------
+        ValueError
+            If the referee has a whole batch or a labeller of others, or frames have been left out.
+        """
+        if not self._own or len(self._judged) != 1:
+            raise ValueError("a block of frames is of one trial, whose labels are the referee's own")
+        if not len(frames):
+            return [], frames.contacts
+        before, bits, breaches = self._block(frames)
+        contacts = tuple(
+            with_fault(contact, bits[row - 1] if row > 0 else before)
+            for contact in frames.contacts
+            for row in (contact.tick - frames.first,)
+        )
+        breaches += accused(contacts) if self._judged[0] else ()
+        return sorted(breaches, key=order), contacts
+
+    @property
+    def running(self) -> Sequence[Pending]:
+        """What hangs over the cars of each trial."""
+        return running(np.arange(len(self._judged)), self._terms, self._docket)
+
+    @property
+    def may_leave(self) -> npt.NDArray[np.bool_]:
+        """Which e-agents meet, with their bodies, a disc out of which some exit is free, and their time counts (E4).
+
+        Of shape (B, N).
+        """
+        return self._docket.clock[:, :, EXIT_COUNTS] >= 0
+
+    @property
+    def stays(self) -> npt.NDArray[np.bool_]:
+        """Which e-agents have been in a disc with a free exit for longer than they may (E4), (B, N)."""
+        clock = self._docket.clock
+        long = self._tick - clock[:, :, EXIT_SINCE] - clock[:, :, EXIT_PAUSED]
+        return (clock[:, :, EXIT_SINCE] >= 0) & (long >= self._terms.whole[:, EXIT_TICKS, None])
+
+    def ways(self, state: State) -> npt.NDArray[np.bool_]:
+        """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, of these poses."""
+        found = np.zeros(state.x.shape, dtype=np.bool_)
+        own = self._labeller
+        find_ways(
+            self._tick,
+            self._spacing,
+            state,
+            self._roads,
+            self._obstacles,
+            self._rules,
+            self._terms,
+            own.labels,
+            own.memory,
+            self._docket,
+            found,
+        )
+        return found
+
+    def _judge(self, tick: int, state: State) -> None:
+        self._tick = tick
+        own = self._labeller
+        tables = (
+            self._roads,
+            self._obstacles,
+            self._rules,
+            self._terms,
+            own.labels,
+            own.memory,
+            self._docket,
+            self._spacing,
+        )
+        judge_frame(tick, *state, *chain.from_iterable(tables))
+
+    def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
+        if not self._docket.filled[0] and not any(contacts):
+            return [()] * len(self._judged)
+        by_trial: dict[int, list[Breach]] = {}
+        for row in self._found():
+            b, n = row[OF_TRIAL], row[OF_CAR]
+            by_trial.setdefault(b, []).append(breach_of(row, float(state.x[b, n]), float(state.y[b, n])))
+        for b, own in enumerate(contacts):
+            if own and self._judged[b]:
+                by_trial.setdefault(b, []).extend(accused(own))
+        breaches: list[Sequence[Breach]] = [()] * len(self._judged)
+        for b, own in by_trial.items():
+            breaches[b] = sorted(own, key=order)
+        return breaches
+
+    def _block(self, frames: Frames) -> tuple[Bits, Bits, list[Breach]]:
+        """Label and judge a block; return the flags of the frame before it, of its frames, and the breaches."""
+        cars = frames.x.shape[1]
+        own = self._labeller
+        if frames.first == 0:
+            self._state = State.zeros(1, cars)
+            self._docket = BreachLog.empty(1, cars, len(self._terms.goal), _ROOMY)
+            self._spacing = unknown(1, cars)
+            self._next = 0
+            own.begin(1, cars)
+        if self._state is None or frames.first != self._next:
+            raise ValueError(f"frames must follow one another: got {frames.first}, and none before it")
+        self._next += len(frames)
+        poses = np.stack([frames.x, frames.y, frames.c, frames.s])
+        before = own.labels.bits[0].copy()
+        bits = np.zeros(frames.x.shape, dtype=np.uint32)
+        breaches: list[Breach] = []
+        room = self._docket.room_of_a_frame
+        done = 0
+        while done < len(frames):
+            done = judge_frames(
+                frames.first,
+                done,
+                room,
+                poses,
+                bits,
+                self._state,
+                self._roads,
+                self._obstacles,
+                self._rules,
+                self._terms,
+                own.labels,
+                own.memory,
+                self._docket,
+                self._spacing,
+            )
+            for row in self._found():
+                f, n = row[AT_TICK] - frames.first, row[OF_CAR]
+                breaches.append(breach_of(row, float(frames.x[f, n]), float(frames.y[f, n])))
+        return before, bits, breaches
+
+    def _found(self) -> list[list[int]]:
+        """Empty the breach_log; return the rows that were in it."""
+        breach_log = self._docket
+        rows: list[list[int]] = breach_log.row[: breach_log.filled[0]].tolist()
+        breach_log.filled[0] = 0
+        return rows
+
+
+def terms_of(problems: Sequence[WithGoals]) -> RefereeParameters:
+    """Return the terms by which the trials of some problems are judged."""
+    kinds, index = kinds_of(problems)
+    real, whole = pack_terms(
+        [RuleParameters.from_mapping(problem.rules) for problem in kinds],
+        [bool(problem.rules) for problem in kinds],
+        [problem.intersection_radius for problem in kinds],
+        [problem.rate for problem in kinds],
+        pack_cars([problem.car for problem in kinds]),
+    )
+    goal_off, goal = [0], list[int]()
+    for problem in problems:
+        goal += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
+        goal_off.append(len(goal))
+    return RefereeParameters(
+        real[index], whole[index], np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64)
+    )
+
+
+def running(trials: Ints, terms: RefereeParameters, breach_log: BreachLog) -> list[Pending]:
+    """Return what hangs over the cars of some trials."""
+    runs = breach_log.clock[trials][:, :, _CLOCKS] >= 0
+    goal: list[bool] = (breach_log.goal_clock >= 0).tolist()
+    off: list[int] = terms.goal_off.tolist()
+    taken = [any(goal[off[b] : off[b + 1]]) for b in trials.tolist()]
+    egos: list[list[bool]] = runs[:, EGO].tolist()
+    others: list[list[bool]] = np.logical_or.reduce(runs[:, EGO + 1 :], axis=1).tolist()
+    return [
+        _hanging(tuple(ego), tuple(other), goal_taken)
+        for ego, other, goal_taken in zip(egos, others, taken, strict=True)
+    ]
+
+
+@cache
+def _hanging(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Pending:
+    """Return what hangs over the cars whose clocks of `_PENDING` run; the trials of a batch share the few there are."""
+    return Pending(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
+
+
+def _named(runs: Sequence[bool]) -> frozenset[str]:
+    return frozenset(rule for (rule, _), run in zip(_PENDING, runs, strict=True) if run)
+
+
+def breach_of(row: Sequence[int], x: float, y: float) -> Breach:
+    """Return the breach in a row of the breach_log, of a car at (x, y)."""
+    return Breach(
+        RULES[row[OF_RULE]], row[OF_CAR], row[AT_TICK], row[SINCE_TICK], x, y, row[AT_VERTEX], row[ON_LANE]
+    )
+
+
+def accused(contacts: Sequence[Contact]) -> list[Breach]:
+    """Return the breaches that lie in contacts: any of the ego's, and an e-agent's fault in any."""
+    breaches: list[Breach] = []
+    for contact in contacts:
+        place = (contact.tick, contact.tick, contact.x, contact.y, NONE, NONE)
+        if EGO in (contact.car, contact.other):
+            breaches.append(Breach(RULES[COLLISION], EGO, *place))
+        for car, guilty in zip((contact.car, contact.other), contact.at_fault, strict=True):
+            if guilty and car > EGO:
+                breaches.append(Breach(RULES[FAULT], car, *place))
+    return breaches
+
+
+def order(breach: Breach) -> tuple[int, int, int]:
+    """Return the key by which breaches are sorted: frame, rule, car."""
+    return breach.tick, RULES.index(breach.rule), breach.car

@@ -1,0 +1,177 @@
+"""The task of a problem as formulas over named propositions (RULES, *phi_sys* and *phi_env*).
+
+i stands for the name of a car, x and y for a lattice point. All mean what RULES says, at one frame:
+
+====================================  =============================================================================
+``i_t_x_y``                           at: the centre is in the disc, as the labels of 2016 say it
+``visit_i_x_y``                       a visit begins: the centre comes into the disc, for the first time or from
+                                      another one
+``free_x_y``                          no e-agent is at the goal
+``collision_i``                       i has touched a car or an obstacle since the frame before
+``on_road_i`` ``left_i``              as in RULES
+``overtaking_i`` ``at_fault_i``       as in RULES
+``enter_i_x_y`` ``clear_i_x_y``       i enters the crossing; no other car is in it
+``stopped_i_x_y``                     i has stopped at the crossing
+``ahead_i_x_y``                       i has stopped there, and somebody is before it in the order
+``first_i_x_y``                       i has stopped there, and nobody is before it in the order
+``renewed_i``                         i gets one more new ticket in one wait than E3 allows
+``exit_i``                            the body meets a disc out of which some exit is free, and the time counts (E4)
+``stays_i``                           it has done so for longer than it may, times that do not count left out (E4)
+``lingers_i`` ``way_i``               i lingers; i is in a lane with a free way ahead (E5)
+``excess_i``                          i has broken E1 more often than the exceptions allow (only if there are any)
+====================================  =============================================================================
+
+Durations are the parameters of the problem. E6 is stated without its horizon, which only says how finite trials are
+judged, and without its pause: where the ego itself holds a goal closed for ever, the formula assumes more than RULES.
+A problem without rules has the task of 2016: every goal again and again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from dubins_traffic.logic.exports import Specification
+from dubins_traffic.logic.formula import (
+    Formula,
+    always,
+    conj,
+    eventually,
+    implies,
+    negation,
+    prop,
+    propositions,
+    yesterday,
+)
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.parameters import RuleParameters
+
+Point = tuple[int, int]
+
+_OF_ENVIRONMENT = ("overtaking", "clear", "ahead")
+"""What is said of the ego but is up to the others."""
+
+
+class Stated(Protocol):
+    """What the task depends on in a problem (`problem.instance.Problem`)."""
+
+    @property
+    def network(self) -> RoadNetwork:
+        """The roads."""
+        ...
+
+    @property
+    def goals(self) -> Sequence[Point]:
+        """Lattice points."""
+        ...
+
+    @property
+    def rules(self) -> Mapping[str, Any]:
+        """Parameters by name; empty if not judged."""
+        ...
+
+
+def task(problem: Stated, names: Sequence[str]) -> Specification:
+    """Return the task: what is assumed of the e-agents, and what the ego must guarantee.
+
+    Parameters
+    ----------
+    problem : Problem
+        The roads, the goals, and the parameters of the rules, which say what is assumed.
+    names : sequence of str
+        Names of the cars, the ego's first.
+
+    Returns
+    -------
+    Specification
+        The ego chooses where it is and what it does; what is up to others too, its order and clear crossings for
+        instance, is an input.
+
+    Raises
+    ------
+    FormulaError
+        If a car has a name that propositions can't carry.
+    """
+    ego, *others = names
+    goals = tuple(dict.fromkeys(problem.goals))
+    if not problem.rules:
+        return _specification((), [always(eventually(prop(_on(f"{ego}_t", goal)))) for goal in goals], ego)
+    visits = [always(eventually(prop(_on(f"visit_{ego}", goal)))) for goal in goals]
+    rules = RuleParameters.from_mapping(problem.rules)
+    crossings = [
+        point
+        for point, degree in zip(problem.network.intersections, problem.network.degrees, strict=True)
+        if degree >= rules.crossing_degree
+    ]
+    on_road = prop(f"on_road_{ego}")
+    guarantees = [
+        always(negation(prop(f"collision_{ego}"))),
+        always(implies(yesterday(on_road), on_road)),
+        *visits,
+        *_conduct(ego, crossings, rules),
+    ]
+    assumptions = [formula for name in others for formula in _assumed(name, crossings, rules)]
+    if rules.assume_e6:
+        assumptions += [always(eventually(prop(_on("free", goal)))) for goal in goals]
+    return _specification(assumptions, guarantees, ego)
+
+
+def _conduct(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
+    """Return rules 2 and 3 for a car."""
+    left = prop(f"left_{name}")
+    found = [
+        always(implies(left, prop(f"overtaking_{name}"))),
+        always(implies(left, eventually(negation(left), (0.0, rules.left_time)))),
+    ]
+    for point in crossings:
+        enter, stopped, ahead, clear = (
+            prop(_on(f"{word}_{name}", point)) for word in ("enter", "stopped", "ahead", "clear")
+        )
+        found += [
+            always(implies(enter, yesterday(condition))) for condition in (stopped, negation(ahead), clear)
+        ]
+    return found
+
+
+def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> list[Formula]:
+    """Return E1 to E5 for an e-agent, those that the problem assumes."""
+    found: list[Formula] = []
+    if rules.assume_e1 and rules.exceptions:
+        found.append(always(negation(prop(f"excess_{name}"))))
+    elif rules.assume_e1:
+        found += _conduct(name, crossings, rules)
+    if rules.assume_e2:
+        found.append(always(negation(prop(f"at_fault_{name}"))))
+    if rules.assume_e3:
+        for point in crossings:
+            goes = conj(prop(_on(f"first_{name}", point)), prop(_on(f"clear_{name}", point)))
+            found.append(_no_longer(goes, rules.enter_time))
+        found.append(always(negation(prop(f"renewed_{name}"))))
+    if rules.assume_e4:
+        found.append(_no_longer(prop(f"exit_{name}"), rules.exit_time))
+        found.append(always(negation(prop(f"stays_{name}"))))
+    if rules.assume_e5:
+        found.append(_no_longer(conj(prop(f"lingers_{name}"), prop(f"way_{name}")), rules.rest_time))
+    return found
+
+
+def _no_longer(state: Formula, seconds: float) -> Formula:
+    return always(implies(state, eventually(negation(state), (0.0, seconds))))
+
+
+def _on(stem: str, point: Point) -> str:
+    return f"{stem}_{point[0]}_{point[1]}"
+
+
+def _specification(assumptions: Sequence[Formula], guarantees: Sequence[Formula], ego: str) -> Specification:
+    """Return the specification; what is guaranteed is the ego's to choose, unless it is up to the others."""
+    used = [name for formula in (*assumptions, *guarantees) for name in propositions(formula)]
+    owned = {name for formula in guarantees for name in propositions(formula)}
+    others = tuple(f"{word}_{ego}" for word in _OF_ENVIRONMENT)
+    outputs = {name for name in owned if not name.startswith(others)}
+    return Specification(
+        tuple(assumptions),
+        tuple(guarantees),
+        tuple(name for name in dict.fromkeys(used) if name not in outputs),
+        tuple(name for name in dict.fromkeys(used) if name in outputs),
+    )

@@ -1,0 +1,183 @@
+"""What there is to choose from, with all parameters, read off the code: for people, machines and a page."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any, Final
+
+from pydantic_core import PydanticUndefined
+
+from dubins_traffic.agents.registry import names as agent_names
+from dubins_traffic.controllers.registry import names as controller_names
+from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.simulators.registry import names as simulator_names
+
+KEEP_E1: Final = KEEP_RULES | {COUNTER}
+"""Kinds of e-agents that keep E1 unless they are told otherwise."""
+BREAKS_E1: Final = "can't keep E1: a problem that assumes E1 is not for it"
+UNKNOWN_E1: Final = "keeps E1 if its program does"
+UNITS: Final = {
+    "_time": "s",
+    "_speed": "m/s",
+    "_rounds": "rounds",
+    "_degree": "roads",
+    "tickets": "tickets",
+    "exceptions": "breaches",
+}
+"""What a parameter of the rules is counted in, by the end of its name; the rest are metres, and switches."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter: its name, its default (None where it must be given or is null), whether it must be, its meaning."""
+
+    name: str
+    default: Any
+    required: bool
+    meaning: str
+
+    @property
+    def shown(self) -> str:
+        """The default as JSON."""
+        return "required" if self.required else json.dumps(self.default)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something to choose: its name, a line of description, its parameters, and remarks."""
+
+    name: str
+    line: str
+    parameters: tuple[Parameter, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as a document."""
+        return {
+            "name": self.name,
+            "description": self.line,
+            "parameters": [
+                {
+                    "name": own.name,
+                    "required": own.required,
+                    "default": own.default,
+                    "description": own.meaning,
+                }
+                for own in self.parameters
+            ],
+            "remarks": list(self.remarks),
+        }
+
+
+def agents() -> tuple[Entry, ...]:
+    """Return the kinds of e-agents."""
+    found: list[Entry] = []
+    for name, line in agent_names().items():
+        parameters = [
+            Parameter(
+                key,
+                None if info.default is PydanticUndefined else info.default,
+                info.default is PydanticUndefined,
+                info.description or "",
+            )
+            for key, info in KINDS[name].model_fields.items()
+        ]
+        remarks = () if name in KEEP_E1 else ((UNKNOWN_E1,) if name == REMOTE else (BREAKS_E1,))
+        found.append(Entry(name, line, tuple(parameters), remarks))
+    return tuple(found)
+
+
+def rules() -> tuple[Parameter, ...]:
+    """Return the parameters of the rules of the road, in the order of their definition."""
+    told = _attribute_docs(RuleParameters)
+    found: list[Parameter] = []
+    for own in fields(RuleParameters):
+        text = told.get(own.name, "")
+        if own.name.startswith("assume_"):
+            text = f"Whether the problem assumes {own.name.removeprefix('assume_').upper()} of the e-agents, 0 or 1."
+        unit = _unit(own.name)
+        meaning = text.rstrip(".") + (f", {unit}" if unit else "")
+        found.append(Parameter(own.name, own.default, False, meaning))
+    return tuple(found)
+
+
+def configurations() -> tuple[Entry, ...]:
+    """Return the shipped configurations."""
+    return tuple(Entry(name, _line(load_config(name))) for name in shipped_names())
+
+
+def controllers() -> tuple[Entry, ...]:
+    """Return the controllers that come with the package."""
+    return tuple(Entry(name, line) for name, line in controller_names().items())
+
+
+def simulators() -> tuple[Entry, ...]:
+    """Return the simulators."""
+    return tuple(Entry(name, line) for name, line in simulator_names().items())
+
+
+def _unit(name: str) -> str:
+    if name.startswith("assume_"):
+        return ""
+    return next((unit for ending, unit in UNITS.items() if name.endswith(ending)), "m")
+
+
+def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
+    """Return the strings that stand below the attributes of a class."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    body = tree.body if isinstance(tree, ast.ClassDef) else []
+    found: dict[str, str] = {}
+    for own, below in pairwise(body):
+        if (
+            isinstance(own, ast.AnnAssign)
+            and isinstance(own.target, ast.Name)
+            and isinstance(below, ast.Expr)
+        ):
+            text = below.value.value if isinstance(below.value, ast.Constant) else ""
+            found[own.target.id] = " ".join(str(text).split())
+    return found
+
+
+def _line(configuration: Configuration) -> str:
+    """Return what a configuration asks for, in a line."""
+    own = configuration.settings
+    goals = _bounds([len(own.goals)] * 2 if own.goals is not None else own.number_goals_bounds)
+    seconds = _bounds([own.duration] * 2 if own.duration is not None else own.duration_bounds)
+    kinds: dict[str, int] = {}
+    for planned in configuration.agents:
+        kinds[planned.agent.kind] = kinds.get(planned.agent.kind, 0) + 1
+    cars = " and ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no e-agents"
+    judged = "judged by the rules of the road" if own.rules else "not judged by the rules"
+    parts = (
+        f"{own.number_trials} trials of {seconds} s",
+        _roads(configuration),
+        f"{goals} goals",
+        cars,
+        judged,
+    )
+    return ", ".join(parts)
+
+
+def _roads(configuration: Configuration) -> str:
+    drawn = configuration.settings.network
+    if drawn is not None and drawn.random is not None:
+        return (
+            f"random networks of {drawn.random.intersections} intersections and {drawn.random.segments} roads"
+        )
+    if drawn is not None and drawn.grid is not None:
+        return f"grids of {drawn.grid.rows} by {drawn.grid.columns}"
+    network = configuration.network
+    return "a network" if network is None else f"a network of {len(network.intersections)} intersections"
+
+
+def _bounds(bounds: list[Any]) -> str:
+    low, high = bounds
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -1,0 +1,237 @@
+"""Many trials, in this process or in several, with the same results in any order."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import DubinsTrafficError, WorkerLostError
+from dubins_traffic.files import locked
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.runs.precompile import companion
+from dubins_traffic.runs.single import Result, run_trial
+from dubins_traffic.simulators import registry as simulators
+
+if TYPE_CHECKING:
+    from multiprocessing.synchronize import Event
+
+    from dubins_traffic.cars.state import Frames
+    from dubins_traffic.problem.configuration import Configuration
+    from dubins_traffic.protocols import Ending
+
+MOST_BARREN = 3
+"""Processes are not started again after so many that ended in a row without a result."""
+MOST_NAMED = 10
+"""So many trials are named in a message, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One trial to run: an instance, or the configuration, seed and number to draw it from.
+
+    `instance` is drawn where the job runs, so that jobs are small to send.
+    """
+
+    trial: int
+    seed: int
+    controller: str
+    configuration: Configuration | None = None
+    instance: Instance | None = None
+    record: Path | None = None
+    overwrite: bool = False
+    deadline: float | None = None
+    show: bool = False
+
+    def run(self, cancelled: Event | None = None) -> Result:
+        """Run the job here; `cancelled` interrupts it after at most one simulated second."""
+        instance = self.instance
+        if instance is None:
+            if self.configuration is None:
+                raise DubinsTrafficError("a job needs an instance or a configuration")
+            instance = draw(self.configuration, self.seed, self.trial)
+        return run_trial(
+            instance,
+            controllers.made(partial(controllers.load, self.controller)),
+            record=self.record,
+            overwrite=self.overwrite,
+            deadline=self.deadline,
+            sinks=() if cancelled is None else (_Watch(cancelled),),
+            simulator=simulators.load(instance.simulator, show=self.show),
+            sketch=False,
+            name=self.controller,
+        )
+
+    @property
+    def called(self) -> str:
+        """What messages call the job."""
+        return f"trial {self.trial}" if self.record is None else f"trial {self.trial} ({self.record.name})"
+
+
+class _Watch:
+    """A sink that interrupts its trial when the campaign has been interrupted."""
+
+    def __init__(self, cancelled: Event) -> None:
+        self._cancelled: Event | None = cancelled
+
+    def begin(self, instance: Instance) -> None:
+        """Nothing has run yet."""
+
+    def frames(self, frames: Frames) -> None:  # noqa: ARG002  # what they hold is no matter here
+        """Look once a simulated second, and interrupt once."""
+        if self._cancelled is not None and self._cancelled.is_set():
+            self._cancelled = None
+            raise KeyboardInterrupt
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is left to interrupt."""
+
+
+def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
+    """Run `jobs` and yield their results as they come.
+
+    With one worker they run here, in order; with more, in that many processes. What a trial does never depends on
+    where or when it ran. On Ctrl-C running trials end as interrupted, nothing new begins, and KeyboardInterrupt
+    is raised after the results that were ready have been yielded.
+
+    Raises
+    ------
+    WorkerLostError
+        If processes ended in the middle of trials, whose controllers left them so or which were killed. All other
+        trials have been run then; the message names those that came to nothing.
+    InputError
+        If a folder in which records are to be kept is in use by another process.
+    """
+    with ExitStack() as held:
+        for folder in sorted({job.record.parent for job in jobs if job.record is not None}):
+            held.enter_context(locked(folder))
+        if workers > 1 and len(jobs) > 1:
+            yield from _in_processes(jobs, workers)
+            return
+        with companion():
+            for job in jobs:
+                yield job.run()
+
+
+def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
+    """Run jobs in processes; those that were under way when one ended too early run again, each by itself."""
+    waiting, suspects, dead = deque(jobs), deque[Job](), list[Job]()
+    barren = 0
+    crew = _Crew(min(workers, len(jobs)))
+    try:
+        while (waiting or crew.under_way) and barren < MOST_BARREN:
+            while waiting and len(crew.under_way) < 2 * workers:
+                crew.submit(waiting.popleft())
+            results, lost = crew.wait()
+            yield from results
+            suspects += lost
+            barren = 0 if results else barren + len(lost[:1])
+        barren = 0
+        while suspects and barren < MOST_BARREN:
+            crew.submit(replace(suspects[0], overwrite=True))  # what it may find there is its own
+            results, lost = crew.wait()
+            yield from results
+            dead += [suspects.popleft()] if lost else []
+            if results:
+                suspects.popleft()
+            barren = 0 if results else barren + 1
+    finally:
+        crew.close()
+    if dead:
+        raise WorkerLostError(_told(dead, len(waiting) + len(suspects)))
+
+
+def _told(dead: Sequence[Job], left: int) -> str:
+    """Return what is said of jobs that ended their processes, and of how many were not tried again for that."""
+    named = ", ".join(job.called for job in dead[:MOST_NAMED])
+    more = f" and {len(dead) - MOST_NAMED} more" if len(dead) > MOST_NAMED else ""
+    rest = f"; {left} trials were not run" if left else ""
+    return f"the process ended in the middle of {named}{more}, each time it was run{rest}"
+
+
+class _Crew:
+    """Processes that run jobs; new ones take their place when one has ended, and what was under way is lost."""
+
+    def __init__(self, workers: int) -> None:
+        self.under_way: dict[Future[Result], Job] = {}
+        self._workers = workers
+        self._context = multiprocessing.get_context("spawn")
+        self._cancelled = self._context.Event()
+        self._pool = self._new()
+
+    def submit(self, job: Job) -> None:
+        """Let a job be run; if the processes have just ended it is lost, as `wait` will tell."""
+        try:
+            with deaf_to_interrupts():
+                future = self._pool.submit(_run, job)
+        except BrokenProcessPool as error:
+            future: Future[Result] = Future()
+            future.set_exception(error)
+        self.under_way[future] = job
+
+    def wait(self) -> tuple[list[Result], list[Job]]:
+        """Return results as soon as there are some, and the jobs that were lost with a process."""
+        done, _ = wait(self.under_way, return_when=FIRST_COMPLETED)
+        broken = any(isinstance(future.exception(), BrokenProcessPool) for future in done)
+        if broken:
+            done, _ = wait(self.under_way)
+        results: list[Result] = []
+        lost: list[Job] = []
+        for future in done:
+            job = self.under_way.pop(future)
+            if isinstance(future.exception(), BrokenProcessPool):
+                lost.append(job)
+            else:
+                results.append(future.result())
+        if broken:
+            self._pool.shutdown()
+            self._pool = self._new()
+        return results, sorted(lost, key=lambda job: job.trial)
+
+    def close(self) -> None:
+        """Interrupt what is under way, after at most one simulated second, and end the processes."""
+        self._cancelled.set()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _new(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(
+            self._workers, mp_context=self._context, initializer=_begin, initargs=(self._cancelled,)
+        )
+
+
+@contextmanager
+def deaf_to_interrupts() -> Generator[None]:
+    """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+_cancelled: Event | None = None
+
+
+def _begin(cancelled: Event) -> None:
+    """Prepare a worker: the parent alone hears Ctrl-C and passes it on."""
+    global _cancelled  # noqa: PLW0603  # a worker's only state, set once
+    _cancelled = cancelled
+
+
+def _run(job: Job) -> Result:
+    try:
+        return job.run(_cancelled)
+    except KeyboardInterrupt:
+        raise DubinsTrafficError(f"trial {job.trial} was interrupted") from None
+    except SystemExit as error:  # handed on, it would end the program as if all were well
+        raise DubinsTrafficError(f"{job.called} ended its process (status {error.code})") from error

@@ -1,0 +1,230 @@
+"""From a configuration, an instance or a record to the jobs that run its trials, and what is left of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import Configuration
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.runs.jobs import Job
+from dubins_traffic.runs.record_folder import check_folder, claim, name
+from dubins_traffic.runs.single import Result
+from dubins_traffic.runs.sources import load
+from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.simulators import registry as simulators
+
+DEFAULT_CONTROLLER = "lanes"
+MOST_RUNS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be run: `jobs`, in order; what they are drawn from, if from a configuration; and since when.
+
+    `before` is how many trials are not run since their records are there.
+    """
+
+    jobs: tuple[Job, ...]
+    configuration: Configuration | None
+    data: Path | None = None
+    before: int = 0
+    began: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+    def conclude(self, results: Iterable[Result]) -> ScoreSheet:
+        """Return the scores of finished trials in their order, and write the trial data file if one was asked for.
+
+        Raises
+        ------
+        InputError
+            If the file can't be written.
+        """
+        done = sorted(results, key=lambda result: (result.instance.trial, str(result.record)))
+        if done and self.data is not None and self.configuration is not None:
+            instances = [result.instance for result in done]
+            TrialData.build(self.configuration, instances, self.began).write(self.data)
+        return ScoreSheet(tuple(result.score for result in done))
+
+
+def plan(
+    source: str | os.PathLike[str],
+    controller: str | None = None,
+    *,
+    trials: int | None = None,
+    repeat: int = 1,
+    seed: int | None = None,
+    rnd: str | os.PathLike[str] | None = None,
+    data: str | os.PathLike[str] | None = None,
+    overwrite_data: bool = False,
+    records: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    append: bool = False,
+    deadline: float | None = None,
+    simulator: str | None = None,
+    show: bool = False,
+    shield: bool = False,
+) -> Plan:
+    """Return what is to be run, checked as far as can be before anything runs.
+
+    Parameters
+    ----------
+    source : path or str
+        A trials configuration (file or shipped name), an instance or a record, told by content.
+    controller : str, optional
+        A built-in name, ``module:Class`` or ``path/to/file.py:Class``; by default `lanes`, and for a record its own.
+    trials : int, optional
+        How many trials of a configuration, from number 0; by default as many as it says.
+    repeat : int
+        How many times each trial is run.
+    seed : int, optional
+        Of a configuration, or of an instance that has none; 0 by default.
+    rnd : path, optional
+        A road network description instead of the configuration's.
+    data : path, optional
+        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+    records : path, optional
+        Folder for the records, made if missing: ``trial-0000.mcap`` for trial 0; with `repeat`,
+        ``trial-0000-0000.mcap`` for its first run. A folder that holds records is refused, unless one of the following.
+    overwrite : bool
+        Whether records that the folder holds are removed before.
+    append : bool
+        Whether they stay, and their trials are not run again; they must be of the same controller and instances.
+    deadline : float, optional
+        Wall-clock seconds within which each `act` must answer.
+    simulator : str, optional
+        Its name, instead of that in the source.
+    show : bool
+        Whether the simulator shows the trials in a window of its own, at the pace of the clock.
+    shield : bool
+        Whether the controller drives under the shield (`controllers.shield`).
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong; then nothing has been written.
+    """
+    found = load(source, rnd=rnd, seed=seed or 0)
+    if controller is None:
+        controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
+    controller = controllers.shielded(controller) if shield else controller
+    controllers.load(controller)
+    _check_deadline(deadline)
+    if append and data is not None:
+        expected = "one of them: trial data are of all trials of a run"
+        raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)
+    if isinstance(found, RoadNetwork):
+        expected = "a trials configuration, a problem instance or a record"
+        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    if isinstance(found, Configuration):
+        configuration = found if simulator is None else found.with_simulator(simulator)
+        count = found.number_trials if trials is None else trials
+        _check_count(count, repeat)
+        jobs = _drawn(configuration, controller, count, seed or 0)
+    else:
+        _check_count(1, repeat)
+        configuration = None
+        instance = found.instance if isinstance(found, Record) else found
+        instance = replace(instance, simulator=simulator or instance.simulator)
+        other_seed = None if seed == instance.seed else seed
+        _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
+        jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
+    if jobs and jobs[0].instance is not None:
+        check_simulator(
+            "--simulator" if simulator else os.fspath(source), jobs[0].instance.simulator, show=show
+        )
+    target = None if data is None else check_data_file(Path(data), overwrite_data)
+    several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
+    whole = [replace(job, deadline=deadline, show=show) for job, _ in several]
+    if records is None:
+        if overwrite or append:
+            raise InputError(
+                "are of --records", file="--overwrite, --append", expected="a folder for records"
+            )
+        return Plan(tuple(whole), configuration, target)
+    folder = check_folder(records)
+    kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)
+    left = [
+        _recorded(job, folder / name(job.trial, run)) for job, (_, run) in zip(whole, several, strict=True)
+    ]
+    left = [job for job in left if job.record is not None and job.record.name not in kept]
+    return Plan(tuple(left), configuration, target, len(whole) - len(left))
+
+
+def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:
+    """Return a function that makes the instance of a trial of the source of `jobs`."""
+
+    def make(trial: int) -> Instance:
+        first = jobs[0]
+        if first.configuration is not None:
+            return draw(first.configuration, seed, trial)
+        if first.instance is None or trial != first.trial:
+            raise InputError("no such trial", value=trial)
+        return first.instance
+
+    return make
+
+
+def _drawn(configuration: Configuration, controller: str, trials: int, seed: int) -> list[Job]:
+    """Return a job per trial; the first is drawn here, so that a configuration that can't be is refused early."""
+    jobs = [Job(trial, seed, controller, configuration=configuration) for trial in range(trials)]
+    if jobs:
+        jobs[0] = replace(jobs[0], instance=draw(configuration, seed, 0))
+    return jobs
+
+
+def _recorded(job: Job, record: Path) -> Job:
+    return replace(job, record=record, overwrite=record.exists())
+
+
+def _refuse(source: str, options: dict[str, object]) -> None:
+    for option, value in options.items():
+        if value is not None:
+            raise InputError(
+                "is for configurations; this is one trial",
+                file=source,
+                field=option,
+                value=value,
+                expected="a trials configuration, or none of it",
+            )
+
+
+def check_simulator(source: str, name: str, *, show: bool = False) -> None:
+    """Raise InputError, naming `source`, if there is no simulator called `name` or it can't be used here."""
+    try:
+        simulators.load(name, show=show).close()
+    except InputError as error:
+        raise error.within(file=source) from None
+
+
+def _check_count(trials: int, repeat: int) -> None:
+    if trials < 1 or repeat < 1 or trials * repeat > MOST_RUNS:
+        expected = f"both at least 1, and at most {MOST_RUNS} runs in all"
+        raise InputError(
+            "not a number of runs", file="--trials, --repeat", value=(trials, repeat), expected=expected
+        )
+
+
+def _check_deadline(deadline: float | None) -> None:
+    if deadline is not None and not 0 < deadline < float("inf"):
+        raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
+
+
+def check_data_file(path: Path, overwrite: bool) -> Path:
+    """Return `path` if a file can be written there; InputError if not, or if one exists and may not be replaced."""
+    if path.exists() and not overwrite:
+        raise InputError(
+            "exists", file=str(path), expected="a new file; --overwrite-trial-data (-F) overwrites"
+        )
+    if path.is_dir() or not path.parent.is_dir():
+        problem = "a folder" if path.is_dir() else "its folder does not exist"
+        raise InputError(problem, file=str(path), expected="a file to write")
+    return path

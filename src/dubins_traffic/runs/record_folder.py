@@ -1,0 +1,114 @@
+"""The folder into which a run puts its records: empty of records before, or told what to do with them."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from dubins_traffic.errors import InputError, RecordError
+from dubins_traffic.files import locked
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.protocols import End
+from dubins_traffic.record import reader
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.record.wall import remove_record
+
+OURS: Final = re.compile(r"trial-(\d{4,})(?:-(\d{4,}))?\.mcap")
+"""Names that runs give their records: the number of the trial, and of its run where it is run several times."""
+WAYS: Final = "a folder without records; --overwrite removes those that are there, --append goes on with them"
+
+
+def name(trial: int, run: int | None = None) -> str:
+    """Return the name of the record of a trial, or of one of its runs."""
+    return f"trial-{trial:04d}.mcap" if run is None else f"trial-{trial:04d}-{run:04d}.mcap"
+
+
+def check_folder(folder: str | os.PathLike[str]) -> Path:
+    """Return `folder`, made if missing; InputError if that can't be, or nothing can be written there."""
+    expected = "a folder, or a place for one"
+    if not os.fspath(folder):
+        raise InputError("no folder", file="--records", value=folder, expected=expected)
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"can't hold records ({error.strerror})", file=str(path), expected=expected
+        ) from None
+    if not os.access(path, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
+        raise InputError("no permission to write", file=str(path), expected=expected)
+    return path
+
+
+def claim(
+    folder: Path,
+    controller: str,
+    instance_of: Callable[[int], Instance],
+    *,
+    overwrite: bool = False,
+    append: bool = False,
+) -> frozenset[str]:
+    """Make a folder ready for the records of a run; return the names of those that stay and are not to be run again.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, which is there.
+    controller : str
+        Name of the run's controller.
+    instance_of : callable
+        Makes the instance of a trial by its number; it may raise InputError where there is no such trial.
+    overwrite : bool
+        Whether records of runs that are there are removed, with their sidecars.
+    append : bool
+        Whether they stay: then they must be of the same controller and instances. Those that were cut off or
+        interrupted are run again.
+
+    Raises
+    ------
+    InputError
+        If the folder holds records and neither is said, or both; if a record is of something else; or if another
+        process writes there.
+    """
+    if overwrite and append:
+        raise InputError("both at once", file="--overwrite, --append", expected="one of them")
+    with locked(folder):
+        found = sorted(path for path in folder.glob("*.mcap") if path.is_file())
+        if found and not (overwrite or append):
+            others = f" and {len(found) - 1} more" if len(found) > 1 else ""
+            raise InputError(f"holds {found[0].name}{others}", file=str(folder), expected=WAYS)
+        ours = [path for path in found if OURS.fullmatch(path.name)]
+        if append:
+            return frozenset(path.name for path in ours if _stays(path, controller, instance_of))
+        for path in ours:
+            remove_record(path)
+        return frozenset()
+
+
+def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance]) -> bool:
+    """Tell whether a record is of the same run, whole; InputError if it is of another run."""
+    match = OURS.fullmatch(path.name)
+    trial = int(match[1]) if match else 0
+    try:
+        record = reader.read(path)
+    except RecordError as error:
+        if "cut off" in error.problem:
+            return False
+        raise
+    if record.controller != bare_name(controller):
+        problem = "a record of another controller"
+        raise InputError(problem, file=str(path), value=record.controller, expected=bare_name(controller))
+    expected = "a record of the same configuration, instance and seed, or another folder"
+    try:
+        wanted = instance_of(trial)
+    except InputError:
+        raise InputError("a record of no trial of this run", file=str(path), expected=expected) from None
+    if record.instance.seed != wanted.seed:
+        problem = "a record of another seed"
+        raise InputError(problem, file=str(path), value=record.instance.seed, expected=str(wanted.seed))
+    if record.instance != wanted:
+        raise InputError("a record of another instance", file=str(path), value=trial, expected=expected)
+    return record.ending is not None and record.ending.end is not End.INTERRUPTED

@@ -1,0 +1,1 @@
+"""Sessions: trials whose ego, e-agents or world are other processes."""

@@ -1,0 +1,41 @@
+"""A session over LCM."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dubins_traffic.runs.single import Result
+from dubins_traffic.sessions.plan import Pace, SessionPlan
+from dubins_traffic.transports.lcm.transport import Lcm
+from dubins_traffic.transports.maestro import Maestro
+
+
+def run_over_lcm(
+    session_plan: SessionPlan, pace: Pace, *, url: str | None = None, wait: bool = False
+) -> Iterator[Result]:
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
+
+    Parameters
+    ----------
+    session_plan : SessionPlan
+        What is run.
+    pace : Pace
+        How drivers are waited for.
+    url : str, optional
+        An LCM URL; by default that of ``LCM_DEFAULT_URL``, else multicast within this machine.
+    wait : bool
+        Whether a trial begins when a program asks START; else it begins at once.
+
+    Raises
+    ------
+    TransportError
+        If there is no route for multicast, or another session at the same URL.
+    MissingExtraError
+        If the extra `lcm` is not installed.
+    InputError
+        If the URL is none of LCM, or an instance can't be drawn.
+    """
+    maestro = Maestro() if wait else None
+    transport = Lcm(url, maestro)
+    session_plan.rehearse()
+    yield from session_plan.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

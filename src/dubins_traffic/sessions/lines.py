@@ -1,0 +1,37 @@
+"""A session over JSON lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dubins_traffic.runs.single import Result
+from dubins_traffic.sessions.plan import Pace, SessionPlan
+from dubins_traffic.transports.lines import Lines
+
+
+def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> Iterator[Result]:
+    """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
+
+    A trial begins when the one before is over.
+
+    Parameters
+    ----------
+    session_plan : SessionPlan
+        What is run.
+    pace : Pace
+        How drivers are waited for.
+    port : int
+        Where to listen on the loopback interface; 0 takes any free port, which is said.
+
+    Raises
+    ------
+    TransportError
+        If the port is in use.
+    InputError
+        If an instance can't be drawn.
+    """
+    session_plan.rehearse()
+    transport = Lines(port)
+    yield from session_plan.run(
+        transport, pace, None, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
+    )

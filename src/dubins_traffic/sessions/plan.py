@@ -1,0 +1,269 @@
+"""Sessions over a transport, from what a user names: a configuration, an instance or a record."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from dubins_traffic.cars.state import State
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.scripted import Scripted
+from dubins_traffic.errors import InputError
+from dubins_traffic.observations.senses import Senses
+from dubins_traffic.problem.configuration import Configuration
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Instance, Laser
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
+from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.runs.plan import check_data_file, check_simulator
+from dubins_traffic.runs.record_folder import check_folder
+from dubins_traffic.runs.single import Result, run_trial
+from dubins_traffic.runs.sources import load
+from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.sessions.foreign import run_under
+from dubins_traffic.sessions.remote import Session, hand_over, quiet, run_remote
+from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.foreign import ForeignMaestro
+from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.patience import Patience
+
+REHEARSAL = 1.2
+"""Seconds: more than a block of frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How a session meets its drivers in time.
+
+    Parameters
+    ----------
+    lockstep : bool
+        Whether the simulation waits for a command of every remote car each tick; else it runs in real time.
+    factor : float
+        How many times as fast as the wall clock, in real time.
+    deadline : float
+        Seconds within which a command must come in lockstep.
+    patience : Patience
+        How long peers are waited for otherwise.
+
+    Raises
+    ------
+    InputError
+        If there is no such clock.
+    """
+
+    lockstep: bool = False
+    factor: float = 1.0
+    deadline: float = 5.0
+    patience: Patience = field(default_factory=Patience)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no clock before anything is opened."""
+        self.clock()
+
+    def clock(self) -> Clock:
+        """Return a clock of this pace."""
+        return Lockstep(self.deadline) if self.lockstep else RealTime(self.factor)
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPlan:
+    """What a session runs: where its instances come from, how many trials, and where things are written.
+
+    `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
+    the ego drives under the shield. `say` is told, in lines for people, what the session does and waits for.
+    """
+
+    supply: Callable[[int], Instance]
+    trials: int | None
+    configuration: Configuration | None
+    controller: str | None
+    remote: tuple[str, ...]
+    records: Path | None
+    data: Path | None
+    shield: bool = False
+    say: Callable[[str], None] = quiet
+    began: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+    def run(
+        self,
+        transport: Transport,
+        pace: Pace,
+        maestro: Maestro | None,
+        world: Callable[[], Simulator] | None = None,
+        at: Callable[[], str] | None = None,
+        foreign: ForeignMaestro | None = None,
+    ) -> Iterator[Result]:
+        """Run it over `transport`, which is closed however that ends; see `remote.run_remote`.
+
+        Once the transport is open, `world` makes the simulator, instead of the one that instances name, and `at`
+        returns a line for people that says where the transport is. `foreign` starts and ends the trials if it is given,
+        see `foreign.run_under`.
+        """
+        try:
+            patience = replace(pace.patience, at_once=foreign is not None)
+            link = Link(transport, pace.clock(), ego=self.controller is None, patience=patience)
+            if at is not None:
+                self.say(at())
+            session = Session(
+                link,
+                self.supply,
+                self.trials,
+                maestro,
+                self.controller or (controllers.SHIELDED if self.shield else ""),
+                self.remote,
+                self.records,
+                None if world is None else world(),
+                self.say,
+            )
+            if foreign is None:
+                yield from run_remote(session)
+            else:
+                yield from run_under(session, foreign, self.shortest)
+        finally:
+            transport.close()
+
+    @property
+    def shortest(self) -> float:
+        """The shortest duration that a trial may have, seconds."""
+        settings = None if self.configuration is None else self.configuration.settings
+        if settings is None:
+            return self.supply(0).duration
+        return float(settings.duration_bounds[0] if settings.duration is None else settings.duration)
+
+    def rehearse(self) -> None:
+        """Compile all that trials need, before anyone waits for them."""
+        self.say("compiling what trials need; the first time on a machine takes minutes")
+        began = monotonic()
+        rehearse(self.supply(0), shield=self.shield)
+        self.say(f"compiled, after {monotonic() - began:.1f} s")
+
+    def conclude(self, results: Sequence[Result]) -> ScoreSheet:
+        """Return the scores, and write the trial data file if one was asked for."""
+        if results and self.data is not None and self.configuration is not None:
+            instances = [result.instance for result in results]
+            TrialData.build(self.configuration, instances, self.began).write(self.data)
+        return ScoreSheet(tuple(result.score for result in results))
+
+
+def session_plan(
+    source: str | os.PathLike[str],
+    controller: str | None = None,
+    *,
+    trials: int | None = None,
+    endless: bool = False,
+    seed: int | None = None,
+    rnd: str | os.PathLike[str] | None = None,
+    remote: Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+    overwrite_data: bool = False,
+    records: str | os.PathLike[str] | None = None,
+    simulator: str | None = None,
+    shield: bool = False,
+) -> SessionPlan:
+    """Return what a session shall run, checked as far as can be before anything is opened.
+
+    Parameters
+    ----------
+    source : path or str
+        A trials configuration (file or shipped name), an instance or a record.
+    controller : str, optional
+        Drives the ego in this process; by default it is driven elsewhere.
+    trials : int, optional
+        How many trials of a configuration; by default as many as it says.
+    endless : bool
+        Whether trials follow each other until the session is interrupted.
+    seed : int, optional
+        Of a configuration, or of an instance that has none; 0 by default.
+    rnd : path, optional
+        A road network instead of the configuration's.
+    remote : sequence of str
+        Names of e-agents that are driven elsewhere whatever their type says.
+    data : path, optional
+        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+    records : path, optional
+        Folder for the records, made if missing.
+    simulator : str, optional
+        What moves the cars, whatever the source says.
+    shield : bool
+        Whether the ego, wherever it is driven, drives under the shield (`controllers.shield`).
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong; then nothing has been written.
+    """
+    found = load(source, rnd=rnd, seed=seed or 0)
+    if isinstance(found, RoadNetwork):
+        expected = "a trials configuration, a problem instance or a record"
+        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    if controller is not None:
+        controller = controllers.shielded(controller) if shield else controller
+        controllers.load(controller)
+    if trials is not None and (trials < 1 or endless):
+        raise InputError(
+            "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
+        )
+    supply = _supply(found, seed or 0)
+    if simulator is not None:
+        check_simulator("--simulator", simulator)
+        supply = partial(moved_by, supply, simulator)
+    hand_over(supply(0), remote)
+    configuration = found if isinstance(found, Configuration) else None
+    if data is not None and configuration is None:
+        raise InputError(
+            "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
+        )
+    count = trials or (1 if configuration is None else configuration.number_trials)
+    return SessionPlan(
+        supply,
+        None if endless else count,
+        configuration,
+        controller,
+        tuple(remote),
+        None if records is None else check_folder(records),
+        None if data is None else check_data_file(Path(data), overwrite_data),
+        shield,
+    )
+
+
+def rehearse(instance: Instance, *, shield: bool = False) -> None:
+    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts.
+
+    The ego drives under the shield if `shield`, and every laser sweeps once, as when someone listens to it.
+    """
+    agents = tuple(
+        replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
+        if agent.kind == REMOTE
+        else agent
+        for agent in instance.e_agents
+    )
+    brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
+    nobody: Controller = Scripted(np.zeros((brief.ticks, 2)))
+    run_trial(brief, controllers.under_shield(nobody) if shield else nobody)
+    state = State.zeros(1, len(brief.starts))
+    Senses(brief, laser=brief.problem.laser or Laser()).sweep(state)
+
+
+def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> Instance:
+    """Return instance `number` of `supply`, to be moved by `simulator`."""
+    return replace(supply(number), simulator=simulator)
+
+
+def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
+    if isinstance(found, Configuration):
+        configuration = found
+        return lambda number: draw(configuration, seed, number)
+    instance = found.instance if isinstance(found, Record) else found
+    return lambda _number: instance

@@ -1,0 +1,179 @@
+"""Trials whose ego, or some of whose e-agents, are driven by other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError, PeerError, TransportError
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.protocols import Controller, End, Simulator
+from dubins_traffic.runs.single import Result, Trial, run_trial
+from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.maestro import Maestro, Next, Phase
+
+
+def quiet(_line: str) -> None:
+    """Say nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What is run over a transport.
+
+    Parameters
+    ----------
+    link : Link
+        To the drivers elsewhere.
+    supply : callable
+        Returns instance number n; called with 0, 1, 2, ... as instances are drawn.
+    trials : int, optional
+        After how many trials the session ends; None: never by itself.
+    maestro : Maestro, optional
+        Whose leave to start every trial awaits; without one a trial starts when its predecessor is over.
+    controller : str or Controller
+        Drives the ego if the link does not.
+    remote : tuple of str
+        Names of e-agents that are driven elsewhere whatever their type says.
+    simulator : Simulator, optional
+        Instead of the one that instances name.
+    records : Path, optional
+        Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
+    say : callable
+        Is told, in lines for people, what the session does and waits for.
+    """
+
+    link: Link
+    supply: Callable[[int], Instance]
+    trials: int | None = 1
+    maestro: Maestro | None = None
+    controller: str | Controller = "lanes"
+    remote: tuple[str, ...] = ()
+    records: Path | None = None
+    simulator: Simulator | None = None
+    say: Callable[[str], None] = quiet
+
+    def which(self, instance: Instance, done: int) -> str:
+        """Return the words for the trial of `instance`, which follows `done` others."""
+        return f"trial {instance.trial}" + ("" if self.trials is None else f" ({done + 1} of {self.trials})")
+
+
+def run_remote(session: Session) -> Iterator[Result]:
+    """Run the trials of `session` and yield their results, those of trials that were restarted too.
+
+    A trial that ends by a peer's fault is a result like any other, and the next one follows. The link is left open.
+
+    Raises
+    ------
+    TransportError
+        If the transport is lost; after the result of the trial that was running.
+    InputError
+        If an instance has no e-agent of a name in `remote`.
+    """
+    maestro = session.maestro
+    session.link.inbox.warn = session.say
+    try:
+        if maestro is not None:
+            session.link.mark = lambda running: maestro.enter(Phase.RUNNING if running else Phase.PREPARING)
+        yield from _trials(session)
+    finally:
+        if maestro is not None:
+            maestro.close()
+
+
+def _trials(session: Session) -> Iterator[Result]:
+    """Run one trial after another."""
+    done = number = repetition = 0
+    instance: Instance | None = None
+    while session.trials is None or done < session.trials:
+        if instance is None:
+            instance = hand_over(session.supply(number), session.remote)
+        which = session.which(instance, done)
+        asked, instance = _await_start(session, instance, which)
+        if asked is Next.DRAW:
+            instance, number, repetition = None, number + 1, 0
+            continue
+        ego = "; the first command of ego is waited for" if session.link.ego else ""
+        session.say(f"{which}: begins{ego}")
+        yield run_trial(
+            instance,
+            session.controller,
+            record=record_path(session.records, number, repetition),
+            overwrite=True,
+            link=session.link,
+            simulator=session.simulator,
+        )
+        check_lost(session.link)
+        if session.maestro is not None and session.maestro.next is Next.REPEAT:
+            repetition += 1
+        else:
+            done, instance, number, repetition = done + 1, None, number + 1, 0
+
+
+def check_lost(link: Link) -> None:
+    """Raise TransportError if the transport has been lost."""
+    lost = link.inbox.stopped
+    if lost is not None and lost[0] is End.TRANSPORT_LOST:
+        raise TransportError(lost[1])
+
+
+def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
+    """Return `instance` with the e-agents named in `remote` driven elsewhere.
+
+    Raises
+    ------
+    InputError
+        If one of them is none of its e-agents.
+    """
+    wanted = set(remote)
+    for name in sorted(wanted - set(instance.names[1:])):
+        expected = (
+            f"one of {', '.join(instance.names[1:21])}" if instance.e_agents else "an instance with e-agents"
+        )
+        raise InputError("no such e-agent", file="--remote", value=name, expected=expected)
+    agents = tuple(
+        replace(agent, kind=REMOTE, type=REMOTE, parameters={}) if agent.name in wanted else agent
+        for agent in instance.e_agents
+    )
+    return replace(instance, e_agents=agents)
+
+
+def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next, Instance]:
+    """Show the world until someone starts it or wants another one; return it with its cars where they were put."""
+    maestro, link = session.maestro, session.link
+    if maestro is None:
+        return Next.RUN, instance
+    inbox = link.inbox
+    maestro.interrupt = lambda detail: inbox.stop(End.RESET, detail) if detail else inbox.wake()
+    maestro.enter(Phase.PREPARING)
+    inbox.placed()
+    try:
+        while True:
+            with Trial(instance, simulator=session.simulator, link=link):
+                if maestro.phase is Phase.PREPARING:
+                    session.say(f"{which}: waiting for READY and START from the program that drives ego")
+                    maestro.enter(Phase.READY)
+                link.idle(lambda: maestro.next is not None or inbox.news)
+            instance = placed(instance, inbox.placed())
+            if maestro.next is not None:
+                break
+    except PeerError as error:
+        raise TransportError(error.detail) from error
+    return maestro.next, instance
+
+
+def placed(instance: Instance, places: Mapping[str, Pose]) -> Instance:
+    """Return `instance` with cars at other starts."""
+    old = zip(instance.names, instance.starts, strict=True)
+    return replace(instance, starts=tuple(places.get(name, start) for name, start in old))
+
+
+def record_path(folder: Path | None, number: int, repetition: int) -> Path | None:
+    """Return where the record of an instance's trial stands, None where none is wanted."""
+    if folder is None:
+        return None
+    suffix = f"-{repetition}" if repetition else ""
+    return folder / f"trial-{number:04d}{suffix}.mcap"

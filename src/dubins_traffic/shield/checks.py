@@ -1,0 +1,237 @@
+"""Whether a command, held for one tick, leaves the ego where it can stand for ever and break nothing (compiled)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.policies.rules.tables import (
+    DEGREE,
+    DISC,
+    FASTEST,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    OVER,
+    PERIOD,
+    REACH,
+    ROUNDING,
+    SLOWEST,
+    TIGHTEST,
+    YAW_MOST,
+    Drivers,
+    Scratch,
+)
+from dubins_traffic.policies.safety import GUARD, may_hit, motion_is_safe
+from dubins_traffic.roads.lookup import (
+    lane_coordinates,
+    lane_direction,
+    lane_end,
+    nearest_segment,
+    nearest_vertex,
+)
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.lane_state import lane_state
+from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
+from dubins_traffic.rules.shape import distance2_to_body, half_extent
+from dubins_traffic.shield.tables import (
+    CLEARANCE,
+    CONTACT,
+    EGO,
+    LANE,
+    LEFT_RELEASE,
+    NOTHING,
+    ORDER,
+    RETURN,
+    ROAD,
+    STOP,
+    TOP,
+    TURN,
+    TURN_BACK,
+    Guards,
+)
+
+VERGE = 0.005
+"""What the centre keeps from the edge of the road, metres."""
+BRINK = 0.002
+"""What the body keeps from where it counts as left, and from a disc that it may not enter, metres."""
+TURNING = 0.01
+"""What is kept of the way back that counts as turning round, metres."""
+
+
+@jit_inline
+def bounded(speed: float, yaw_rate: float, build: Any) -> tuple[float, float]:
+    """Return a command as the simulator clips it."""
+    speed = min(max(speed, build[SLOWEST]), build[FASTEST])
+    most = build[YAW_MOST]
+    if build[TIGHTEST] > 0.0:
+        most = min(most, abs(speed) / build[TIGHTEST])
+    return speed, min(max(yaw_rate, -most), most)
+
+
+@jit_inline
+def travel_of(build: Any) -> float:
+    """Return how far any point of a car may get in a tick, metres."""
+    travel = max(build[FASTEST], -build[SLOWEST]) * build[PERIOD]
+    if build[HALF_LENGTH] > 0.0:
+        travel += build[YAW_MOST] * build[REACH] * build[PERIOD]
+    return travel
+
+
+@jit_inline
+def gather_close(b: int, state: State, sight2: float, build: Any, scratch: Scratch) -> int:
+    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
+    far = 2.0 * (build[REACH] + 1.2 * travel_of(build)) + GUARD
+    far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
+    count = 0
+    for n in range(1, state.count[b]):
+        dx = state.x[b, n] - state.x[b, EGO]
+        dy = state.y[b, n] - state.y[b, EGO]
+        if dx * dx + dy * dy <= far2:
+            scratch.near[count] = n
+            count += 1
+    return count
+
+
+@jit
+def may_touch(
+    b: int, speed: float, yaw_rate: float, near: int, state: State, obstacles: ObstacleTable, build: Any,
+    scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
+
+    `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
+    of its way, which GUARD covers unless ticks are long.
+    """
+    x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
+    p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
+    period = build[PERIOD]
+    travel = travel_of(build)
+    own = (abs(speed) + (abs(yaw_rate) * reach if p > 0.0 else 0.0)) * period
+    between = max(own / 8.0 - GUARD, 0.0)
+    for k in range(near):
+        j = scratch.near[k]
+        if not motion_is_safe(
+            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel + between,
+        ):  # fmt: skip
+            return True
+    return may_hit(
+        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
+        obstacles.part, obstacles.off[b], obstacles.off[b + 1], travel + between + GUARD, between,
+    )  # fmt: skip
+
+
+@jit
+def refusal(
+    b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
+    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
+) -> int:  # fmt: skip
+    """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
+
+    NOTHING if it does not: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
+    the road, and has touched nothing, whatever the others did.
+    """
+    build = drivers.build[b]
+    bits = np.int64(labels.bits[b, EGO])
+    turns = yaw_rate != 0.0 and build[HALF_LENGTH] > 0.0
+    if speed == 0.0 and not turns:
+        return RETURN if bits & LEFT != 0 else NOTHING
+    net = drivers.net[b]
+    x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
+    nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
+    segment, off2 = nearest_segment(roads, net, nx, ny)
+    edge = float(roads.half_width[net]) - VERGE
+    if off2 > edge * edge:
+        _, before2 = nearest_segment(roads, net, x, y)
+        if off2 >= before2:
+            return ROAD
+    v, away2 = nearest_vertex(roads, net, nx, ny)
+    found = _enters(b, v, nx, ny, nc, ns, state, labels, roads, drivers)
+    if found != NOTHING:
+        return found
+    at = v if away2 < build[DISC] * build[DISC] else -1
+    found = _leaves_lane(
+        b, at, segment, off2, nx, ny, nc, ns, state, labels, roads, drivers, guards,
+    )  # fmt: skip
+    if found != NOTHING:
+        return found
+    return CONTACT if may_touch(b, speed, yaw_rate, near, state, obstacles, build, scratch) else NOTHING
+
+
+@jit
+def _enters(
+    b: int, v: int, x: float, y: float, c: float, s: float, state: State, labels: Labels, roads: RoadTable,
+    drivers: Drivers,
+) -> int:  # fmt: skip
+    """Return which part of rule 3 an ego that goes to a pose breaks; the nearest intersection to that is v."""
+    build = drivers.build[b]
+    net = drivers.net[b]
+    row = roads.vert_off[net] + v
+    if labels.crosses[b, EGO] == v or roads.degree[row] < build[DEGREE]:
+        return NOTHING
+    vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
+    half_length, half_width = build[HALF_LENGTH], build[HALF_WIDTH]
+    edge = build[DISC] + build[ROUNDING] + BRINK
+    after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)
+    if after2 >= edge * edge:
+        return NOTHING
+    before2 = distance2_to_body(
+        vx, vy, state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO], half_length, half_width
+    )
+    if after2 >= before2:
+        return NOTHING
+    bits = np.int64(labels.bits[b, EGO])
+    lane = labels.lane[b, EGO]
+    if bits & STOPPED == 0 or lane < 0 or lane_end(roads, net, lane) != v:
+        return STOP
+    if bits & AHEAD != 0:
+        return ORDER
+    return CLEARANCE if bits & CLEAR == 0 else NOTHING
+
+
+@jit
+def _leaves_lane(
+    b: int, at: int, segment: int, off2: float, x: float, y: float, c: float, s: float, state: State,
+    labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards,
+) -> int:  # fmt: skip
+    """Return whether an ego that goes to a pose, in the disc of `at` (-1: none), is left there or turns round."""
+    net = drivers.net[b]
+    build = drivers.build[b]
+    lane = labels.lane[b, EGO]
+    back = guards.limit[b, TURN_BACK]
+    after, top, progress, lateral, turned = lane_state(
+        roads, net, at, labels.at[b, EGO], lane, guards.memory[b, TOP], segment, off2, x, y, c, s, back
+    )
+    if after < 0:
+        return NOTHING
+    if turned:
+        return TURN
+    if after == lane and top - progress > back - TURNING:
+        before, _ = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
+        if progress < before:
+            return TURN
+    tx, ty = lane_direction(roads, net, after)
+    half = half_extent(tx, ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
+    reach = lateral + half
+    if np.int64(labels.bits[b, EGO]) & LEFT != 0 and labels.at[b, EGO] < 0:
+        return RETURN if reach >= guards.limit[b, LEFT_RELEASE] else NOTHING
+    if reach <= build[OVER] - BRINK:
+        return NOTHING
+    return NOTHING if reach < min(build[OVER], _reach(b, after, state, labels, roads, net, build)) else LANE
+
+
+@jit
+def _reach(b: int, lane: int, state: State, labels: Labels, roads: RoadTable, net: int, build: Any) -> float:
+    """Return the largest lateral coordinate of the ego's body in `lane`, if that is its lane state."""
+    if labels.lane[b, EGO] != lane:
+        return 0.0
+    tx, ty = lane_direction(roads, net, lane)
+    _, lateral = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
+    return lateral + half_extent(
+        tx, ty, state.c[b, EGO], state.s[b, EGO], build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING]
+    )
