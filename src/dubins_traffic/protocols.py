@@ -22,6 +22,7 @@ __all__ = [
     "Driver",
     "End",
     "Ending",
+    "Looks",
     "Mailbox",
     "Polled",
     "Reports",
@@ -262,6 +263,15 @@ class Polled(Protocol):
 
     def receive(self, seconds: float) -> None:
         """Wait for a message, so long at most, and hand all that have come to the mailbox."""
+        ...
+
+
+@runtime_checkable
+class Looks(Protocol):
+    """A transport that sees who is there by looking, now and then, and at once before a peer is called silent."""
+
+    def look(self) -> None:
+        """Tell the mailbox who has come and who has gone by now."""
         ...
 
 

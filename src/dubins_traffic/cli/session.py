@@ -75,6 +75,8 @@ class Asked:
     data: options.Data = None
     data_over: options.DataOver = None
     records: options.Records = None
+    overwrite: options.Overwrite = False
+    append: options.Append = False
     shield: options.Shield = False
     json: options.Json = False
 
@@ -85,7 +87,8 @@ class Asked:
         todo = session_plan(
             self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
             remote=self.remote or (), data=options.trial_data(self.data, self.data_over),
-            overwrite_data=self.data is None, records=self.records, simulator=simulator, shield=self.shield,
+            overwrite_data=self.data is None, records=self.records, overwrite=self.overwrite, append=self.append,
+            simulator=simulator, shield=self.shield,
         )  # fmt: skip
         return replace(todo, say=faults.tell)
 

@@ -17,7 +17,7 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.jobs import Job
-from dubins_traffic.runs.record_folder import check_folder, claim, name
+from dubins_traffic.runs.record_folder import check_choice, check_folder, claim, name
 from dubins_traffic.runs.single import Result
 from dubins_traffic.runs.sources import load
 from dubins_traffic.scoring.score import ScoreSheet
@@ -118,9 +118,7 @@ def plan(
     controller = controllers.shielded(controller) if shield else controller
     controllers.load(controller)
     _check_deadline(deadline)
-    if append and data is not None:
-        expected = "one of them: trial data are of all trials of a run"
-        raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)
+    check_choice(records, data, overwrite=overwrite, append=append)
     if isinstance(found, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
@@ -145,10 +143,6 @@ def plan(
     several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
     whole = [replace(job, deadline=deadline, show=show) for job, _ in several]
     if records is None:
-        if overwrite or append:
-            raise InputError(
-                "are of --records", file="--overwrite, --append", expected="a folder for records"
-            )
         return Plan(tuple(whole), configuration, target)
     folder = check_folder(records)
     kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)

@@ -67,9 +67,15 @@ def run_over_ros1(
     if elsewhere and (pace.lockstep or pace.factor != 1.0):
         expected = "neither --lockstep nor --factor"
         raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
+    if elsewhere and session_plan.append:
+        expected = "--overwrite, or another folder: the other maestro tells other problems"
+        raise InputError("both at once", file="--maestro-elsewhere, --append", expected=expected)
     ego = session_plan.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
+    if world:
+        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, WORLD))
+    session_plan = session_plan.claim(Ros1.name)
     session_plan.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
@@ -86,7 +92,6 @@ def run_over_ros1(
         if not world:
             yield from session_plan.run(transport, pace, maestro, foreign=foreign)
             return
-        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, WORLD))
         make = partial(_elsewhere, transport, ego, poses)
         yield from session_plan.run(transport, pace, maestro, make, foreign=foreign)
 

@@ -65,6 +65,7 @@ def run_over_ros2(
     """
     maestro = Maestro() if session_plan.controller is None else None
     transport = make_transport(domain, maestro, here=here, clock=clock)
+    session_plan = session_plan.claim(transport.name)
     session_plan.rehearse()
     where = f"DDS domain {transport.domain}{', within this machine' if here else ''}"
     yield from session_plan.run(transport, pace, maestro, at=lambda: where)
