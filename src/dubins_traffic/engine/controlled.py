@@ -22,6 +22,7 @@ from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
+from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.seat import Seat, fault
 
@@ -90,8 +91,14 @@ class Controlled:
         The trials.
     """
 
-    def __init__(self, instances: Sequence[Instance], make: Maker, shared: BatchController | None) -> None:
-        self.group = Group(instances, keeps_rules=False)
+    def __init__(
+        self,
+        instances: Sequence[Instance],
+        make: Maker,
+        shared: BatchController | None,
+        metrics: Sequence[MetricMaker],
+    ) -> None:
+        self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
         self._senses = [Senses(instance) for instance in instances] if shared is None else []
         self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
@@ -167,9 +174,10 @@ class Controlled:
     def _end(self, b: int, error: ControllerError) -> None:
         self.group.end(b, End(error.reason), error.detail)
 
-    def _hear(self, b: int, kind: str, _detail: str) -> None:
-        """Count how often a shield has stepped in."""
+    def _hear(self, b: int, kind: str, detail: str) -> None:
+        """Count how often a shield has stepped in, and tell the metrics of what a controller reports."""
         self._interventions[b] += kind == SHIELD
+        self.group.note(b, kind, detail)
 
     def view(self, places: int) -> BatchView:
         """Return what a vectorised controller is shown of these trials, with `places` for cars."""
@@ -228,6 +236,7 @@ def ask(
     controller: str,
     batch: int,
     cancelled: Callable[[], bool] = lambda: False,
+    metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
     """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
 
@@ -243,6 +252,8 @@ def ask(
         Its name.
     batch
         How many trials run at a time.
+    metrics
+        What makes further metrics for a trial.
     """
     made = make()
     shared = made if isinstance(made, BatchController) else None
@@ -256,7 +267,7 @@ def ask(
         for own in grouped(taken):
             if shared is not None:
                 _check_clear(own)
-            seats.append(Controlled(own, make, shared))
+            seats.append(Controlled(own, make, shared, metrics))
         if not seats:
             return
         if shared is None:

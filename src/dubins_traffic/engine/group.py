@@ -14,7 +14,7 @@ from dubins_traffic.agents.lawful import pack_drivers
 from dubins_traffic.agents.tables import workspace as agent_workspace
 from dubins_traffic.cars.near import spacing
 from dubins_traffic.cars.rows import TOGETHER
-from dubins_traffic.cars.state import EGO, Contact, Labels, State
+from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
     COLLIDED,
     COURSE,
@@ -32,6 +32,7 @@ from dubins_traffic.engine.batch_kernel import (
     World,
     run_trials,
 )
+from dubins_traffic.engine.feed import Feed
 from dubins_traffic.engine.fork import world_of
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
@@ -50,6 +51,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
 from dubins_traffic.rules.tables import NET
 from dubins_traffic.scoring.margins_kernel import margin_table
+from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
@@ -87,6 +89,8 @@ class Group:
         One a trial; with the embedded simulator, without formulas of the user's and without remote cars.
     keeps_rules : bool
         Whether the controller `rules` drives the egos, compiled; else `commands` says what they do.
+    metrics : sequence of callable
+        What makes further metrics; they are shown every frame, so the trials are taken tick by tick.
 
     Attributes
     ----------
@@ -98,7 +102,9 @@ class Group:
         How each trial has ended, None while it runs.
     """
 
-    def __init__(self, instances: Sequence[Instance], *, keeps_rules: bool) -> None:
+    def __init__(
+        self, instances: Sequence[Instance], *, keeps_rules: bool, metrics: Sequence[Maker] = ()
+    ) -> None:
         self.instances = tuple(instances)
         self._rate = instances[0].problem.rate
         problems = [instance.problem for instance in instances]
@@ -131,6 +137,7 @@ class Group:
         self._contacts: list[list[Contact]] = [[] for _ in instances]
         self._breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
+        self._feed = Feed(instances, places, metrics) if metrics else None
         self._run(self.active, 1)
         self._aim()
 
@@ -177,6 +184,7 @@ class Group:
         twin._contacts = [list(self._contacts[b]) for b in trials]
         twin._breaches = [list(self._breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
+        twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
         twin._note_rules()
         return twin
 
@@ -209,7 +217,14 @@ class Group:
     def end(self, b: int, end: End, detail: str = "") -> None:
         """End trial b for a reason of its driver's."""
         self.endings[b] = Ending(end, int(self.ticks[b]), detail)
+        if end is not End.DURATION:
+            self.note(b, end.value, detail)
         self._going[b] = False
+
+    def note(self, b: int, kind: str, detail: str) -> None:
+        """Tell the metrics of trial b of an event of the ego's, at its present tick."""
+        if self._feed is not None:
+            self._feed.note(b, Event(int(self.ticks[b]), kind, EGO, detail))
 
     def outcomes(
         self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
@@ -230,6 +245,8 @@ class Group:
                 self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
                 self._rules[b], name, begin.get(b),
             )  # fmt: skip
+            if self._feed is not None:
+                score = replace(score, metrics=self._feed.result(b, ending, self._contacts[b]))
             found.append(Outcome(self.instances[b], ending, score))
         return found
 
@@ -256,6 +273,18 @@ class Group:
             own[PLACE] = nearest_stage(drivers.distance, int(own[FIRST]), int(own[LAST_STAGE]), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
+        """Take trials up to `most` ticks farther, with the metrics that are shown every frame tick by tick."""
+        if self._feed is None:
+            self._carry(active, most)
+            return
+        for _ in range(most):
+            active = active[self._going[active]]
+            before = self.ticks[active].copy()
+            self._carry(active, 1)
+            moved = active[self.ticks[active] > before]
+            self._feed.push(moved, self.state, self.labels, self.commands, self._contacts)
+
+    def _carry(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most
         while len(active):
             left = int((goal - self.ticks[active]).max())

@@ -59,8 +59,8 @@ class Problem(Pictured):
     """What a controller is told before a trial.
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
-    `rules` holds the parameters of RULES by name, empty where the rules are not to be judged; `formulas` the texts of
-    what is judged beside the task, by name.
+    `rules` holds the parameters of docs/rules.md by name, empty where the rules are not to be judged; `formulas` the
+    texts of what is judged beside the task, by name.
     """
 
     network: RoadNetwork

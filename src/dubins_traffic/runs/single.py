@@ -17,6 +17,7 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
 from dubins_traffic.transports.drivers import LocalController, RemoteAgents, RemoteController
@@ -202,6 +203,7 @@ def run_trial(
     simulator: Simulator | None = None,
     sketch: bool = True,
     name: str | None = None,
+    metrics: Sequence[MetricSpec] = (),
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -228,15 +230,17 @@ def run_trial(
         Whether the result keeps a sketch of the ways of the cars, for pictures: some kilobytes for each car.
     name : str, optional
         What record and score call the controller; by default the name by which it was given, or that of its class.
+    metrics : sequence of str or callable
+        Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md).
 
     Raises
     ------
     InputError
-        If the controller can't be loaded or the record can't be written.
+        If the controller or a metric can't be loaded, or the record can't be written.
     """
     called, driver = _driver(controller, link)
     name = called if name is None else name
-    scorer, paths = Scorer(), Paths()
+    scorer, paths = Scorer(metrics), Paths()
     writer = None
     if record is not None:
         writer = RecordWriter(record, controller=name, overwrite=overwrite)
