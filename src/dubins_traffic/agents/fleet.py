@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide
+from dubins_traffic.agents.own import OwnAgents
 from dubins_traffic.agents.tables import (
     AIMED,
     BEGIN,
@@ -44,7 +45,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
+from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN, parameters_of
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
@@ -91,8 +92,10 @@ class Fleet:
         self._counter = _counter() if COUNTER in kinds else None
         if self._counter is not None:
             self._counter.reset(instances, state)
-        elsewhere = KEEP_RULES | {COUNTER, REMOTE}
-        self._others = not kinds <= elsewhere
+        self._own = OwnAgents() if OWN in kinds else None
+        if self._own is not None:
+            self._own.reset(instances, state)
+        self._others = not kinds <= KEEP_RULES | ALONE
         self._roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
@@ -113,15 +116,18 @@ class Fleet:
             self._lawful.decide(tick, state, labels, commands)
         if self._counter is not None:
             self._counter.decide(tick, state, labels, commands)
+        if self._own is not None:
+            self._own.decide(tick, state, labels, commands)
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return what the cars that play a counterstrategy have to say."""
-        return () if self._counter is None else self._counter.report()
+        """Return what the cars that play a counterstrategy and the user's own have to say."""
+        told = () if self._counter is None else self._counter.report()
+        return told if self._own is None else (*told, *self._own.report())
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
         self._agents.seed[:] = seed
-        for team in (self._lawful, self._counter):
+        for team in (self._lawful, self._counter, self._own):
             if team is not None:
                 team.reseed(seed)
 
@@ -148,7 +154,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     floats = np.zeros((trials, cars, FLOATS))
     cycle: list[int] = []
     script: list[tuple[float, float, float]] = []
-    elsewhere = KEEP_RULES | {COUNTER, REMOTE}
+    elsewhere = KEEP_RULES | ALONE
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
     kinds = [{agent.kind for agent in instances[b].e_agents} for b in fleets]
     driven = np.array([not own <= elsewhere for own in kinds])[whose]

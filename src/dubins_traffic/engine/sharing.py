@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
+from dubins_traffic.problem.kinds import ALONE, KEEP_RULES
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -30,7 +30,7 @@ def fitness() -> Callable[[Instance], bool]:
 
 def can_share(instance: Instance) -> bool:
     """Tell whether a trial can be stepped with others, whatever drives its ego."""
-    apart = any(agent.kind in (COUNTER, REMOTE) for agent in instance.e_agents)
+    apart = any(agent.kind in ALONE for agent in instance.e_agents)
     return instance.simulator == "embedded" and not instance.problem.formulas and not apart
 
 

@@ -120,7 +120,7 @@ class AgentEntry(Careful):
 
     type: str = Field(
         description="what drives it: wander, loop, follow, parked, scripted, lawful, nemesis, counter, "
-        '"wander/wander", or remote or package/executable: a program elsewhere'
+        '"wander/wander", or remote or package/executable: a program elsewhere, or module:Class'
     )
     name: str = Field(
         default="agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."

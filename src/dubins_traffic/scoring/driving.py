@@ -11,6 +11,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import LEFT, ON_ROAD
+from dubins_traffic.scoring.metric import Column, Told
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,3 +85,15 @@ class Driving:
             self._off_road / ticks,
             self._departures,
         )
+
+
+TOLD = (
+    Told(Column("distance_m", "distance", "m"), lambda score: score.driven.distance_m),
+    Told(Column("standing_share", "standing", "share", -1), lambda score: score.driven.standing_share),
+    Told(Column("off_road_s", "off the road", "s", -1), lambda score: score.driven.off_road_s),
+    Told(Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share),
+    Told(
+        Column("lane_departures", "lane departures", "", -1, "int32"),
+        lambda score: score.driven.lane_departures,
+    ),
+)

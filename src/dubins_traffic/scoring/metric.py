@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, Protocol, TypeAlias
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.score import Score
 
 Value: TypeAlias = float | int | bool | str | None
 """What a metric tells; None where a trial has no such value."""
@@ -32,7 +35,7 @@ class Column:
     name : str
         Key and column, such as ``min_clearance_m``: letters, digits and underscores.
     label : str
-        The same for people, without the unit.
+        The same for people, without the unit; empty: no line of a report is about it alone.
     short : str
         A label for narrow tables; by default `label`.
     unit : str
@@ -50,7 +53,7 @@ class Column:
     """
 
     name: str
-    label: str
+    label: str = ""
     unit: str = ""
     better: int = 0
     kind: Kind = "float64"
@@ -101,6 +104,14 @@ class Metric(Protocol):
     def result(self) -> Mapping[str, Value]:
         """Return the values by the names of the columns, up to the last frame."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A column of every score, and how its value is taken from a `Score`."""
+
+    column: Column
+    of: Callable[[Score], Value]
 
 
 Maker = Callable[[], Metric]

@@ -14,7 +14,7 @@ from dubins_traffic.display import Pictured, Tabulated, count
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.reader import Record
-from dubins_traffic.record.sink import SHIELD, Ending
+from dubins_traffic.record.sink import Ending
 from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
@@ -25,6 +25,7 @@ from dubins_traffic.scoring.duration import counted_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.interventions import Interventions
 from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.metric import Measured, MetricSpec
 from dubins_traffic.scoring.own_metrics import OwnMetrics
@@ -159,6 +160,7 @@ class Scorer:
         self._clearance = Clearance()
         self._judging = Judging()
         self._formulas = FormulaVerdicts()
+        self._interventions = Interventions()
         self._metrics = (
             self._icra2016,
             self._collisions,
@@ -167,6 +169,7 @@ class Scorer:
             self._clearance,
             self._judging,
             self._formulas,
+            self._interventions,
             *([] if self._own is None else [self._own]),
         )
 
@@ -176,7 +179,6 @@ class Scorer:
         self._ending: Ending | None = None
         self._count = 0
         self._shown = 0
-        self._interventions = 0
         self._waiting: list[Frames] = []
         for metric in self._metrics:
             metric.begin(instance)
@@ -184,7 +186,6 @@ class Scorer:
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
         self._count += len(frames)
-        self._interventions += sum(event.kind == SHIELD for event in frames.events)
         self._waiting.append(frames)
         if self._count - self._shown >= _BLOCK:
             self._show()
@@ -235,7 +236,7 @@ class Scorer:
             formulas=self._formulas.result(),
             paper_score=paper_score(self._instance, collisions, visits.rounds, driven.off_road_s),
             icra2016=self._icra2016.result(),
-            interventions=self._interventions,
+            interventions=self._interventions.result(),
             metrics=() if self._own is None else self._own.result(),
         )
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.report.metrics import FAULTS, METRICS, WALL_METRICS
+from dubins_traffic.campaign.report.metrics import FAULTS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.scoring.columns import REPORTED
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
@@ -113,7 +114,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
     wall : pyarrow.Table, optional
         The wall-clock figures of the same trials.
     """
-    metrics = (*METRICS, *(own for own in campaign.columns if own.kind != "string"))
+    metrics = (*REPORTED, *(own for own in campaign.columns if own.kind != "string"))
     values = {metric.name: _floats(results[metric.name]) for metric in metrics}
     if wall is not None:
         values |= {metric.name: _floats(wall[metric.name]) for metric in WALL_METRICS}
