@@ -43,8 +43,8 @@ def load(
     Raises
     ------
     InputError
-        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything but
-        a configuration.
+        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything
+        other than a configuration.
     """
     found = _load(source, rnd, seed)
     if rnd is not None and not isinstance(found, Configuration):

@@ -1,4 +1,4 @@
-"""How notebooks show values: a picture and a few numbers as HTML, with nothing in it that runs or is loaded."""
+"""How notebooks show values: a picture and a few numbers as HTML, without scripts and without anything to load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a report: self-contained HTML, but for the replays beside it that it links to."""
+"""The page of a report: self-contained HTML, except for the replays beside it, to which it links."""
 
 from __future__ import annotations
 
