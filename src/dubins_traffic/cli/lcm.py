@@ -19,7 +19,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES)
 @session.shared
 def run(
-    asked: session.SessionOptions,
+    chosen: session.SessionOptions,
     url: Annotated[
         str | None,
         typer.Option(
@@ -36,8 +36,8 @@ def run(
     """Run trials whose ego, or some of whose e-agents, are driven over LCM. Ctrl-C keeps all finished trials."""
     from dubins_traffic.sessions.lcm import run_over_lcm
 
-    todo = asked.session_plan()
-    session.run_session(todo, run_over_lcm(todo, asked.pace(), url=url, wait=wait), json=asked.json)
+    todo = chosen.session_plan()
+    session.run_session(todo, run_over_lcm(todo, chosen.pace(), url=url, wait=wait), json=chosen.json)
 
 
 @app.command("messages", epilog=options.examples("lcm messages -o dubins_traffic_lcm.lcm"))

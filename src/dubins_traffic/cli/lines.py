@@ -19,7 +19,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES)
 @session.shared
 def run(
-    asked: session.SessionOptions,
+    chosen: session.SessionOptions,
     port: Annotated[
         int,
         typer.Option("--port", metavar="PORT", min=0, max=65535, help="Where to listen; 0: any free one."),
@@ -28,5 +28,5 @@ def run(
     """Run trials whose ego, or some of whose e-agents, are driven over a socket. Ctrl-C keeps all finished trials."""
     from dubins_traffic.sessions.lines import run_over_lines
 
-    todo = asked.session_plan()
-    session.run_session(todo, run_over_lines(todo, asked.pace(), port=port), json=asked.json)
+    todo = chosen.session_plan()
+    session.run_session(todo, run_over_lines(todo, chosen.pace(), port=port), json=chosen.json)

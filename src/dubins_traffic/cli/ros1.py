@@ -22,7 +22,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES, context_settings={"allow_extra_args": True})
 @session.shared
 def run(
-    asked: session.SessionOptions,
+    chosen: session.SessionOptions,
     context: typer.Context,
     master: Annotated[
         bool,
@@ -59,12 +59,12 @@ def run(
 
     _check_remappings(context.args)
     world = _is_world(simulator, poses)
-    todo = asked.session_plan(None if world else simulator)
+    todo = chosen.session_plan(None if world else simulator)
     at = port if master else None
     results = run_over_ros1(
-        todo, asked.pace(), master=at, clock=clock, world=world, poses=poses, elsewhere=elsewhere
+        todo, chosen.pace(), master=at, clock=clock, world=world, poses=poses, elsewhere=elsewhere
     )
-    session.run_session(todo, results, json=asked.json)
+    session.run_session(todo, results, json=chosen.json)
 
 
 @app.command("messages", epilog=options.examples("ros1 messages build/ros --cpp"))

@@ -21,7 +21,7 @@ EXAMPLES = options.examples(
 @app.command("run", epilog=EXAMPLES)
 @session.shared
 def run(
-    asked: session.SessionOptions,
+    chosen: session.SessionOptions,
     domain: Annotated[
         int | None,
         typer.Option(
@@ -37,7 +37,7 @@ def run(
     """Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials."""
     from dubins_traffic.sessions.ros2 import run_over_ros2
 
-    todo = asked.session_plan()
+    todo = chosen.session_plan()
     session.run_session(
-        todo, run_over_ros2(todo, asked.pace(), domain=domain, here=not wide, clock=clock), json=asked.json
+        todo, run_over_ros2(todo, chosen.pace(), domain=domain, here=not wide, clock=clock), json=chosen.json
     )

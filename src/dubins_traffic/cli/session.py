@@ -109,8 +109,8 @@ def shared(own: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(own)
     def command(**given: Any) -> None:
-        asked = SessionOptions(**{name: given.pop(name) for name in hints})
-        own(asked, **given)
+        chosen = SessionOptions(**{name: given.pop(name) for name in hints})
+        own(chosen, **given)
 
     hints = get_type_hints(SessionOptions, include_extras=True)
     own_hints = get_type_hints(own, include_extras=True)
