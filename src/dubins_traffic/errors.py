@@ -13,6 +13,8 @@ _ARGUMENTS: Final = {
     "--gui": "show=True",
     "--jobs 1": "workers=1",
     "--lockstep": "lockstep=True",
+    "--map-format": "map_format",
+    "--metric": "metrics",
     "--overwrite": "overwrite=True",
     "--overwrite-trial-data": "overwrite_data=True",
     "--resume": "resume=True",

@@ -25,9 +25,10 @@ from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
-from dubins_traffic.scoring.verdict import Judging, Verdict
+from dubins_traffic.scoring.verdict import Verdict
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
 from tests.recordings import blocks

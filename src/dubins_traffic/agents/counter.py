@@ -124,6 +124,10 @@ class CounterTeam:
         found, self._reports = self._reports, []
         return found
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._drivers.seed[:] = seed
+
     def _choose(self, tick: int, cars: Sequence[Sighting]) -> None:
         """Choose the cells to which the cars go in this turn, and prepare the law for it."""
         play, position = self._play, self._play.position

@@ -45,11 +45,11 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
-from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
+    from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import EAgent, Instance
 
 AS_FAR_AS_2016 = 3.5
@@ -118,6 +118,13 @@ class Fleet:
         """Return what the cars that play a counterstrategy have to say."""
         return () if self._counter is None else self._counter.report()
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._agents.seed[:] = seed
+        for team in (self._lawful, self._counter):
+            if team is not None:
+                team.reseed(seed)
+
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
         while done < commands.shape[0]:
@@ -169,7 +176,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     )
 
 
-def _lawful() -> Driver:
+def _lawful() -> Lawful:
     """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
     from dubins_traffic.agents.lawful import Lawful
 

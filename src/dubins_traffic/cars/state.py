@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -108,6 +108,10 @@ class State(NamedTuple):
         """Return a state of standing cars at the origin."""
         x, y, s, speed, yaw_rate = (np.zeros((trials, cars)) for _ in range(5))
         return State(x, y, np.ones((trials, cars)), s, speed, yaw_rate, np.full(trials, cars, dtype=np.int64))
+
+
+STATE_END: Final = len(State._fields)
+"""Where the arrays of State end among those that a kernel takes one after another."""
 
 
 class Labels(NamedTuple):

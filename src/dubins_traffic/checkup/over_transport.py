@@ -53,7 +53,7 @@ class NotingLink(Link):
     @property
     def answers(self) -> list[float]:
         """Seconds after which each frame of the trial was answered."""
-        return list(self._answers[EGO_NAME])
+        return list(self._punctuality.answers[EGO_NAME])
 
 
 def run_over(over: str, command: str) -> tuple[Pass, Pass]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import STATE_END, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
@@ -86,7 +86,6 @@ BESIDE = LONG | LEFT | OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 ROADS_END = STATE_END + len(RoadTable._fields)
 OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
 RULES_END = OBSTACLES_END + len(RuleTable._fields)

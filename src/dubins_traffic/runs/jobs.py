@@ -52,6 +52,7 @@ class Job:
     overwrite: bool = False
     deadline: float | None = None
     show: bool = False
+    metrics: tuple[str, ...] = ()
 
     def run(self, cancelled: Event | None = None) -> Result:
         """Run the job here; `cancelled` interrupts it after at most one simulated second."""
@@ -70,6 +71,7 @@ class Job:
             simulator=simulators.load(instance.simulator, show=self.show),
             sketch=False,
             name=self.controller,
+            metrics=self.metrics,
         )
 
     @property

@@ -31,7 +31,7 @@ def csv_files(comparison: Comparison) -> dict[str, str]:
 def _controllers(comparison: Comparison) -> Iterator[Sequence[object]]:
     for standing in comparison.standings:
         for metric in comparison.metrics:
-            yield standing.controller, metric.column, *_estimate(standing.estimates[metric.column])
+            yield standing.controller, metric.name, *_estimate(standing.estimates[metric.name])
 
 
 def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
@@ -53,13 +53,13 @@ def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
 def _differences(comparison: Comparison) -> Iterator[Sequence[object]]:
     for one in comparison.differences:
         estimate = _estimate(one.estimate)
-        yield one.first, one.second, one.metric.column, *estimate, one.larger, one.smaller
+        yield one.first, one.second, one.metric.name, *estimate, one.larger, one.smaller
 
 
 def _factors(comparison: Comparison) -> Iterator[Sequence[object]]:
     for level in comparison.levels:
         estimate = _estimate(level.estimate)[:4]
-        yield level.factor, level.value, level.controller, level.metric.column, *estimate
+        yield level.factor, level.value, level.controller, level.metric.name, *estimate
 
 
 def _estimate(estimate: Estimate) -> tuple[object, ...]:
