@@ -111,7 +111,7 @@ def app(name: str, entry: TransportEntry) -> typer.Typer:
 def command(name: str, entry: TransportEntry) -> Callable[..., None]:
     """Return the function that runs a session over a transport, with its own options and those of `SessionOptions`.
 
-    `own` is given these as its first argument. The library reads options off a signature, so this makes one.
+    The library reads options off a signature, so this makes one.
     """
 
     def run(**given: Any) -> None:
