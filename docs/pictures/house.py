@@ -14,7 +14,7 @@ FAMILIES = {
     "#fbeccb": "task, rules, problem",
     "#ececec": "ground",
 }
-GROUND = {"kernels", "files", "display", "errors", "record", "protocols"}
+GROUND = {"kernels", "files", "display", "errors", "record", "protocols", "outside"}
 TASK = {"problem", "rules", "logic", "roads", "cars", "synthesis", "scoring"}
 TRIALS = {
     "engine", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
@@ -41,6 +41,7 @@ WHAT = {
     "roads": "networks; bodies, motion, contact",
     "kernels": "what compiled functions share",
     "files": "whole or not at all; what notebooks show",
+    "outside": "classes of the user's own",
     "errors": "one base class",
 }
 

@@ -38,7 +38,7 @@ class Seam:
         What it must be able to do; the last one is looked for when a class is to be proposed.
     signature : str
         The same as a line for people.
-    told : callable
+    error_text : callable
         Returns what is said of an exception that its code raised.
     """
 
@@ -46,7 +46,7 @@ class Seam:
     name: str
     methods: tuple[str, ...]
     signature: str
-    told: Callable[[BaseException], str] = plainly
+    error_text: Callable[[BaseException], str] = plainly
 
     def refuse(self, problem: str, spec: str, expected: str) -> InputError:
         """Return the error about `spec`."""
@@ -114,7 +114,10 @@ def make(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
         raise
     except BaseException as error:
         raise ConstructionError(
-            f"{name} raised {seam.told(error)} on construction", file=seam.option, value=spec, expected=CLASS
+            f"{name} raised {seam.error_text(error)} on construction",
+            file=seam.option,
+            value=spec,
+            expected=CLASS,
         ) from error
     for method in seam.methods:
         if not callable(getattr(made, method, None)):
@@ -143,7 +146,7 @@ def _load_file(place: str, spec: str, seam: Seam) -> ModuleType:
         raise
     except BaseException as error:
         del sys.modules[label]
-        problem = f"{place} raised {seam.told(error)} while it was loaded"
+        problem = f"{place} raised {seam.error_text(error)} while it was loaded"
         raise seam.refuse(problem, spec, "a file that loads") from error
     return module
 
@@ -161,7 +164,7 @@ def _load_module(place: str, spec: str, seam: Seam) -> ModuleType:
             problem, expected = f"no module {place}", "module:Class that can be imported from here"
         else:
             problem, expected = (
-                f"{place} raised {seam.told(error)} while it was loaded",
+                f"{place} raised {seam.error_text(error)} while it was loaded",
                 "a module that loads",
             )
         raise seam.refuse(problem, spec, expected) from error

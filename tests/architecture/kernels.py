@@ -23,7 +23,7 @@ _ROW = re.compile(r"^(\w+(?:, \w+)*) +(\w+) {2,}\S", re.MULTILINE)
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*)(?: : (.*))?\n((?:    .*\n?)+)", re.MULTILINE)
 _SHAPE = re.compile(r"\((?:[A-Z]\w*(?: \+ \d+)?|\d+),[^)]*\)|\bmetres\b")
 _UNIT = re.compile(
-    r"\((?:[A-Z]\w*(?: [+*] \w+)?,|\d+,)|\b(?:m|metres?|seconds?|s|rad|radians|m/s|rad/s|1/m|1/s|Hz|ticks?|frames?|"
+    r"\((?:[A-Z]\w*(?: [+*] \w+)?,|\d+,)|\b(?i:m|metres?|seconds?|s|rad|radians|m/s|rad/s|1/m|1/s|Hz|ticks?|frames?|"
     r"bytes?|indices|index|numbers?|first|count|share|unit vectors?|vertex|lane|segment|intersection|car|trial|"
     r"whether|bits|flags?|row|position|goal|node|scene|debt|term|in \[0, 1\])\b"
 )

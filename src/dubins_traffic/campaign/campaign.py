@@ -156,8 +156,8 @@ def seed_of(root: int, configuration: str, values: Mapping[str, Scalar]) -> int:
 
     Neither the controllers nor other cells come into it, so that these may be added without a change of instances.
     """
-    told = json.dumps([root, configuration, dict(sorted(values.items()))], separators=(",", ":"))
-    return int.from_bytes(hashlib.sha256(told.encode()).digest()[:8], "little")
+    text = json.dumps([root, configuration, dict(sorted(values.items()))], separators=(",", ":"))
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
 
 
 def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -> Configuration:
@@ -215,10 +215,10 @@ def _cells(model: CampaignModel, configurations: list[Configuration]) -> Iterato
         name = model.configurations[k].name
         for values in product(*axes.values()):
             chosen = dict(zip(axes, values, strict=True))
-            told = {axis: scalar(value) for axis, value in chosen.items()}
-            settled = _settled(configuration, chosen, set(factors), f"configurations[{k}]", told)
+            scalars = {axis: scalar(value) for axis, value in chosen.items()}
+            settled = _settled(configuration, chosen, set(factors), f"configurations[{k}]", scalars)
             count = model.trials or settled.number_trials
-            yield Cell(index, name, told, seed_of(model.seed, name, told), first, count, settled)
+            yield Cell(index, name, scalars, seed_of(model.seed, name, scalars), first, count, settled)
             first += count * len(model.controllers)
             index += 1
             if first > MOST_TRIALS:
@@ -231,9 +231,9 @@ def _check_axes(axes: Mapping[str, list[Any]], model: CampaignModel, configurati
     count = configurations
     for name, values in axes.items():
         field_ = f"fields.{name}" if name in model.fields else f"factors.{name}"
-        told = [scalar(value) for value in values]
-        for k, value in enumerate(told):
-            if (type(value), value) in [(type(other), other) for other in told[:k]]:
+        scalars = [scalar(value) for value in values]
+        for k, value in enumerate(scalars):
+            if (type(value), value) in [(type(other), other) for other in scalars[:k]]:
                 raise InputError(
                     "value stands twice", field=f"{field_}[{k}]", value=value, expected="each value once"
                 )
@@ -248,12 +248,12 @@ def _settled(
     chosen: Mapping[str, Any],
     factors: set[str],
     field_: str,
-    told: Mapping[str, Scalar],
+    scalars: Mapping[str, Scalar],
 ) -> Configuration:
     """Return the configuration with the chosen values put in, checked."""
     named = {name: value for name, value in chosen.items() if name in factors}
     rest = {name: value for name, value in chosen.items() if name not in factors}
-    with_ = ", ".join(f"{name} = {value}" for name, value in told.items())
+    with_ = ", ".join(f"{name} = {value}" for name, value in scalars.items())
     try:
         document = vary(_inlined(configuration), named, rest)
         settled = Configuration.from_document(document)

@@ -119,8 +119,8 @@ def cost(cell: Cell, controller: str) -> float:
     """Return about what a trial takes, in car-steps of the compiled tick."""
     settings = cell.settled.settings
     seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
-    asked = 0 if controller == COMPILED else ASKED
-    return TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents) + asked)
+    python_cost = 0 if controller == COMPILED else ASKED
+    return TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents) + python_cost)
 
 
 def _trials(left: float, each: float) -> int:

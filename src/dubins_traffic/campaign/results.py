@@ -18,7 +18,7 @@ from dubins_traffic.viewer.notebook import shares_html
 
 @dataclass(frozen=True, slots=True)
 class CampaignResults:
-    """What came of a campaign so far.
+    """The results of a campaign so far.
 
     Attributes
     ----------

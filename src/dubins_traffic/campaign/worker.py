@@ -1,4 +1,4 @@
-"""The work of a campaign, chunk by chunk: what runs in a worker, wherever that is."""
+"""A worker of a campaign runs its chunks, in whichever process or machine it is."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _is_recorded(records: Records, number: int, row: rows.Row) -> bool:
 def _together(
     chunk: Chunk, some: Sequence[int], cancelled: Event | None, metrics: Sequence[Maker]
 ) -> dict[int, rows.Row]:
-    """Run trials of a chunk together; return the rows of those that could be.
+    """Run trials of a chunk together; return the rows of those that fit a batch.
 
     What is wrong with the others is found out when they are run by themselves.
     """

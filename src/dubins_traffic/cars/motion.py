@@ -114,7 +114,7 @@ def step_trial(
 ) -> int:
     """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
 
-    No two cars are nearer to each other than `least`, metres, or nothing is known of that (0).
+    No two cars are nearer to each other than `least` (m), or nothing is known of that (0).
     Returns MOVED, or what is too small, FULL for the buffer of contacts or CROWDED for that of pairs: then nothing
     has moved.
     """

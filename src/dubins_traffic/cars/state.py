@@ -90,7 +90,7 @@ class Observation(NamedTuple):
 
 
 class State(NamedTuple):
-    """State of a batch after a tick. All arrays (B, N) float64, but `count` (B,) int64: cars in each trial.
+    """State of a batch after a tick. All arrays (B, N) float64, except `count` (B,) int64: cars in each trial.
 
     `speed` and `yaw_rate` are those in force when the frame was reached: 0 for a car that a contact had fixed.
     """

@@ -24,7 +24,7 @@ WIDTH = 100
 
 
 class Subject(StrEnum):
-    """What there are several of."""
+    """The catalogues that `list` prints."""
 
     AGENTS = "agents"
     CONFIGURATIONS = "configurations"

@@ -111,15 +111,15 @@ def app(name: str, entry: TransportEntry) -> typer.Typer:
 def command(name: str, entry: TransportEntry) -> Callable[..., None]:
     """Return the function that runs a session over a transport, with its own options and those of `SessionOptions`.
 
-    `own` is given these as its first argument. The library reads options off a signature, so this makes one.
+    The library reads options off a signature, so this makes one.
     """
 
     def run(**given: Any) -> None:
         context: typer.Context = given.pop("context")
-        asked = SessionOptions(**{name: given.pop(name) for name in hints})
+        chosen = SessionOptions(**{name: given.pop(name) for name in hints})
         _check_remappings(name, context.args)
-        todo = asked.session_plan()
-        run_session(todo, entry.runner(todo, asked.pace(), **given), json=asked.json)
+        todo = chosen.session_plan()
+        run_session(todo, entry.runner(todo, chosen.pace(), **given), json=chosen.json)
 
     hints = get_type_hints(SessionOptions, include_extras=True)
     parameters = [

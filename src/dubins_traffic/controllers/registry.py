@@ -40,7 +40,7 @@ _SEAM = Seam(
     "controller",
     ("start", "act"),
     "start(problem) and act(observation) -> (speed, yaw rate)",
-    blame.told,
+    blame.error_text,
 )
 _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.controllers.shield import told
+from dubins_traffic.controllers.shield import override_text
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.policies.rules.exits import BACK
@@ -190,7 +190,7 @@ class Synthesized(Rules):
         given = self._shield_filter.filter(seen, command)
         found = self._shield_filter.intervention
         if found is not None:
-            pursuit.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
+            pursuit.reports.append((SHIELD, override_text(found.asked, found.given, found.reason)))
         return given
 
     def _waiting(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:

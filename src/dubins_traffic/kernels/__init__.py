@@ -18,6 +18,12 @@ x, y             float    a centre or another point, m
 px, py           float    a point, m
 c, s             float    heading: cosine and sine
 tx, ty           float    a direction: unit vector
+x0, y0, x1, y1   float    centres of the first and the second of two bodies, m
+c0, s0, c1, s1   float    their headings: cosine and sine
+a0, b0, a1, b1   float    half lengths and half widths of their cores, m
+r0, r1           float    their roundings, m
+u0, w0, u1, w1   float    their speeds, m/s, and yaw rates, rad/s
+until0, until1   float    for how long they move in the tick, s; then they stand
 ox, oy           float    centre of another body, m
 oc, os           float    its heading: cosine and sine
 speed            float    m/s
@@ -28,6 +34,8 @@ half_width       float    half the width of a body's core, m
 rounding         float    radius by which a body's core is rounded, m; a disc is all rounding
 reach            float    distance from a body's centre to its farthest point, m
 seed             Any      seed of the trial, uint64
+trial            int      number of the trial by which random numbers are drawn
+others           int      number of e-agents in a game of cells
 commands         Floats   (B, N, 2) speed (m/s) and yaw rate (rad/s)
 ===============  =======  ============================================================================================
 """

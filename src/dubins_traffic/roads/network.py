@@ -274,7 +274,7 @@ class RoadNetwork(Pictured):
 
     @cached_property
     def known(self) -> dict[object, object]:
-        """What the rooms above have worked out about this network and keep with it, each under a key of its own."""
+        """Tables that other rooms have computed for this network and keep with it, each under a key of its own."""
         return {}
 
     @cached_property

@@ -32,17 +32,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from dubins_traffic.logic.exports import Specification
-from dubins_traffic.logic.formula import (
-    Formula,
-    always,
-    conj,
-    eventually,
-    implies,
-    negation,
-    prop,
-    propositions,
-    yesterday,
-)
+from dubins_traffic.logic.formula import Formula, conj, implies, negation, prop, propositions
+from dubins_traffic.logic.temporal import always, eventually, yesterday
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 

@@ -100,10 +100,10 @@ def agents() -> tuple[Entry, ...]:
 
 def rules() -> tuple[Parameter, ...]:
     """Return the parameters of the rules of the road, in the order of their definition."""
-    told = _attribute_docs(RuleParameters)
+    meanings = _attribute_docs(RuleParameters)
     found: list[Parameter] = []
     for own in fields(RuleParameters):
-        text = told.get(own.name, "")
+        text = meanings.get(own.name, "")
         if own.name.startswith("assume_"):
             text = f"Whether the problem assumes {own.name.removeprefix('assume_').upper()} of the e-agents, 0 or 1."
         unit = _unit(own.name)

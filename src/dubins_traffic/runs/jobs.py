@@ -126,7 +126,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
 
 
 def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """Run jobs in processes; those that were under way when one ended too early run again, each by itself."""
+    """Run jobs in processes; the jobs that were under way when a process died run again, each by itself."""
     waiting, suspects, dead = deque(jobs), deque[Job](), list[Job]()
     barren = 0
     crew = _Crew(min(workers, len(jobs)))
@@ -154,7 +154,7 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
 
 
 def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
-    """Return what is said of jobs that ended their processes, and of how many were not tried again for that."""
+    """Return the message on jobs whose processes ended in the middle of them; for that `left` jobs were not run."""
     named = ", ".join(job.called for job in dead[:MOST_NAMED])
     more = f" and {len(dead) - MOST_NAMED} more" if len(dead) > MOST_NAMED else ""
     rest = f"; {left} trials were not run" if left else ""
@@ -162,7 +162,7 @@ def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
 
 
 class _Crew:
-    """Processes that run jobs; new ones take their place when one has ended, and what was under way is lost."""
+    """Processes that run jobs. When a process has died, all are replaced, and the jobs under way are lost."""
 
     def __init__(self, workers: int) -> None:
         self.under_way: dict[Future[Result], Job] = {}
@@ -213,7 +213,7 @@ class _Crew:
 
 @contextmanager
 def deaf_to_interrupts() -> Generator[None]:
-    """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
+    """Hold Ctrl-C back while workers are started; workers inherit this, so Ctrl-C reaches the parent alone."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -1,4 +1,4 @@
-"""From a configuration, an instance or a record to the jobs that run its trials, and what is left of them."""
+"""Plans of runs: the jobs that run the trials of a configuration, an instance or a record."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The folder into which a run puts its records: empty of records before, or told what to do with them."""
+"""The folder for the records of a run: one without records, or a choice between overwriting and appending."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def check_choice(
     overwrite: bool,
     append: bool,
 ) -> None:
-    """Raise InputError if what is said of a folder for records makes no sense without one, or with trial data."""
+    """Raise InputError if overwriting or appending is asked for without a folder for records, or with trial data."""
     if append and data is not None:
         expected = "one of them: trial data are of all trials of a run"
         raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)

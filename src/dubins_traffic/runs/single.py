@@ -278,7 +278,7 @@ def _driver(controller: str | Controller, link: Link | None) -> tuple[str, Contr
 
 
 def _over(link: Link, measured: wall.Wall) -> wall.Wall:
-    """Add to what was measured here what the link has measured."""
+    """Return the wall-clock figures of the trial with those of the link."""
     begin = link.time_to_begin if link.ego else measured.time_to_begin_s
     reproducible = measured.reproducible and link.clock.lockstep
     return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=link.report())

@@ -51,8 +51,8 @@ def load(
     Raises
     ------
     InputError
-        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything but
-        a configuration.
+        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything
+        other than a configuration.
     """
     form = formats.load(map_format) if isinstance(map_format, str) else map_format
     found = _load(source, rnd, seed, form)

@@ -14,7 +14,12 @@ def box_gap(
 ) -> float:  # fmt: skip
     """Return the distance between two oriented boxes, 0 where they overlap, as `scoring.clearance.box_distance` does.
 
-    A box is its centre, the cosine and sine of its heading, its half length and half width.
+    Parameters
+    ----------
+    ax, ay, ac, az, a_length, a_width : float
+        The first box: its centre (m), the cosine and sine of its heading, its half length and half width (m).
+    bx, by, bc, bz, b_length, b_width : float
+        The second box, in the same units: m, and a unit vector.
     """
     if _overlap(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width):
         return 0.0

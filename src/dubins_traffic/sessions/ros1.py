@@ -16,7 +16,7 @@ from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.external import NAME as WORLD
 from dubins_traffic.transports.ros1.external import ExternalWorld
-from dubins_traffic.transports.ros1.maestro_services import Told
+from dubins_traffic.transports.ros1.maestro_services import SessionParameters
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
@@ -99,7 +99,12 @@ def run_over_ros1(
         session_plan.say(f"ROS master at {uri}")
         stack.callback(leave)
         transport = Ros1(
-            uri, maestro=maestro, told=_told(session_plan), clock=clock, simulated=not world, foreign=foreign
+            uri,
+            maestro=maestro,
+            parameters=_parameters(session_plan),
+            clock=clock,
+            simulated=not world,
+            foreign=foreign,
         )
         if not world:
             yield from session_plan.run(transport, pace, maestro, foreign=foreign)
@@ -112,9 +117,9 @@ def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:
     return ExternalWorld(transport.rospy, ego=ego, poses=poses)
 
 
-def _told(session_plan: SessionPlan) -> Told:
+def _parameters(session_plan: SessionPlan) -> SessionParameters:
     settings = None if session_plan.configuration is None else session_plan.configuration.settings
-    return Told(
+    return SessionParameters(
         number_trials=session_plan.trials,
         duration_bounds=None if settings is None else settings.duration_bounds,
         number_goals_bounds=None if settings is None else settings.number_goals_bounds,

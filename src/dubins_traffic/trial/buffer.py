@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 @jit
 def keep(f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, *arrays: Any) -> None:
-    """Copy trial 0 of the arrays of State and Labels, and its commands, into frame f of a block."""
+    """Copy trial 0 of the arrays of State and Labels, and its commands, into frame `f` (index) of a block.
+
+    The block is `reals` (8, F, N): pose, twist and command, `whole` (4, F, N) and `bits` (F, N).
+    """
     state = State(*arrays[:STATE_END])
     labels = Labels(*arrays[STATE_END:])
     for n in range(reals.shape[2]):

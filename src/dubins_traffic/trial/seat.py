@@ -93,10 +93,10 @@ class Seat:
         self.latencies.append(elapsed)
         if self._reports:
             with guard:
-                for kind, detail in told(cast(Reports, controller).report()):
+                for kind, detail in checked_reports(cast(Reports, controller).report()):
                     note(kind, detail)
         if deadline is not None and elapsed > deadline:
-            raise _late(deadline, seen.tick)
+            raise _deadline_error(deadline, seen.tick)
         if command is None:
             raise ControllerError(End.GAVE_UP.value, f"the controller gave up at tick {seen.tick}")
         return command
@@ -110,7 +110,7 @@ class Seat:
                 raise
             except BaseException as error:  # the trial is over and judged; its detail says what closing did
                 blame.show(error)
-                detail = f"{ending.detail}; {CLOSE_RAISED} {blame.told(error)}".lstrip("; ")
+                detail = f"{ending.detail}; {CLOSE_RAISED} {blame.error_text(error)}".lstrip("; ")
                 return Ending(ending.end, ending.ticks, detail)
         return ending
 
@@ -133,7 +133,7 @@ class Answerable:
         self, kind: type[BaseException] | None, error: BaseException | None, _traceback: object
     ) -> None:
         if isinstance(error, _TooLateError):
-            raise _late(error.deadline, self.tick) from None
+            raise _deadline_error(error.deadline, self.tick) from None
         if error is not None and not isinstance(error, KeyboardInterrupt | PeerError):
             blame.show(error)
             raise fault(error, self.tick) from error
@@ -141,10 +141,10 @@ class Answerable:
 
 def fault(error: BaseException, tick: int) -> ControllerError:
     """Return the fault that it was of a controller to raise `error` in frame `tick`."""
-    return ControllerError(End.CONTROLLER_FAULT.value, blame.told(error, tick))
+    return ControllerError(End.CONTROLLER_FAULT.value, blame.error_text(error, tick))
 
 
-def told(reports: Iterable[object]) -> list[tuple[str, str]]:
+def checked_reports(reports: Iterable[object]) -> list[tuple[str, str]]:
     """Return what a controller reports, pairs of kind and detail, as lines that a record can hold.
 
     Raises
@@ -157,14 +157,14 @@ def told(reports: Iterable[object]) -> list[tuple[str, str]]:
         pair = tuple(cast("Sequence[object]", entry)) if isinstance(entry, tuple | list) else ()
         if len(pair) != 2 or not all(isinstance(part, str) for part in pair):
             raise TypeError(
-                f"a report is pairs of texts (kind, detail): got {blame.said(cast(object, entry), 80)}"
+                f"a report is pairs of texts (kind, detail): got {blame.value_text(cast(object, entry), 80)}"
             )
         kind, detail = map(str, pair)
         found.append((shown(kind), shown(detail)))
     return found
 
 
-def _late(deadline: float, tick: int) -> ControllerError:
+def _deadline_error(deadline: float, tick: int) -> ControllerError:
     return ControllerError(End.DEADLINE.value, f"act took more than {deadline} s at tick {tick}")
 
 

@@ -1,4 +1,4 @@
-"""A trial gone through once more from its instance and its recorded commands."""
+"""A recorded trial is simulated again from its instance and its recorded commands, and compared."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def drivers(record: Record) -> Sequence[Driver]:
 
 
 def _commands_of_ego(instance: Instance, frames: Frames) -> Sequence[tuple[float, float]]:
-    """Return what the ego asked for in each tick, as far as the record tells it: delayed commands come later.
+    """Return the commands that the ego's controller gave in each tick, as far as the record tells: they may be delayed.
 
     A command that was delayed beyond the end, or lost, has left no trace; in its place stands what makes none.
     """

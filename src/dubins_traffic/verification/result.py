@@ -1,4 +1,4 @@
-"""What comes of verifying a record."""
+"""The outcome of verifying a record."""
 
 from __future__ import annotations
 

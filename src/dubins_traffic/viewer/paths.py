@@ -19,7 +19,7 @@ CARS = 60
 
 
 class Paths:
-    """A sink that keeps every so manieth position of the first cars, and the last pose of all."""
+    """A sink that keeps every k-th position of the first cars, and the last pose of all cars."""
 
     forks = True
 

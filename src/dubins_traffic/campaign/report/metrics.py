@@ -1,4 +1,4 @@
-"""The metrics that a report compares: what they are called and how they are told."""
+"""The metrics that a report compares: their names, units, and how their numbers are written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a report: self-contained HTML, but for the replays beside it that it links to."""
+"""The page of a report: self-contained HTML, except for the replays beside it, to which it links."""
 
 from __future__ import annotations
 
@@ -263,11 +263,11 @@ def _table(head: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -
     rows: list[str] = []
     for cells in body:
         spanned = kind == "grouped" and not cells[0]
-        told = [
+        labelled = [
             cell if cell.startswith("<th") else f'<td data-head="{label}">{cell}</td>'
             for label, cell in zip(labels, cells, strict=True)
         ]
-        rows.append("".join(told[spanned:]))
+        rows.append("".join(labelled[spanned:]))
     lines = "\n".join(f"<tr>{row}</tr>" for row in rows)
     return (
         f'<div class="scroll"><table class="{kind}"><thead><tr>{heading}</tr></thead>\n'

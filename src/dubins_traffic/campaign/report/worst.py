@@ -50,7 +50,7 @@ NOTHING = frozenset({rows.FAILED, rows.CRASHED})
 
 @dataclass(frozen=True, slots=True)
 class Bad:
-    """One of the worst trials: its row, why it is, its replay (None: there is none), and what is odd about it."""
+    """One of the worst trials: its row, why it is bad, its replay (None: there is none), and a remark on it."""
 
     row: Mapping[str, Any]
     why: str
@@ -151,7 +151,7 @@ def _bad(campaign: Campaign, row: Mapping[str, Any], folder: Path) -> Bad:
 
 
 def replay_name(number: int) -> str:
-    """Return where the replay of a trial stands in a report."""
+    """Return the path of a trial's replay within a report."""
     return f"{FOLDER}/trial-{number:09d}.html"
 
 

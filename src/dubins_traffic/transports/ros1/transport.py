@@ -13,7 +13,7 @@ from xmlrpc.client import Error as XmlRpcError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.ros1.maestro_services import MaestroServices, Told
+from dubins_traffic.transports.ros1.maestro_services import MaestroServices, SessionParameters
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join, tell_first
 from dubins_traffic.transports.ros1.world import Topics, World
@@ -37,7 +37,7 @@ class Ros1:
         The ROS master's.
     maestro : Maestro, optional
         Who grants modes; without one trials start by themselves.
-    told : Told
+    parameters : SessionParameters
         The session, for parameters.
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
@@ -57,14 +57,19 @@ class Ros1:
         uri: str,
         *,
         maestro: Maestro | None = None,
-        told: Told | None = None,
+        parameters: SessionParameters | None = None,
         clock: bool = False,
         simulated: bool = True,
         rate: float = 120.0,
         foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
-        self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
+        self._uri, self._maestro, self._parameters, self._clock = (
+            uri,
+            maestro,
+            parameters or SessionParameters(),
+            clock,
+        )
         self._stamps = Stamps(self.interval, clock=clock)
         self._simulated_here, self._foreign = simulated, foreign
         self._world: World | None = None
@@ -89,7 +94,7 @@ class Ros1:
             self._rospy,
             mailbox,
             self._maestro,
-            self._told,
+            self._parameters,
             simulated=self._simulated_here,
             foreign=self._foreign,
         )
