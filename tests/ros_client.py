@@ -32,6 +32,10 @@ def law(pose):
     return 0.3 + 0.1 * math.sin(x), 0.5 * math.cos(theta) + 0.1 * math.sin(y)
 
 
+PATIENCE = 600
+"""Seconds for what is to come, on a busy machine."""
+
+
 class Client:
     def __init__(self):
         self.lock = threading.Condition()
@@ -47,7 +51,7 @@ class Client:
         rospy.Subscriber("/ego/odom", Odometry, self.odom)
         rospy.Subscriber("/ego/scan", LaserScan, self.scan)
         rospy.Subscriber("/gazebo/model_states", ModelStates, self.state, tcp_nodelay=True)
-        rospy.wait_for_service("/dubins_traffic_maestro/mode", timeout=20)
+        rospy.wait_for_service("/dubins_traffic_maestro/mode", timeout=PATIENCE)
         self.mode = rospy.ServiceProxy("/dubins_traffic_maestro/mode", MMode)
         while self.out.get_num_connections() == 0:
             time.sleep(0.01)
@@ -94,7 +98,7 @@ class Client:
         started = self.mode(MModeRequest.START).result
         again = self.mode(MModeRequest.START).result
         with self.lock:
-            if not self.lock.wait_for(lambda: len(self.problems) > seen, 10):
+            if not self.lock.wait_for(lambda: len(self.problems) > seen, PATIENCE):
                 raise SystemExit("no instance")
         self.until(lambda: self.sent >= limit or not self.active)
         refused = self.act(action)
@@ -113,11 +117,9 @@ class Client:
         out = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
         message = ModelState(model_name="ego")
         message.pose.position.x, message.pose.orientation.w = 1.25, 1.0
-        for _ in range(100):
+        while self.ego is None or abs(self.ego.position.x - 1.25) > 1e-6:
             out.publish(message)
             time.sleep(0.05)
-            if self.ego is not None and abs(self.ego.position.x - 1.25) < 1e-6:
-                break
         return {"x": self.ego.position.x}
 
     def pause(self):
@@ -132,7 +134,7 @@ class Client:
 
     def until(self, done):
         with self.lock:
-            if not self.lock.wait_for(done, 30):
+            if not self.lock.wait_for(done, PATIENCE):
                 raise SystemExit("nothing comes")
 
     def act(self, action):
@@ -152,8 +154,7 @@ class Client:
             self.out.publish(Twist(linear=Twist().linear, angular=type(Twist().angular)(0, 0, math.nan)))
         if action == "flood":
             command = Twist()
-            until = time.time() + 4
-            while time.time() < until and self.active:
+            while self.active:
                 for _ in range(10):
                     self.out.publish(command)
                 time.sleep(0.001)
@@ -161,7 +162,7 @@ class Client:
 
 
 if __name__ == "__main__":
-    rospy.init_node("client", anonymous=True, disable_rosout=True)
+    rospy.init_node("client", anonymous=True, disable_rosout=True, disable_signals=True)
     client = Client()
     for argument in sys.argv[1:]:
         what, _, count = argument.partition(":")

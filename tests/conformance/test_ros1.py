@@ -5,13 +5,15 @@ from typing import Any
 
 import pytest
 
+from dubins_traffic.protocols import End, Mailbox
 from dubins_traffic.sessions.plan import rehearse
+from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
 from tests.conformance.ros_peer import Odometry, RosPeer
-from tests.conformance.transport import TransportConformance
+from tests.conformance.transport import SOON, TransportConformance, answer
 from tests.recordings import make_instance
 from tests.ros import need_ros
 
@@ -41,11 +43,8 @@ def uri(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 class Ros1Peer(RosPeer):
-    def __init__(self, rospy: Any, car: str) -> None:
-        self.rospy, self.car = rospy, car
-        super().__init__()
-
     def open(self) -> None:
+        self.rospy = self.transport.rospy
         m, self.came = load(), queue.SimpleQueue[str | Odometry]()
         topics = (
             ("/ego/odom", m.Odometry, self.move),
@@ -94,4 +93,27 @@ class TestRos1(TransportConformance):
         return Ros1(self.uri, clock=True)
 
     def connect(self, transport: Ros1, car: str) -> Ros1Peer:
-        return Ros1Peer(transport.rospy, car)
+        return Ros1Peer(transport, car)
+
+    @pytest.mark.parametrize("clock", [Lockstep(SOON), RealTime(2.0)], ids=["lockstep", "real time"])
+    def test_a_peer_that_dies_before_anyone_has_looked_is_lost(self, clock: Any) -> None:
+        self.ticks = 1200
+        self.make = lambda: Unwatched(self.uri, clock=True)
+        self.connect = Unseen
+        result = self.run(answer(until=5, then=lambda peer: peer.hang_up()), clock)
+        assert result.ending.end is End.PEER_LOST
+
+
+class Unseen(Ros1Peer):
+    """Nobody looks for it."""
+
+    def await_seen(self, there: bool) -> None:
+        """Don't wait."""
+
+
+class Unwatched(Ros1):
+    """As on a busy machine: who is there is looked at only when a peer does not answer."""
+
+    def open(self, mailbox: Mailbox) -> None:
+        super().open(mailbox)
+        self._watch.close()

@@ -10,9 +10,9 @@ from random import Random
 import pytest
 
 from dubins_traffic.logic.automaton import FALSE, TRUE, automaton
-from dubins_traffic.logic.formula import Formula, Op, until
-from dubins_traffic.logic.printer import Brackets, Style, written
+from dubins_traffic.logic.formula import Brackets, Formula, Op, Style, written
 from dubins_traffic.logic.rewrite import mapped
+from dubins_traffic.logic.temporal import until
 from dubins_traffic.logic.translation import in_ticks, until_and_release_only, written_out
 from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn

@@ -24,14 +24,13 @@ from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign import manifest
 from dubins_traffic.campaign.report.comparison import compare
-from dubins_traffic.campaign.report.metrics import METRICS
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.write import write_report
 from dubins_traffic.campaign.results import load_results
-from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.scoring.columns import REPORTED, SCORES
 from tests.campaigns import campaign, written
 from tests.integration.test_replay_page import CHROMIUM, DRIVER, FLAGS
 
@@ -121,14 +120,14 @@ def test_controllers_are_ranked_by_counted_rounds(folder: Path) -> None:
 
 
 def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
-    told = {line["metric"] for line in sheet(folder, "controllers.csv")}
+    compared = {line["metric"] for line in sheet(folder, "controllers.csv")}
     parts = {"breaches.", "breaches_of_others."}
     numbers = {
         name
-        for name, (kind, _) in SCORES.items()
-        if kind != "string" and not any(name.startswith(part) for part in parts)
+        for name, told in SCORES.items()
+        if told.column.kind != "string" and not any(name.startswith(part) for part in parts)
     }
-    assert told == numbers - {"excuse_sensed", "near"}
+    assert compared == numbers - {"excuse_sensed", "near"}
     means = {
         (line["controller"], line["metric"]): float(line["mean"]) for line in sheet(folder, "controllers.csv")
     }
@@ -234,10 +233,10 @@ def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:
     }
     assert "collisions_among_others" in silent
     (note,) = re.findall(r"No chart of what is 0 or absent everywhere: (.*?)\.</p>", text)
-    named = {metric.name for metric in METRICS if metric.column in silent}
+    named = {metric.label for metric in REPORTED if metric.name in silent}
     assert set(note.split("; ")) == named
     charts = re.findall(r'<img alt="([^"]*) against e-agents"', text)
-    assert set(charts) == {metric.heading for metric in METRICS if metric.column not in silent}
+    assert set(charts) == {metric.heading for metric in REPORTED if metric.name not in silent}
     assert 'alt="Collisions by fault"' in text
     assert "the egos had none" not in text
 

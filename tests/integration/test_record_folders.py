@@ -7,15 +7,21 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.runs.record_folder import Earlier, claim
+from dubins_traffic.runs.single import run_trial
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 CONFIG: dict[str, Any] = {
@@ -41,6 +47,14 @@ class Slow(Straight):
         return (0.3, 0.0)
 """
 RUN = ["run", "small.json", "--controller", "mine.py:Straight", "--json", "--records", "out"]
+SESSION = ["lines", "run", *RUN[1:], "--lockstep"]
+OVER = {
+    "lines": ["lines", "run"],
+    "lcm": ["lcm", "run"],
+    "ros1": ["ros1", "run", "--master"],
+    "ros1 under another maestro": ["ros1", "run", "--master", "--maestro-elsewhere"],
+    "ros2": ["ros2", "run"],
+}
 BATCH = [
     "batch",
     "small.json",
@@ -93,7 +107,19 @@ def test_a_folder_that_holds_records_is_refused_and_left(first, call, place):
     assert contents(place / "out") == before
 
 
-@pytest.mark.parametrize("command", [RUN, BATCH])
+@pytest.mark.parametrize("over", OVER)
+def test_sessions_refuse_a_folder_that_holds_records_before_they_open_anything(over, call, place):
+    assert call(*RUN)[0] == 0
+    before = contents(place / "out")
+    status, shown, err = call(*OVER[over], *RUN[1:])
+    assert (status, shown) == (2, [])
+    assert "out: holds trial-0000.mcap and 2 more; expected a folder without records; --overwrite" in err
+    assert "compil" not in err
+    assert call(*OVER[over], *RUN[1:], "--append", "--seed", "7")[0] == 2
+    assert contents(place / "out") == before
+
+
+@pytest.mark.parametrize("command", [RUN, BATCH, SESSION])
 def test_overwrite_removes_what_was_there(command, call, place):
     assert call(*command)[0] == 0
     (place / "out" / "notes.txt").write_text("mine")
@@ -105,7 +131,7 @@ def test_overwrite_removes_what_was_there(command, call, place):
     assert (place / "out" / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("command", [RUN, BATCH])
+@pytest.mark.parametrize("command", [RUN, BATCH, SESSION])
 def test_append_goes_on_and_ends_in_the_same_bytes(command, call, place):
     assert call(*command)[0] == 0
     whole = contents(place / "out")
@@ -113,15 +139,15 @@ def test_append_goes_on_and_ends_in_the_same_bytes(command, call, place):
     cut = place / "out" / "trial-0002.mcap"
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
     status, shown, err = call(*command, "--append")
-    assert (status, shown) == (0, [1, 2] if command is RUN else [0, 1, 2])
+    assert (status, shown) == (0, [0, 1, 2] if command is BATCH else [1, 2])
     assert contents(place / "out") == whole
-    if command is RUN:
-        assert "1 trials have their records in out; 2 are left" in err
+    if command is not BATCH:
+        assert "1 trials have their records in out" in err
     assert call(*command, "--append", "--trials", "4")[0] == 0
     assert sorted(contents(place / "out")) == [*sorted(whole), "trial-0003.mcap"]
 
 
-@pytest.mark.parametrize("command", [RUN, BATCH])
+@pytest.mark.parametrize("command", [RUN, BATCH, SESSION])
 @pytest.mark.parametrize(
     ("change", "needle"),
     [
@@ -140,6 +166,26 @@ def test_append_refuses_records_of_another_run(command, change, needle, call, pl
     assert (status, shown) == (2, [])
     assert needle in err
     assert contents(place / "out") == before
+
+
+def test_a_session_goes_on_with_the_repetition_that_was_broken_off(place):
+    out = place / "out"
+    out.mkdir()
+    for name in ("0000", "0000-1", "0001", "0001-1", "0001-2", "0002", "0003-1"):
+        (out / f"trial-{name}.mcap").touch()
+    (out / "mine.mcap").touch()
+    whole = {f"trial-{name}.mcap" for name in ("0000", "0000-1", "0001", "0001-1", "0002")}
+    assert Earlier.of(out, frozenset(whole)) == Earlier(frozenset({0, 2}), {1: 2, 3: 1})
+
+
+def test_records_of_cars_that_were_put_elsewhere_are_of_the_same_session(place):
+    drawn = draw(load_config(CONFIG), 0, 0)
+    moved = replace(drawn, starts=(Pose(1.25, 0.0, 1.0, 0.0),))
+    (place / "out").mkdir()
+    run_trial(moved, "simple", record=place / "out" / "trial-0000.mcap")
+    with pytest.raises(InputError, match="another instance"):
+        claim(place / "out", "simple", lambda _: drawn, append=True)
+    assert claim(place / "out", "simple", lambda _: drawn, append=True, placed=True) == {"trial-0000.mcap"}
 
 
 def test_runs_of_one_instance_append_too(call, place):
@@ -169,17 +215,25 @@ def test_runs_of_one_instance_append_too(call, place):
         (["--records", "out", "--append", "-f", "data.json"], ["--append, -f", "both at once"]),
     ],
 )
-def test_choices_that_make_no_sense_are_refused(options, needles, call, place):
-    status, _, err = call("run", "small.json", *options)
+@pytest.mark.parametrize("command", [["run"], ["lines", "run"]])
+def test_choices_that_make_no_sense_are_refused(command, options, needles, call, place):
+    status, _, err = call(*command, "small.json", *options)
     assert status == 2
     assert all(needle in err for needle in needles)
     assert not (place / "data.json").exists()
 
 
-def test_a_second_run_into_one_folder_is_refused_until_the_first_has_ended(call, place):
+def test_trials_of_another_maestro_are_not_appended(call):
+    status, _, err = call(*OVER["ros1 under another maestro"], *RUN[1:], "--append")
+    assert status == 2
+    assert "--maestro-elsewhere, --append: both at once" in err
+
+
+@pytest.mark.parametrize("first", [["run"], ["lines", "run"]])
+def test_a_second_run_into_one_folder_is_refused_until_the_first_has_ended(first, call, place):
     command = [
         *COMMAND,
-        "run",
+        *first,
         "small.json",
         "--controller",
         "mine.py:Slow",
@@ -188,19 +242,20 @@ def test_a_second_run_into_one_folder_is_refused_until_the_first_has_ended(call,
         "--records",
         "out",
     ]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
         try:
             until = time.monotonic() + 300
             while not list(place.glob("out/*.mcap")):
                 assert time.monotonic() < until
-                assert first.poll() is None
+                assert running.poll() is None
                 time.sleep(0.05)
             for extra in (["--append"], ["--overwrite"], []):
-                status, _, err = call(*RUN, *extra)
-                assert status == 2
-                assert "out: in use by another process" in err
+                for other in (RUN, SESSION):
+                    status, _, err = call(*other, *extra)
+                    assert status == 2
+                    assert "out: in use by another process" in err
         finally:
-            first.send_signal(signal.SIGKILL)
+            running.send_signal(signal.SIGKILL)
     assert call(*RUN, "--overwrite")[0] == 0
 
 

@@ -193,7 +193,7 @@ def test_an_ego_over_ros_drives_under_the_shield(ros: Graph, tmp_path: Path) -> 
 def test_faulty_clients_end_their_trials_and_the_session_goes_on(ros: Graph, tmp_path: Path) -> None:
     records = tmp_path / "out"
     config = configuration(tmp_path, duration=30.0, number_trials=5)
-    session = ros.session(config, "--records", records, "--silence", "1.5")
+    session = ros.session(config, "--records", records, "--silence", "5")
     for number, action in enumerate(("die:5", "stop:5", "flood:5", "nan:5")):
         client = ros.client(action)
         _wait_for_end(records, number)
@@ -254,6 +254,40 @@ def test_a_session_whose_node_is_displaced_ends(ros: Graph, tmp_path: Path, runn
     assert "shut this node down" in err
     assert "new node registered with same name" in err
     assert ends(records) == ({"trial-0000": End.TRANSPORT_LOST} if running else {})
+
+
+DISPLACED = """
+import threading
+import time
+from dubins_traffic.protocols import End, Ending
+from dubins_traffic.transports.inbox import Inbox
+from dubins_traffic.transports.ros1.node import join
+from dubins_traffic.transports.ros1.transport import Ros1
+from tests.recordings import make_instance
+
+class Heard(Inbox):
+    def stop(self, end, detail):
+        super().stop(end, detail)
+        print(end.value, detail, flush=True)
+
+rospy = join({uri!r})
+rospy.core.add_preshutdown_hook(lambda reason: time.sleep(1.0))
+heard, transport = Heard(1000), Ros1({uri!r})
+transport.open(heard)
+transport.begin(make_instance(names=("agent0",)), ["ego"])
+shutdown = threading.Thread(target=rospy.signal_shutdown, args=("another has its name",))
+shutdown.start()
+while shutdown.is_alive():
+    transport.end(Ending(End.RESET, 0, ""))
+"""
+"""A session that publishes all the time while the master shuts its node down, which closes all topics first."""
+
+
+def test_who_is_displaced_says_so_however_much_it_publishes_meanwhile(ros: Graph) -> None:
+    session = ros.start([sys.executable, "-c", DISPLACED.format(uri=ros.uri)])
+    status, out, err = finish(session)
+    assert status == 0, err
+    assert out == "transport_lost the ROS master has shut this node down: another has its name\n"
 
 
 def test_two_programs_that_drive_one_car_are_told_of_at_once_and_counted(ros: Graph, tmp_path: Path) -> None:

@@ -17,17 +17,9 @@ from dubins_traffic.logic.exports import (
     tlsf,
     tulip,
 )
-from dubins_traffic.logic.formula import Formula, FormulaError, conj, implies
+from dubins_traffic.logic.formula import ASCII, Brackets, Formula, FormulaError, Style, conj, implies, written
 from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import (
-    ASCII,
-    SPIN,
-    Brackets,
-    Style,
-    written,
-    written_implication,
-    written_together,
-)
+from dubins_traffic.logic.printer import SPIN, written_implication, written_together
 from tests.formulas import drawn
 from tests.grammars import slugs_sections, tlsf_sections
 

@@ -13,25 +13,28 @@ from dubins_traffic.logic.formula import (
     TRUE,
     Formula,
     FormulaError,
-    always,
     conj,
     disj,
-    eventually,
     iff,
     implies,
     negation,
-    next_,
-    once,
     prop,
     propositions,
+    to_ascii,
+)
+from dubins_traffic.logic.parse import parse
+from dubins_traffic.logic.printer import to_spin
+from dubins_traffic.logic.temporal import (
+    always,
+    eventually,
+    next_,
+    once,
     release,
     since,
     until,
     weak_until,
     yesterday,
 )
-from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import to_ascii, to_spin
 
 a, b, c, d = map(prop, "abcd")
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide
+from dubins_traffic.agents.own import OwnAgents
 from dubins_traffic.agents.tables import (
     AIMED,
     BEGIN,
@@ -45,12 +46,12 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
-from dubins_traffic.protocols import Driver
+from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN, parameters_of
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
+    from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import EAgent, Instance
 
 AS_FAR_AS_2016 = 3.5
@@ -92,8 +93,10 @@ class Fleet:
         self._counter = _counter() if COUNTER in kinds else None
         if self._counter is not None:
             self._counter.reset(instances, state)
-        elsewhere = KEEP_RULES | {COUNTER, REMOTE}
-        self._others = not kinds <= elsewhere
+        self._own = OwnAgents() if OWN in kinds else None
+        if self._own is not None:
+            self._own.reset(instances, state)
+        self._others = not kinds <= KEEP_RULES | ALONE
         self._roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
@@ -115,10 +118,20 @@ class Fleet:
             self._lawful.decide(tick, state, labels, commands)
         if self._counter is not None:
             self._counter.decide(tick, state, labels, commands)
+        if self._own is not None:
+            self._own.decide(tick, state, labels, commands)
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return what the cars that play a counterstrategy have to say."""
-        return () if self._counter is None else self._counter.report()
+        """Return what the cars that play a counterstrategy and the user's own have to say."""
+        told = () if self._counter is None else self._counter.report()
+        return told if self._own is None else (*told, *self._own.report())
+
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._agents.seed[:] = seed
+        for team in (self._lawful, self._counter, self._own):
+            if team is not None:
+                team.reseed(seed)
 
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
@@ -146,7 +159,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     floats = np.zeros((trials, cars, FLOATS))
     cycle: list[int] = []
     script: list[tuple[float, float, float]] = []
-    elsewhere = KEEP_RULES | {COUNTER, REMOTE}
+    elsewhere = KEEP_RULES | ALONE
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
     kinds = [{agent.kind for agent in instances[b].e_agents} for b in fleets]
     driven = np.array([not own <= elsewhere for own in kinds])[whose]
@@ -174,7 +187,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     )
 
 
-def _lawful() -> Driver:
+def _lawful() -> Lawful:
     """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
     from dubins_traffic.agents.lawful import Lawful
 

@@ -1,1 +1,1 @@
-"""Many trials, and the place where a trial is put together from its parts."""
+"""Campaigns: many trials by one file, run in chunks, kept in a folder, compared in a report."""

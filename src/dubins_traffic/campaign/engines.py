@@ -34,5 +34,5 @@ class Engine(Protocol):
         ...
 
     def close(self) -> None:
-        """Give up what is under way and free everything."""
+        """Interrupt the chunks under way and free all resources."""
         ...

@@ -1,4 +1,4 @@
-"""Factors of a campaign: what a value of each does to a trials configuration, and how it is told in tables."""
+"""Factors of a campaign: what a value of each changes in a trials configuration, and its text in tables."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _check_known(path: str, steps: Sequence[str | int]) -> None:
 
 
 def scalar(value: Any) -> Scalar:
-    """Return how a table tells the value of a factor: numbers, switches and texts as they are, else in words."""
+    """Return the value of a factor as a table has it: numbers, switches and texts as they are, else in words."""
     if isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, Mapping):

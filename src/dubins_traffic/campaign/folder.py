@@ -45,7 +45,7 @@ class Folder:
             return [(0, self.campaign.total)]
         found: list[tuple[int, int]] = []
         for first, end, path in parts(self.path):
-            if table.is_part(path, end - first):
+            if table.is_part(path, end - first, self.campaign.columns):
                 found.append((first, end))
             else:
                 path.unlink()
@@ -167,7 +167,7 @@ def _make(folder: Path) -> None:
 
 
 def _check_empty(folder: Path) -> None:
-    """Refuse a folder that holds anything but what a campaign leaves that was cut off before its manifest."""
+    """Refuse a folder that holds other files than a campaign leaves that was cut off before its manifest."""
     ours = {LOCK, manifest.CAMPAIGN}
     for name in sorted(path.name for path in folder.iterdir()):
         if name not in ours and not name.endswith(".tmp"):

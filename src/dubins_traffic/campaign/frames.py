@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.engine.batch import Batch
 from dubins_traffic.runs.single import Result
+from dubins_traffic.scoring.columns import SCORES
 from dubins_traffic.scoring.score import Score, ScoreSheet
 
 
@@ -25,4 +25,5 @@ def rows_of(subject: object) -> list[dict[str, Any]]:
 
 def _row(score: Score) -> dict[str, Any]:
     identity = {name: getattr(score, name) for name in ("trial", "seed", "controller", "record", "end")}
-    return {**identity, **{name: value(score) for name, (_, value) in SCORES.items()}}
+    scores = {name: told.of(score) for name, told in SCORES.items()}
+    return {**identity, **scores, **{own.column.name: own.value for own in score.metrics}}

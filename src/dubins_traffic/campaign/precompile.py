@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from time import sleep
 from typing import Any
 
-from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.errors import InputError
@@ -97,9 +97,9 @@ def _rehearsals(*, everything: bool) -> Iterator[Callable[[], object]]:
     noise = Disturbances(0.01, 0.01, 1, 0.1)
     yield partial(run_trial, replace(town, problem=problem, disturbances=noise), "lanes")
     yield partial(_checked, town)
-    for instance in course().values():
+    for instance in scenarios().values():
         yield partial(run_trial, _brief(instance), "lanes")
-    yield partial(_game, course()["dead ends"])
+    yield partial(_game, scenarios()["dead ends"])
 
 
 def _brief(instance: Instance) -> Instance:

@@ -92,7 +92,7 @@ class _Sender:
 
 
 def _beat(ray: Any, send: _Sender, over: threading.Event) -> None:
-    """Tell how many processors the cluster has, as long as its head answers and the work is not over."""
+    """Send the number of the cluster's processors every second, as long as its head answers and chunks may come."""
     gone = (BrokenPipeError, ray.exceptions.RayError)  # nobody is left to tell, or nothing but silence
     with contextlib.suppress(*gone):
         while not over.is_set():
@@ -114,7 +114,7 @@ class _Driver:
         threading.Thread(target=self._listen, args=(pipe,), daemon=True).start()
 
     def run(self) -> None:
-        """Run chunks until there is nobody to run them for."""
+        """Run chunks until the other end of the pipe is closed."""
         while (event := self._events.get()) is not None:
             number, what = event
             if isinstance(what, bytes):

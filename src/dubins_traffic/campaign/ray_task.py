@@ -1,4 +1,4 @@
-"""What a worker of a Ray cluster is asked to do.
+"""The task of a worker of a Ray cluster: one chunk.
 
 The process that drives Ray names it and hands chunks on as they came, so that it need not load what runs them.
 """

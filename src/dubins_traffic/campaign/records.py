@@ -52,7 +52,7 @@ class Records:
         return self.keep is not Keep.FAILURES or is_failure(row)
 
     def check(self) -> None:
-        """Refuse to run where the folder is another than the campaign's."""
+        """Raise an error if the records' folder is not that of the campaign."""
         if not (self.campaign / FOLDER).is_dir():
             raise DubinsTrafficError(
                 f"{self.campaign} is not on this machine; records need a folder that all machines share"

@@ -1,4 +1,4 @@
-"""Running a campaign in its folder: begun, cut off, resumed, finished."""
+"""A campaign is run in its folder from its beginning, or resumed from where it was cut off."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def lost(own: Spacing, b: int, tick: int) -> float:
 
 @jit_inline
 def ticks_within(distance: float, own: Spacing, b: int) -> int:
-    """Return for how many ticks, at least 1, no car of trial b drives `distance` metres; 1 if nothing is known."""
+    """Return for how many ticks, at least 1, no car of trial b drives `distance` (m); 1 if nothing is known."""
     if distance <= own.drift[b] or own.drift[b] <= 0.0:
         return 1
     return int(min(distance / own.drift[b], LONG))
@@ -160,7 +160,7 @@ def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Int
 
 @jit
 def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, own: Spacing) -> int:
-    """Write all cars of trial b that may be within `far` of a point into `own.near`; return how many."""
+    """Write all cars of trial b that may be within `far` (m) of a point into `own.near`; return how many."""
     size = own.head.shape[1]
     count = 0
     if size == 0 or far + (tick - own.since[b]) * own.drift[b] > CELL:
@@ -193,8 +193,9 @@ def candidates(
 ) -> int:
     """Write the pairs of trial b that may meet into `pair` (P, 2) and return how many there are.
 
-    Cars i < j whose centres are nearer than `distance`, and (i, -1 - p) for obstacle part p whose reach plus
-    `margin` holds the centre of i. If more than P, the surplus is counted but not written.
+    Cars i < j whose centres are nearer than `distance` (m), and (i, -1 - p) for obstacle part p whose reach plus
+    `margin` (m) holds the centre of i. If more than P, the surplus is counted but not written. `head` (H,), H a power
+    of two, `link` (N,) and `cell` (N, 2) are scratch.
     """
     if state.count[b] <= FEW:
         found = _all_pairs(state, b, distance, pair)

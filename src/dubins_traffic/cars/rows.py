@@ -25,7 +25,7 @@ TOGETHER = 4
 
 
 class Rows(NamedTuple):
-    """Constants of a batch, one value per trial (B,), but for `alike`, `mask` and `close`.
+    """Constants of a batch, one value per trial (B,), except `alike`, `mask` and `close`.
 
     `low`, `high`: bounds on the speed; `most`, `slack`, `curvature`: |yaw| <= min(most, slack + curvature |speed|);
     `far`: how far from its centre a car may reach in one tick; `near`: square of the distance of the centres within
@@ -76,9 +76,9 @@ def _alike(columns: Floats) -> Ints:
 
 @jit
 def clip(r: Rows, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int) -> None:
-    """Clip the commands (B * N, 2) of the cars first..last - 1, all like those of trial b, in place.
+    """Clip the commands (B * N, 2) of the cars `first` (index) to before `last` (index), all like those of trial b.
 
-    The speed is clipped first; both also go to the rows `speed` and `yaw`.
+    In place; the speed is clipped first. Both also go to `speed` (B * N,), m/s, and `yaw` (B * N,), rad/s.
     """
     low, high, most, slack, curvature = r.low[b], r.high[b], r.most[b], r.slack[b], r.curvature[b]
     own, speed, yaw = commands[first:last], speed[first:last], yaw[first:last]
@@ -94,7 +94,10 @@ def clip(r: Rows, b: int, commands: Floats, speed: Floats, yaw: Floats, first: i
 
 @jit
 def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -> int:
-    """Set `close` for each of the cars first..last - 1 that may meet a later one of its trial; return how many."""
+    """Set `Rows.close` for each car that may meet a later one of its trial; return how many.
+
+    The cars are `first` (index) to before `last` (index) of `x` (B * N,) and `y` (B * N,), metres; n to a trial.
+    """
     count = last - first
     close = r.close[:count]
     near = r.near[b]
@@ -116,7 +119,10 @@ def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -
 
 @jit
 def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
-    """Tell whether the squared distance of any two of the first `cars` cars is less than `near`."""
+    """Tell whether any two of the first `cars` (count) cars are nearer to each other than the root of `near` (m^2).
+
+    `x` (N,) and `y` (N,) are their centres, metres.
+    """
     close = 0
     for i in range(cars - 1):
         for j in range(i + 1, cars):
@@ -130,7 +136,11 @@ def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
 def move(
     x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float, first: int, last: int
 ) -> None:
-    """Move the cars first..last - 1 along their arcs for `dt` seconds."""
+    """Move the cars `first` (index) to before `last` (index) along their arcs for `dt` seconds.
+
+    `x` (B * N,) and `y` (B * N,) are centres, metres; `c` (B * N,) and `s` (B * N,) headings; `speed` (B * N,), m/s,
+    and `yaw` (B * N,), rad/s, what they hold.
+    """
     x, y, c, s = x[first:last], y[first:last], c[first:last], s[first:last]
     speed, yaw = speed[first:last], yaw[first:last]
     for f in range(last - first):
@@ -139,7 +149,7 @@ def move(
 
 @jit
 def move_fours(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
-    """Do as `move`, for all places of one trial.
+    """Do as `move`, for all places of one trial: `x` (N,), `y` (N,), `c` (N,), `s` (N,), `speed` (N,), `yaw` (N,).
 
     Four cars are written out, which become one instruction each; a loop would take more at a time than a trial has.
     """

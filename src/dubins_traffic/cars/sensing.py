@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import NONE, Labels, State
+from dubins_traffic.cars.state import NONE, STATE_END, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
@@ -17,14 +17,13 @@ from dubins_traffic.kernels.trig import sincos
 
 POSITION_DRAW = 200
 HEADING_DRAW = 206
-STATE_END = len(State._fields)
 SEEN_REALS = 6
 SEEN_WHOLES = 6
 
 
 @jit
 def neighbours(b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, *arrays: Any) -> int:
-    """Write the viewer and then the other cars within `radius` of it, by index, into two arrays; return the number.
+    """Write car `viewer` (index), then the others within `radius` (m), by index, into two arrays; return how many.
 
     A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
     segment, at, crosses, lane, bits, and the first row that is free begins with NONE. `arrays` are those of State and
@@ -74,7 +73,10 @@ def _view(state: State, labels: Labels, b: int, n: int, reals: Floats, wholes: I
 def blur(
     reals: Floats, wholes: Ints, count: int, seed: Any, trial: int, tick: int, position: float, heading: float
 ) -> None:
-    """Add noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad)."""
+    """Add noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad).
+
+    The first `count` (count) rows of `reals` (N, SEEN_REALS) and `wholes` (N, SEEN_WHOLES) are those of `neighbours`.
+    """
     for k in range(count):
         row = reals[k]
         car = wholes[k, 0]
@@ -98,9 +100,11 @@ def ray_box(
     b: float,
     r: float,
 ) -> float:
-    """Return how far the ray from (px, py) along the unit vector (ex, ey) goes to a rounded box, or NEVER.
+    """Return how far the ray from (px, py) along a unit vector goes to a rounded box, metres, or NEVER.
 
-    A rounded box is the union of two crossed boxes and four discs at the corners. 0 if the ray begins inside.
+    The vector has the components `ex` (unit) and `ey` (unit); the box has half length `a` (m), half width `b` (m) and
+    rounding `r` (m). A rounded box is the union of two crossed boxes and four discs at the corners. 0 if the ray begins
+    inside.
     """  # fmt: skip
     dx = px - x
     dy = py - y
@@ -160,10 +164,10 @@ def scan(
     longest: float,
     ranges: Floats,
 ) -> None:
-    """Write the laser ranges of car `viewer` in metres into `ranges` (R,).
+    """Write the laser ranges of car `viewer` (index) in metres into `ranges` (R,).
 
     `rays` (R, 2) are unit vectors in the car's frame. As REP 117 of ROS says, a ray that meets nothing within
-    `longest` reads +inf, and one that meets something nearer than `shortest` reads -inf.
+    `longest` (m) reads +inf, and one that meets something nearer than `shortest` (m) reads -inf.
     """  # fmt: skip
     x, y = state.x[b, viewer], state.y[b, viewer]
     c, s = state.c[b, viewer], state.s[b, viewer]

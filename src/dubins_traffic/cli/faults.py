@@ -1,4 +1,4 @@
-"""What becomes of an error: one line for people, an exit status for machines."""
+"""How errors end a command: one line for people, an exit status for machines."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:
 
 
 def _hang_up() -> int:
-    """Let what is still to be printed go nowhere: the reader of our output had enough, which is no error."""
+    """Discard what is still to be printed: the reader of standard output has closed it, which is no error."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.__stdout__ or sys.stdout).fileno())
     return OK

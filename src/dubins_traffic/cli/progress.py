@@ -1,4 +1,4 @@
-"""How far something has come, for people."""
+"""Progress bars for people, on standard error."""
 
 from __future__ import annotations
 

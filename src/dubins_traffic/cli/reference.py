@@ -53,8 +53,8 @@ def _part(name: str) -> str:
 
 
 def _more(remarks: Iterable[str], parameters: Sequence[Parameter]) -> str:
-    told = "".join(f" ({remark})" for remark in remarks)
-    return told + ("\n\n" + "\n".join(_table(parameters)) if parameters else "")
+    text = "".join(f" ({remark})" for remark in remarks)
+    return text + ("\n\n" + "\n".join(_table(parameters)) if parameters else "")
 
 
 def _table(parameters: Iterable[Parameter]) -> list[str]:

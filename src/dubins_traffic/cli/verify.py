@@ -69,7 +69,7 @@ def verify(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """Go through recorded trials again, and say what in a record is not what happened.
+    """Simulate recorded trials again, and say what in a record is not what happened.
 
     Trials of our simulator are run again from instance and recorded commands, and all is compared bit for bit. Exit
     status: 0 if all are verified, 1 if one differs, 2 if one can't be read.

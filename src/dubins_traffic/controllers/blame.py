@@ -34,20 +34,20 @@ _LABEL = re.compile(r"\b_controller_(\w+)_[0-9a-f]{1,8}\b")
 _CELL = re.compile(r"ipykernel_\d+[\\/]|^<ipython-input")
 
 
-def told(error: BaseException, tick: int | None = None) -> str:
+def error_text(error: BaseException, tick: int | None = None) -> str:
     """Return kind and message of what a controller raised, when, and the last lines of its own that led there.
 
     Examples
     --------
-    >>> told(ValueError("lost"), 7)
+    >>> error_text(ValueError("lost"), 7)
     'ValueError: lost at tick 7'
     """
     when = "" if tick is None else f" at tick {tick}"
     lines = [] if isinstance(error, DubinsTrafficError) else list(_own_lines(error.__traceback__))[-LINES:]
-    return f"{_named(error)}{when}{_told_lines(lines)}"
+    return f"{_named(error)}{when}{_lines_text(lines)}"
 
 
-def said(value: object, limit: int = LONGEST) -> str:
+def value_text(value: object, limit: int = LONGEST) -> str:
     """Return what `value` is as a line of text, whatever its `repr` does."""
     return _clean(_text(repr, value), limit)
 
@@ -58,7 +58,7 @@ def show(error: BaseException) -> None:
         traceback.print_exception(error)
 
 
-def _told_lines(lines: list[str]) -> str:
+def _lines_text(lines: list[str]) -> str:
     return f" ({' > '.join(lines)})" if lines else ""
 
 

@@ -69,7 +69,7 @@ class Shield:
         given = self.shield_filter.filter(observation, asked)
         found = self.shield_filter.intervention
         if found is not None:
-            self._events.append((SHIELD, told(found.asked, found.given, found.reason)))
+            self._events.append((SHIELD, override_text(found.asked, found.given, found.reason)))
         return given
 
     def report(self) -> Sequence[tuple[str, str]]:
@@ -84,7 +84,7 @@ class Shield:
             self._controller.close()
 
 
-def told(asked: tuple[float, float], given: tuple[float, float], reason: str) -> str:
+def override_text(asked: tuple[float, float], given: tuple[float, float], reason: str) -> str:
     """Return the detail of an event: asked and given commands in m/s and rad/s, and the rule at stake."""
     numbers = [f"({speed:.6g}, {yaw_rate:.6g})" for speed, yaw_rate in (asked, given)]
     return f"{reason}: asked {numbers[0]}, given {numbers[1]}"

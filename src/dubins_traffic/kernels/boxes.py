@@ -26,7 +26,7 @@ _CAP = 4096
 
 @jit
 def corner(k: int, x: float, y: float, c: float, s: float, a: float, b: float) -> tuple[float, float]:
-    """Return corner k = 0..3 of a box without its rounding."""
+    """Return corner `k` (0 to 3) of a box of half length `a` (m) and half width `b` (m), without its rounding."""
     p = a if k < 2 else -a
     q = b if k % 2 == 0 else -b
     return x + (p * c - q * s), y + (p * s + q * c)
@@ -36,7 +36,7 @@ def corner(k: int, x: float, y: float, c: float, s: float, a: float, b: float) -
 def nearest_in_box(
     px: float, py: float, x: float, y: float, c: float, s: float, a: float, b: float
 ) -> tuple[float, float]:
-    """Return the point of a box without its rounding that is nearest to (px, py)."""
+    """Return the point nearest to (px, py) of a box without its rounding: half length `a` (m), half width `b` (m)."""
     dx = px - x
     dy = py - y
     u = min(max(dx * c + dy * s, -a), a)
@@ -163,7 +163,7 @@ def disc_contact(
     begin: float,
     end: float,
 ) -> float:
-    """Return the first instant in [begin, end] at which two moving discs touch and close, or NEVER.
+    """Return the first instant from `begin` (s) to `end` (s) of a tick at which two discs touch and close, or NEVER.
 
     Disc i starts the tick at (xi, yi, ci, si), holds (ui, wi) until `untili` and stands from then on; `reach` is
     the sum of the radii. The distance of the centres bends downward by at most the sum of the accelerations
@@ -267,7 +267,7 @@ def box_contact(
     begin: float,
     end: float,
 ) -> float:
-    """Return the first instant in [begin, end] at which two moving rounded boxes touch and close, or NEVER.
+    """Return the first instant from `begin` (s) to `end` (s) at which two rounded boxes touch and close, or NEVER.
 
     As `disc_contact`: along the normal between the nearest features, the gap of every two corners is bounded
     below by a parabola, and the step is the least of their roots.

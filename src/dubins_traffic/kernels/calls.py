@@ -78,6 +78,9 @@ class _Steady(Generic[R]):
         self._kinds: tuple[Kind, ...] = ()
         self._seen: dict[int, tuple[Any, Kind, int, list[Any]]] = {}
 
+    def __deepcopy__(self, memo: object) -> _Steady[R]:
+        return _Steady(self._kernel)
+
     def __call__(self, *args: Any) -> R:
         if self._kernel.is_waiting:
             return self._kernel.interpreted(*args)

@@ -320,8 +320,11 @@ def _compare_quickly() -> None:
     def is_equal(one: Any, other: Any) -> Any:
         return (type(one) is type(other) and one._values == other._values) or thorough(one, other)
 
+    def same_for_all(_one: Any) -> int:
+        return 1
+
     settings.__eq__ = is_equal
-    settings.__hash__ = lambda _one: 1
+    settings.__hash__ = same_for_all
 
 
 def _index_plainly() -> None:

@@ -24,7 +24,15 @@ GRID = 2.0**-53
 
 @jit
 def block(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> tuple[Any, Any, Any, Any]:
-    """Return four random 32-bit words, as uint64; `seed` is a uint64."""
+    """Return four random 32-bit words, as uint64.
+
+    Parameters
+    ----------
+    seed : uint64
+        The seed of all random numbers, 0 to 2**64 - 1.
+    trial, car, tick, draw : uint64
+        The counter: trial and car by their numbers, the tick, and which of the numbers drawn in it; each below 2**32.
+    """
     return philox4x32(
         np.uint64(trial), np.uint64(car), np.uint64(tick), np.uint64(draw), seed & LOW, seed >> HALF
     )
@@ -32,14 +40,28 @@ def block(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> tuple[Any, A
 
 @jit
 def uniform(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> float:
-    """Return a float in [0, 1), on a grid of 2**-53."""
+    """Return a float in [0, 1), on a grid of 2**-53.
+
+    Parameters
+    ----------
+    seed, trial, car, tick, draw : uint64
+        The seed and the counter, numbers as in `block`.
+    """
     a, b, _, _ = block(seed, trial, car, tick, draw)
     return np.float64((a << UP) | (b >> DOWN)) * GRID
 
 
 @jit
 def below(seed: Any, trial: Any, car: Any, tick: Any, draw: Any, bound: Any) -> Any:
-    """Return an integer in [0, bound); bound <= 2**16, so that the bias is below 2**-16 per value."""
+    """Return an integer in [0, bound).
+
+    Parameters
+    ----------
+    seed, trial, car, tick, draw : uint64
+        The seed and the counter, numbers as in `block`.
+    bound : uint64
+        A number <= 2**16, so that the bias is below 2**-16 per value.
+    """
     a, _, _, _ = block(seed, trial, car, tick, draw)
     return np.int64((a * np.uint64(bound)) >> HALF)
 
@@ -48,6 +70,11 @@ def below(seed: Any, trial: Any, car: Any, tick: Any, draw: Any, bound: Any) -> 
 def bell(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> float:
     """Return a number of mean 0 and variance 1, close to normal and bounded by 6: the sum of twelve uniform
     32-bit fractions less 6 (Irwin-Hall). Uses the draws `draw`, `draw` + 1 and `draw` + 2.
+
+    Parameters
+    ----------
+    seed, trial, car, tick, draw : uint64
+        The seed and the counter, numbers as in `block`.
     """
     total = 0.0
     for k in range(3):

@@ -14,7 +14,7 @@ sincos = jit(_plain_sincos)
 
 @jit
 def arc_factors(d: float) -> tuple[float, float]:
-    """Return (sin d / d, (1 - cos d) / d) for |d| <= 1/2, by Taylor polynomials (error below 1e-17)."""
+    """Return (sin d / d, (1 - cos d) / d) for `d` (rad), |d| <= 1/2, by Taylor polynomials (error below 1e-17)."""
     z = d * d
     along = S9 + z * (S11 + z * (S13 + z * S15))
     along = 1.0 + z * (S3 + z * (S5 + z * (S7 + z * along)))

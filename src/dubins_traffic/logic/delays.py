@@ -16,7 +16,6 @@ from dubins_traffic.logic.formula import (
     FUTURE,
     Formula,
     Op,
-    always,
     disj,
     implies,
     make,
@@ -24,9 +23,9 @@ from dubins_traffic.logic.formula import (
     prop,
     propositions,
     subformulas,
-    ticks,
 )
 from dubins_traffic.logic.obligations import Table
+from dubins_traffic.logic.temporal import always, ticks
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Final, TypeAlias
 
 from dubins_traffic.logic.formula import FormulaError
+from dubins_traffic.logic.letters import Letter
 from dubins_traffic.logic.moves import PUT_OFF, Stepper
-from dubins_traffic.logic.obligations import Letter
 
 MAX_STATES: Final = 20_000
 """Most states of the Büchi automaton of one part."""

@@ -13,28 +13,23 @@ from typing import Final
 
 from dubins_traffic.logic.formula import (
     Bounds,
+    Brackets,
     Formula,
     FormulaError,
     Op,
-    always,
+    Style,
     conj,
     implies,
     make,
+    number,
     propositions,
     subformulas,
-    ticks,
+    written,
 )
 from dubins_traffic.logic.gr1 import gr1, slugs_text, tulip_text
-from dubins_traffic.logic.printer import (
-    SPIN,
-    Brackets,
-    Style,
-    number,
-    written,
-    written_implication,
-    written_together,
-)
+from dubins_traffic.logic.printer import SPIN, written_implication, written_together
 from dubins_traffic.logic.rewrite import mapped
+from dubins_traffic.logic.temporal import always, ticks
 from dubins_traffic.logic.translation import (
     MAX_NEXT,
     for_signals,

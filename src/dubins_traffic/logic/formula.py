@@ -1,34 +1,15 @@
 """Formulas of linear temporal logic with past and bounded operators, over named propositions.
 
 Formulas are immutable and shared: equal formulas are one object, so `==` and `hash` cost nothing. Conjunctions and
-disjunctions have any number of parts and never stand directly inside one of their own kind.
-
-========  =====================  =================================================================
-letter    function               meaning at position t of an infinite word
-========  =====================  =================================================================
-``X``     `next_`                p holds at t + 1
-``F``     `eventually`           p holds now or later; with bounds [a, b], within them
-``G``     `always`               p holds from now on; with bounds [a, b], at all positions in them
-``U``     `until`                q holds now or later (within the bounds), and p until then
-``R, V``  `release`              not (not p U not q)
-``W``     `weak_until`           p U q, or p for ever
-``M``     `strong_release`       q U (p and q)
-``Y``     `yesterday`            t > 0, and p held at t - 1
-``Z``     `weak_yesterday`       t = 0, or p held at t - 1
-``O``     `once`                 p holds now or held before
-``H``     `historically`         p holds now and held always before
-``S``     `since`                q holds now or held before, and p has held since
-``T``     `trigger`              not (not p S not q)
-========  =====================  =================================================================
-
-Bounds are in seconds. At period T the bound d means ceil(d/T - 1e-9) ticks.
+disjunctions have any number of parts and never stand directly inside one of their own kind. What each temporal
+operator means stands in `dubins_traffic.logic.temporal`. A formula is printed in letters: ``G (a -> F b)``.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from threading import Lock
 from typing import Any, Final, TypeAlias
@@ -40,8 +21,6 @@ MAX_DEPTH: Final = 100
 """Deepest nesting of operators in a formula."""
 MAX_SIZE: Final = 20_000
 """Most operators and propositions in a formula written out."""
-LONGEST_BOUND: Final = 1e9
-"""Longest bound, seconds: some thirty years."""
 
 Bounds: TypeAlias = tuple[float, float]
 
@@ -154,8 +133,6 @@ class Formula:
         return negation(self)
 
     def __str__(self) -> str:
-        from dubins_traffic.logic.printer import to_ascii
-
         return to_ascii(self)
 
     def __repr__(self) -> str:
@@ -240,75 +217,6 @@ def iff(left: Formula, right: Formula) -> Formula:
     return make(Op.IFF, (left, right))
 
 
-def _unary(op: Op) -> Callable[[Formula], Formula]:
-    def build(part: Formula) -> Formula:
-        return make(op, (part,))
-
-    build.__doc__ = f"Return {op.value} `part`."
-    return build
-
-
-def _binary(op: Op) -> Callable[[Formula, Formula], Formula]:
-    def build(left: Formula, right: Formula) -> Formula:
-        return make(op, (left, right))
-
-    build.__doc__ = f"Return `left` {op.value} `right`."
-    return build
-
-
-next_ = _unary(Op.X)
-yesterday = _unary(Op.Y)
-weak_yesterday = _unary(Op.Z)
-once = _unary(Op.O)
-historically = _unary(Op.H)
-weak_until = _binary(Op.W)
-strong_release = _binary(Op.M)
-since = _binary(Op.S)
-trigger = _binary(Op.T)
-
-
-def eventually(part: Formula, bounds: Bounds | None = None) -> Formula:
-    """Return F `part`, within `bounds` (seconds) if given."""
-    return make(Op.F, (part,), bounds=interval(bounds))
-
-
-def always(part: Formula, bounds: Bounds | None = None) -> Formula:
-    """Return G `part`, within `bounds` (seconds) if given."""
-    return make(Op.G, (part,), bounds=interval(bounds))
-
-
-def until(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
-    """Return `left` U `right`, `right` within `bounds` (seconds) if given."""
-    return make(Op.U, (left, right), bounds=interval(bounds))
-
-
-def release(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
-    """Return `left` R `right`, `right` asked for within `bounds` (seconds) only if given."""
-    return make(Op.R, (left, right), bounds=interval(bounds))
-
-
-def interval(bounds: Bounds | None) -> Bounds | None:
-    """Return `bounds` as floats.
-
-    Raises
-    ------
-    FormulaError
-        If they are not 0 <= a <= b <= `LONGEST_BOUND`.
-    """
-    if bounds is None:
-        return None
-    low, high = float(bounds[0]), float(bounds[1])
-    if not 0.0 <= low <= high <= LONGEST_BOUND:
-        expected = f"[a, b] with 0 <= a <= b <= {LONGEST_BOUND:g}, seconds"
-        raise FormulaError("not an interval", value=list(bounds), expected=expected)
-    return low + 0.0, high + 0.0
-
-
-def ticks(seconds: float, period: float) -> int:
-    """Return how many ticks a duration takes: ceil(seconds / period - 1e-9)."""
-    return max(0, math.ceil(seconds / period - 1e-9))
-
-
 def subformulas(formula: Formula) -> Iterator[Formula]:
     """Yield each distinct subformula once, parts before wholes."""
     seen: set[Formula] = set()
@@ -326,3 +234,106 @@ def subformulas(formula: Formula) -> Iterator[Formula]:
 def propositions(formula: Formula) -> tuple[str, ...]:
     """Return the names of the propositions in `formula`, sorted."""
     return tuple(sorted(part.name for part in subformulas(formula) if part.op is Op.PROP))
+
+
+JUNCTIONS: Final = (Op.AND, Op.OR, Op.IMPLIES, Op.IFF)
+
+
+class Brackets(Enum):
+    """Which parentheses are left out."""
+
+    RANKED = "ranked"
+    """Those that the ranks of ``&``, ``|``, ``->`` and ``<->`` make needless."""
+    MIXED_NEVER = "mixed never"
+    """As SPIN needs it: none around parts of ``&``, ``|``, ``->`` and ``<->`` that are none of these themselves."""
+    ALL = "all"
+    """None: every operator has its own."""
+
+
+def number(value: float) -> str:
+    """Return a number of seconds as short as it reads back exactly."""
+    return str(int(value)) if value.is_integer() and value < 1e15 else repr(value)
+
+
+def _in_brackets(bounds: Bounds) -> str:
+    return f"[{number(bounds[0])},{number(bounds[1])}]"
+
+
+@dataclass(frozen=True)
+class Style:
+    """How formulas are spelled.
+
+    Attributes
+    ----------
+    signs : mapping of Op to str
+        Operators and constants that are not spelled as their values.
+    brackets : Brackets
+        Which parentheses are left out.
+    bounds : callable
+        Spells the bounds behind an operator.
+    name : callable
+        Spells a proposition.
+    tight : bool
+        Whether the sign of the negation stands right before its part.
+    """
+
+    signs: Mapping[Op, str]
+    brackets: Brackets = Brackets.RANKED
+    bounds: Callable[[Bounds], str] = _in_brackets
+    name: Callable[[str], str] = str
+    tight: bool = True
+
+
+ASCII: Final = Style({Op.AND: "&", Op.OR: "|"})
+
+
+def to_ascii(formula: Formula) -> str:
+    """Return `formula` in letters: ``G (a -> F b)``."""
+    return written(formula, ASCII)
+
+
+def written(formula: Formula, style: Style) -> str:
+    """Return `formula` spelled in a style."""
+    done: dict[Formula, str] = {}
+    for part in subformulas(formula):
+        inner = [
+            done[arg] if is_bare(part, place, arg, style.brackets) else f"({done[arg]})"
+            for place, arg in enumerate(part.args)
+        ]
+        done[part] = joined_with_sign(part, inner, style)
+    return done[formula]
+
+
+def joined_with_sign(part: Formula, inner: Sequence[str], style: Style) -> str:
+    """Return `part` spelled in a style, given its parts' texts with their brackets."""
+    if part.op is Op.PROP:
+        return style.name(part.name)
+    sign = style.signs.get(part.op, part.op.value)
+    if part.bounds is not None:
+        sign += style.bounds(part.bounds)
+    if not inner:
+        return sign
+    if part.op is Op.NOT and style.tight:
+        return sign + inner[0]
+    if len(inner) == 1:
+        return f"{sign} {inner[0]}"
+    return f" {sign} ".join(inner)
+
+
+def is_bare(whole: Formula, place: int, part: Formula, brackets: Brackets) -> bool:
+    """Say whether `part` needs no parentheses as the part number `place` of `whole`."""
+    if brackets is Brackets.ALL:
+        return not part.args
+    if len(part.args) < 2:
+        return True
+    if whole.op not in JUNCTIONS:
+        return False
+    if part.op not in JUNCTIONS:
+        return True
+    if brackets is Brackets.MIXED_NEVER:
+        return False
+    if whole.op is Op.IMPLIES and part.op is Op.IMPLIES:
+        return place == 1
+    if whole.op is Op.IFF and part.op is Op.IFF:
+        return place == 0
+    return JUNCTIONS.index(part.op) < JUNCTIONS.index(whole.op)

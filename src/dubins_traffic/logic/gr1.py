@@ -23,23 +23,24 @@ from typing import Final
 
 from dubins_traffic.logic.formula import (
     FUTURE,
+    Brackets,
     Formula,
     FormulaError,
     Op,
+    Style,
     conj,
     disj,
     iff,
     implies,
     negation,
-    next_,
     prop,
     propositions,
     subformulas,
-    ticks,
+    written,
 )
 from dubins_traffic.logic.monitor import parts
-from dubins_traffic.logic.printer import Brackets, Style, written
 from dubins_traffic.logic.rewrite import mapped, nnf, renamed, simplify
+from dubins_traffic.logic.temporal import next_, ticks
 from dubins_traffic.logic.translation import FreshNames, without_past
 
 

@@ -33,7 +33,6 @@ from dubins_traffic.logic.formula import (
     Formula,
     FormulaError,
     Op,
-    always,
     conj,
     implies,
     propositions,
@@ -42,6 +41,7 @@ from dubins_traffic.logic.formula import (
 from dubins_traffic.logic.obligations import MAX_PROPOSITIONS
 from dubins_traffic.logic.packing import Piece, packed_lines, packed_tables
 from dubins_traffic.logic.rewrite import renamed
+from dubins_traffic.logic.temporal import always
 
 if TYPE_CHECKING:
     from dubins_traffic.logic.kernel import Lines, Tables

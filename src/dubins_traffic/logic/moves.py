@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from typing import Final
 
 from dubins_traffic.logic.formula import FormulaError
-from dubins_traffic.logic.obligations import DONE, NOTHING, Atom, Letter, Moves, Node, Table
+from dubins_traffic.logic.letters import Letter
+from dubins_traffic.logic.obligations import DONE, NOTHING, Atom, Moves, Node, Table
 
 MAX_MOVES: Final = 400
 """Most alternatives that one step may leave open."""

@@ -15,7 +15,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.logic.formula import Formula, FormulaError, Op, subformulas, ticks
+from dubins_traffic.logic.formula import Formula, FormulaError, Op, subformulas
+from dubins_traffic.logic.temporal import ticks
 
 
 def robustness(formula: Formula, signals: Mapping[str, Floats], period: float) -> Floats:

@@ -11,22 +11,17 @@ from dubins_traffic.logic.formula import (
     Formula,
     FormulaError,
     Op,
-    always,
     conj,
     disj,
-    eventually,
     iff,
     implies,
     make,
     negation,
-    next_,
     prop,
     propositions,
-    release,
-    ticks,
-    until,
 )
 from dubins_traffic.logic.rewrite import mapped, rebuilt
+from dubins_traffic.logic.temporal import always, eventually, next_, release, ticks, until
 
 MAX_NEXT: Final = 40
 """Most nested nexts by which a bound is written out."""

@@ -45,17 +45,17 @@ def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]
         0: what a controller of 2016 is told; 1: everything, so that reading it gives an equal instance.
     """
     problem = instance.problem
-    told: dict[str, Any] = {
+    public: dict[str, Any] = {
         "version": version,
         "goals": [list(goal) for goal in problem.goals],
         "rnd": problem.network.to_document(),
         "intersection_radius": problem.intersection_radius,
     }
     if version == 0:
-        return {**told, **instance.extra}
+        return {**public, **instance.extra}
     poses = zip(instance.names, instance.starts, strict=True)
     return {
-        **told,
+        **public,
         "starts": {name: list(pose) for name, pose in poses},
         "duration": instance.duration,
         "e-agents": [

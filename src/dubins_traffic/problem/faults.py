@@ -54,7 +54,7 @@ class Open(Strict):
 
 
 class Careful(Open):
-    """The same, but a key that looks like a known one misspelt is refused: kept, it would silently mean nothing."""
+    """Like `Open`, except that a key which looks like a known one misspelt is refused: it would mean nothing."""
 
     @model_validator(mode="before")
     @classmethod

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.outside import is_place
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, parse
 
@@ -158,6 +159,8 @@ class Remote(Strict):
 
 COUNTER = "counter"
 REMOTE = "remote"
+OWN = "own"
+"""A class of the user's, which the type names: ``module:Class`` or ``path/to/file.py:Class``."""
 KINDS: Mapping[str, type[Strict]] = {
     "wander": Wander,
     "loop": Loop,
@@ -172,6 +175,8 @@ KINDS: Mapping[str, type[Strict]] = {
 """Kinds by name, each with the model of its parameters."""
 KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis"})
 """Kinds of e-agents that keep the rules of the road."""
+ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})
+"""Kinds of e-agents whose trials run by themselves: drivers of their own decide, in Python or elsewhere."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}
 """Types (package/executable) of 2016, and what they are called here."""
@@ -181,7 +186,9 @@ PROGRAM = r"^[A-Za-z][A-Za-z0-9_]*/[A-Za-z0-9_.-]+$"
 
 
 def kind_of(name: str) -> str:
-    """Return the kind that `name`, ours or of 2016, stands for; a package/executable that is not ours is remote.
+    """Return the kind that `name`, ours or of 2016, stands for.
+
+    A package/executable that is not ours is remote; what names a class is the user's own.
 
     Raises
     ------
@@ -193,14 +200,24 @@ def kind_of(name: str) -> str:
         return kind
     if re.fullmatch(PROGRAM, name):
         return REMOTE
+    if is_place(name):
+        return OWN
     known = ", ".join([*KINDS, *NAMES_2016])
     raise InputError(
-        "unknown type of e-agent", field="type", value=name, expected=f"one of {known}, or package/executable"
+        "unknown type of e-agent",
+        field="type",
+        value=name,
+        expected=f"one of {known}, package/executable, or module:Class",
     )
 
 
 def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the rest."""
+    """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the rest.
+
+    Those of the user's own are checked by their class, when a trial begins.
+    """
+    if kind == OWN:
+        return dict(given)
     return parse(KINDS[kind], given, field="parameters").model_dump()
 
 

@@ -96,7 +96,25 @@ def place_trials(
     seed: np.uint64, trials: Ints, stream: int, own: Lots, lane: Ints, span: Floats, ends: Floats, poses: Floats,
     placed: Ints,
 ) -> None:  # fmt: skip
-    """Place the cars of all trials; `lane`, `span` and `ends` are scratch."""
+    """Place the cars of all trials.
+
+    Parameters
+    ----------
+    seed : uint64
+        The seed of all random numbers.
+    trials : (B,) int64
+        Numbers of the trials.
+    stream : int
+        Number of the draw in the counter of random numbers.
+    own : Lots
+        What the trials have in common.
+    lane, span, ends : (2, K), (2, K, 2), (K,)
+        Scratch for one trial.
+    poses : (B, D, 4) float64
+        Set to x, y (m), cos, sin of each car that is drawn.
+    placed : (B,) int64
+        Set to the number of cars that have found a place.
+    """
     for b in range(trials.shape[0]):
         count = own.lane.shape[0]
         for k in range(count):

@@ -74,8 +74,10 @@ class TrialData:
 
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> TrialData:
-        """Check `document`: its configuration and each of its instances are checked too, but a road network
-        that the configuration names by path is not looked up.
+        """Return the checked trial data of a document.
+
+        Its configuration and each of its instances are checked too. A road network that the configuration names by
+        path is not looked up.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The chunks of a record's file, whole or cut off; damage is told from an end that is missing.
+"""The chunks of a record's file, whole or cut off; damage and a missing end are told apart.
 
 A file that ends with a footer and the closing magic has been finished: then its summary must match its checksum, the
 index in it must name the very chunks that are there, and every length must lead from one MCAP record to the next.

@@ -105,10 +105,10 @@ def read(record: Path | str) -> Wall | None:
             "not a version of a sidecar", file=str(path), field="version", expected=str(VERSION)
         )
     for name, value in fields.items():
-        told = _TYPES.get(name)
-        if told is not None and not told[0](value):
+        rule = _TYPES.get(name)
+        if rule is not None and not rule[0](value):
             raise RecordError(
-                "not a sidecar of a record", file=str(path), field=name, value=value, expected=told[1]
+                "not a sidecar of a record", file=str(path), field=name, value=value, expected=rule[1]
             )
     try:
         return Wall(**fields)

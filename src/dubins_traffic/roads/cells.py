@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 
 PAIRS_AT_ONCE = 1 << 21
+
+
+class RoadRaster(NamedTuple):
+    """Cells over the box of `Surface.cells`: cell (cx, cy) has the number cy * nx + cx.
+
+    ``pave`` holds OFF where no point of the cell is on the road, ON where all are, else the number of the only
+    segment whose road meets the cell, or MIXED where there are several.
+    """
+
+    scale: float
+    nx: int
+    ny: int
+    pave: Ints
 
 
 def covered(start: Floats, end: Floats, pad: float, size: float) -> tuple[Ints, Ints, Ints]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import ceil, sqrt
-from typing import Final, NamedTuple, cast
+from typing import Final, cast
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.cells import covered
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.cells import RoadRaster, covered
 from dubins_traffic.roads.surface import Surface
 
 OFF: Final = -1
@@ -17,28 +17,15 @@ MIXED: Final = -3
 CELLS_PER_SEGMENT: Final = 256.0
 
 
-class Paving(NamedTuple):
-    """Cells over the box of `Surface.cells`: cell (cx, cy) has the number cy * nx + cx.
-
-    ``pave`` holds OFF where no point of the cell is on the road, ON where all are, else the number of the only
-    segment whose road meets the cell, or MIXED where there are several.
-    """
-
-    scale: float
-    nx: int
-    ny: int
-    pave: Ints
-
-
-def pave(surface: Surface, half_width: float) -> Paving:
-    """Return the paving of roads `half_width` metres to either side of the segments (kept for next time)."""
-    kept = surface.pavings.get(half_width)
+def road_raster(surface: Surface, half_width: float) -> RoadRaster:
+    """Return the raster of roads `half_width` metres to either side of the segments (kept for next time)."""
+    kept = surface.rasters.get(half_width)
     if kept is None:
-        kept = surface.pavings[half_width] = _pave(surface, half_width)
+        kept = surface.rasters[half_width] = _drawn(surface, half_width)
     return kept
 
 
-def _pave(surface: Surface, half_width: float) -> Paving:
+def _drawn(surface: Surface, half_width: float) -> RoadRaster:
     cells = surface.cells
     width, height = cells.nx / cells.scale, cells.ny / cells.scale
     finest = sqrt(width * height / (CELLS_PER_SEGMENT * len(surface.lengths)))
@@ -64,4 +51,4 @@ def _pave(surface: Surface, half_width: float) -> Paving:
         for dy in (-0.5, 0.5):
             whole &= surface.distance2(x + dx * side, y + dy * side, item) < inner * inner
     paved[number[whole]] = ON
-    return Paving(1.0 / side, nx, ny, paved)
+    return RoadRaster(1.0 / side, nx, ny, paved)

@@ -22,7 +22,7 @@ FEW = 1 << 14
 """Up to so many pairs of a cell and an item all are looked at, which is sooner done."""
 
 if TYPE_CHECKING:
-    from dubins_traffic.roads.road_raster import Paving
+    from dubins_traffic.roads.cells import RoadRaster
 
 Distance2 = Callable[[Floats, Floats, Ints], Floats]
 
@@ -66,7 +66,7 @@ class Surface:
         self.end = points[ends[:, 1]]
         self.tangents = tangents
         self.lengths = lengths
-        self.pavings: dict[float, Paving] = {}
+        self.rasters: dict[float, RoadRaster] = {}
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return the number of the nearest segment and the distance, for points (..., 2)."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.road_raster import pave
+from dubins_traffic.roads.road_raster import road_raster
 
 
 class RoadTable(NamedTuple):
@@ -110,7 +110,7 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
     """Return the table of one network (kept for next time, never to be written to)."""
     key = RoadTable, half_width
     if key not in network.known:
-        paving, cells = pave(network.surface, half_width), network.surface.cells
+        raster, cells = road_raster(network.surface, half_width), network.surface.cells
         network.known[key] = RoadTable(
             half_width=np.array([half_width], dtype=np.float64),
             seg_off=_offsets([len(network.segments)]),
@@ -126,9 +126,9 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
             seg_item=cells.seg_item,
             vert_start=cells.vert_start,
             vert_item=cells.vert_item,
-            pave_scale=np.array([paving.scale], dtype=np.float64),
-            pave_dim=np.array([[paving.nx, paving.ny, 0]], dtype=np.int64),
-            pave=paving.pave,
+            pave_scale=np.array([raster.scale], dtype=np.float64),
+            pave_dim=np.array([[raster.nx, raster.ny, 0]], dtype=np.int64),
+            pave=raster.pave,
         )
     return cast(RoadTable, network.known[key])
 

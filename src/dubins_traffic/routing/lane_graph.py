@@ -14,7 +14,7 @@ FAR = 1 << 40
 def frame(row: Floats, lane: int) -> tuple[float, float, float, float, float]:
     """Return (x, y, tx, ty, length): start, unit direction and length of a lane on the road's centre line.
 
-    `row` is the row of the lane's segment in `RoadTable.seg`.
+    `row` (SEGMENT_FIELDS,) is the row of the lane's segment in `RoadTable.seg`.
     """
     if lane & 1:
         return row[0] + row[4] * row[2], row[1] + row[4] * row[3], -row[2], -row[3], row[4]
@@ -31,9 +31,10 @@ def lane_at(roads: RoadTable, net: int, x: float, y: float, c: float, s: float) 
 
 @jit
 def nearest_stage(distance: Floats, first: int, last: int, lane: int, segment: int) -> int:
-    """Return the stage, of rows `first` to `last` - 1, that is nearest along lanes; the first of equally near ones.
+    """Return the stage that is nearest along lanes; the first of equally near ones.
 
-    From `lane`, or from `segment` for a car without lane state; -1 if there are no rows.
+    Stages are the rows `first` (index) to before `last` (index) of `distance` (M, L), metres from each lane. It is
+    nearest from `lane`, or from `segment` for a car without lane state; -1 if there are no rows.
     """
     start = lane if lane >= 0 else 2 * segment
     best = -1
@@ -45,7 +46,10 @@ def nearest_stage(distance: Floats, first: int, last: int, lane: int, segment: i
 
 @jit
 def aim_for(lane: int, hops: Ints, queue: Ints, count: int) -> int:
-    """Make a lane a target of `spread`; return the number of targets so far."""
+    """Make a lane a target of `spread`; return the number of targets so far.
+
+    `hops` (L,) and `queue` (L,) are those of `spread`, `count` (count) is the number of targets before.
+    """
     if hops[lane] == FAR:
         hops[lane] = 0
         queue[count] = lane
@@ -55,7 +59,9 @@ def aim_for(lane: int, hops: Ints, queue: Ints, count: int) -> int:
 
 @jit
 def spread(roads: RoadTable, net: int, hops: Ints, queue: Ints, count: int) -> None:
-    """Fill `hops` with the number of lanes to drive from each lane to the `count` targets; FAR: there's no way.
+    """Fill `hops` (L,) with the number of lanes to drive from each lane to the targets; FAR: there's no way.
+
+    The first `count` (count) entries of `queue` (L,) are the targets; the rest is scratch.
 
     Turning round counts as possible at dead ends only. All but the targets were FAR before.
     """
@@ -74,7 +80,7 @@ def spread(roads: RoadTable, net: int, hops: Ints, queue: Ints, count: int) -> N
 
 @jit
 def place_of(lane: int, first: int, last: int, cycle: Ints) -> int:
-    """Return the first row of a cycle that holds a lane, or -1."""
+    """Return the first row from `first` (index) to before `last` (index) of `cycle` (M,) that holds a lane, or -1."""
     for k in range(first, last):
         if cycle[k] == lane:
             return k

@@ -73,7 +73,10 @@ def room(goals: int, lanes: int) -> Search:
 
 @jit
 def metres_to(target: Any, g: LaneTables, far: Floats, queue: Ints, waits: Ints) -> None:
-    """Write the metres from the end of each lane to the end of the lane `target` into `far` (L,)."""
+    """Write the metres from the end of each lane to the end of `target` (a lane) into `far` (L,).
+
+    `queue` (L,) and `waits` (L,) are scratch.
+    """
     lanes = far.shape[0]
     for lane in range(lanes):
         far[lane] = INFINITE
@@ -101,7 +104,7 @@ def metres_to(target: Any, g: LaneTables, far: Floats, queue: Ints, waits: Ints)
 
 @jit
 def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]:
-    """Find the shortest round through the distinct intersections `goals`.
+    """Find the shortest round through the distinct intersections of `goals` (G,).
 
     Its lanes are in `own.lane`, the places in it of those that end in a goal as it is reached in `own.arrival`.
 

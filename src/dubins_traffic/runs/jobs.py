@@ -51,6 +51,7 @@ class Job:
     overwrite: bool = False
     deadline: float | None = None
     show: bool = False
+    metrics: tuple[str, ...] = ()
 
     def run(self, cancelled: Event | None = None) -> Result:
         """Run the job here; `cancelled` interrupts it after at most one simulated second."""
@@ -69,6 +70,7 @@ class Job:
             simulator=simulators.load(instance.simulator, show=self.show),
             sketch=False,
             name=self.controller,
+            metrics=self.metrics,
         )
 
     @property
@@ -122,7 +124,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
 
 
 def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """Run jobs in processes; those that were under way when one ended too early run again, each by itself."""
+    """Run jobs in processes; the jobs that were under way when a process died run again, each by itself."""
     waiting, suspects, dead = deque(jobs), deque[Job](), list[Job]()
     barren = 0
     crew = _Crew(min(workers, len(jobs)))
@@ -146,11 +148,11 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
     finally:
         crew.close()
     if dead:
-        raise WorkerLostError(_told(dead, len(waiting) + len(suspects)))
+        raise WorkerLostError(_lost_jobs_text(dead, len(waiting) + len(suspects)))
 
 
-def _told(dead: Sequence[Job], left: int) -> str:
-    """Return what is said of jobs that ended their processes, and of how many were not tried again for that."""
+def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
+    """Return the message on jobs whose processes ended in the middle of them; for that `left` jobs were not run."""
     named = ", ".join(job.called for job in dead[:MOST_NAMED])
     more = f" and {len(dead) - MOST_NAMED} more" if len(dead) > MOST_NAMED else ""
     rest = f"; {left} trials were not run" if left else ""
@@ -158,7 +160,7 @@ def _told(dead: Sequence[Job], left: int) -> str:
 
 
 class _Crew:
-    """Processes that run jobs; new ones take their place when one has ended, and what was under way is lost."""
+    """Processes that run jobs. When a process has died, all are replaced, and the jobs under way are lost."""
 
     def __init__(self, workers: int) -> None:
         self.under_way: dict[Future[Result], Job] = {}
@@ -209,7 +211,7 @@ class _Crew:
 
 @contextmanager
 def deaf_to_interrupts() -> Generator[None]:
-    """Hold Ctrl-C back until workers have been started; they inherit this and never hear it."""
+    """Hold Ctrl-C back while workers are started; workers inherit this, so Ctrl-C reaches the parent alone."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -1,4 +1,4 @@
-"""From a configuration, an instance or a record to the jobs that run its trials, and what is left of them."""
+"""Plans of runs: the jobs that run the trials of a configuration, an instance or a record."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.jobs import Job
-from dubins_traffic.runs.record_folder import check_folder, claim, name
+from dubins_traffic.runs.record_folder import check_choice, check_folder, claim, name
 from dubins_traffic.runs.single import Result
 from dubins_traffic.runs.sources import load
+from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.simulators import registry as simulators
 
@@ -72,6 +73,7 @@ def plan(
     simulator: str | None = None,
     show: bool = False,
     shield: bool = False,
+    metrics: Sequence[str] = (),
 ) -> Plan:
     """Return what is to be run, checked as far as can be before anything runs.
 
@@ -106,6 +108,8 @@ def plan(
         Whether the simulator shows the trials in a window of its own, at the pace of the clock.
     shield : bool
         Whether the controller drives under the shield (`controllers.shield`).
+    metrics : sequence of str
+        Further metrics: names, ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises
     ------
@@ -117,10 +121,9 @@ def plan(
         controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
     controller = controllers.shielded(controller) if shield else controller
     controllers.load(controller)
+    scores.columns(metrics)
     _check_deadline(deadline)
-    if append and data is not None:
-        expected = "one of them: trial data are of all trials of a run"
-        raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)
+    check_choice(records, data, overwrite=overwrite, append=append)
     if isinstance(found, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
@@ -143,12 +146,8 @@ def plan(
         )
     target = None if data is None else check_data_file(Path(data), overwrite_data)
     several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
-    whole = [replace(job, deadline=deadline, show=show) for job, _ in several]
+    whole = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job, _ in several]
     if records is None:
-        if overwrite or append:
-            raise InputError(
-                "are of --records", file="--overwrite, --append", expected="a folder for records"
-            )
         return Plan(tuple(whole), configuration, target)
     folder = check_folder(records)
     kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)

@@ -1,10 +1,11 @@
-"""The folder into which a run puts its records: empty of records before, or told what to do with them."""
+"""The folder for the records of a run: one without records, or a choice between overwriting and appending."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,14 +17,31 @@ from dubins_traffic.record import reader
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.wall import remove_record
 
-OURS: Final = re.compile(r"trial-(\d{4,})(?:-(\d{4,}))?\.mcap")
-"""Names that runs give their records: the number of the trial, and of its run where it is run several times."""
+OURS: Final = re.compile(r"trial-(\d{4,})(?:-(\d+))?\.mcap")
+"""Names that runs and sessions give their records: the number of the trial, and of its run where there are several."""
+BROKEN_OFF: Final = (End.INTERRUPTED, End.TRANSPORT_LOST)
+"""Ends that say nothing of who drives: such a trial is run again."""
 WAYS: Final = "a folder without records; --overwrite removes those that are there, --append goes on with them"
 
 
 def name(trial: int, run: int | None = None) -> str:
     """Return the name of the record of a trial, or of one of its runs."""
     return f"trial-{trial:04d}.mcap" if run is None else f"trial-{trial:04d}-{run:04d}.mcap"
+
+
+def check_choice(
+    records: str | os.PathLike[str] | None,
+    data: str | os.PathLike[str] | None,
+    *,
+    overwrite: bool,
+    append: bool,
+) -> None:
+    """Raise InputError if overwriting or appending is asked for without a folder for records, or with trial data."""
+    if append and data is not None:
+        expected = "one of them: trial data are of all trials of a run"
+        raise InputError("both at once", file="--append, -f", value=os.fspath(data), expected=expected)
+    if records is None and (overwrite or append):
+        raise InputError("are of --records", file="--overwrite, --append", expected="a folder for records")
 
 
 def check_folder(folder: str | os.PathLike[str]) -> Path:
@@ -50,6 +68,7 @@ def claim(
     *,
     overwrite: bool = False,
     append: bool = False,
+    placed: bool = False,
 ) -> frozenset[str]:
     """Make a folder ready for the records of a run; return the names of those that stay and are not to be run again.
 
@@ -64,8 +83,10 @@ def claim(
     overwrite : bool
         Whether records of runs that are there are removed, with their sidecars.
     append : bool
-        Whether they stay: then they must be of the same controller and instances. Those that were cut off or
-        interrupted are run again.
+        Whether they stay: then they must be of the same controller and instances. Those that were cut off, interrupted
+        or lost with their transport are run again.
+    placed : bool
+        Whether cars may have been put elsewhere before a trial: then records of other starts are of the same instance.
 
     Raises
     ------
@@ -82,13 +103,13 @@ def claim(
             raise InputError(f"holds {found[0].name}{others}", file=str(folder), expected=WAYS)
         ours = [path for path in found if OURS.fullmatch(path.name)]
         if append:
-            return frozenset(path.name for path in ours if _stays(path, controller, instance_of))
+            return frozenset(path.name for path in ours if _stays(path, controller, instance_of, placed))
         for path in ours:
             remove_record(path)
         return frozenset()
 
 
-def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance]) -> bool:
+def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance], placed: bool) -> bool:
     """Tell whether a record is of the same run, whole; InputError if it is of another run."""
     match = OURS.fullmatch(path.name)
     trial = int(match[1]) if match else 0
@@ -109,6 +130,34 @@ def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance]) 
     if record.instance.seed != wanted.seed:
         problem = "a record of another seed"
         raise InputError(problem, file=str(path), value=record.instance.seed, expected=str(wanted.seed))
+    wanted = replace(wanted, starts=record.instance.starts) if placed else wanted
     if record.instance != wanted:
         raise InputError("a record of another instance", file=str(path), value=trial, expected=expected)
-    return record.ending is not None and record.ending.end is not End.INTERRUPTED
+    return record.ending is not None and record.ending.end not in BROKEN_OFF
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """How far the session has come whose records are in a folder already.
+
+    Parameters
+    ----------
+    over : frozenset of int
+        Numbers of the instances whose trials are over.
+    runs : mapping of int to int
+        Of the other instances that have records: the run, 0 for the first, that was broken off.
+    """
+
+    over: frozenset[int] = frozenset()
+    runs: Mapping[int, int] = field(default_factory=dict[int, int])
+
+    @classmethod
+    def of(cls, folder: Path, kept: frozenset[str]) -> Earlier:
+        """Look at a folder in which the records named `kept` are whole."""
+        last: dict[int, tuple[int, bool]] = {}
+        for path in folder.glob("*.mcap"):
+            if match := OURS.fullmatch(path.name):
+                number, run = int(match[1]), int(match[2] or 0)
+                last[number] = max(last.get(number, (-1, False)), (run, path.name in kept))
+        over = frozenset(number for number, (_, whole) in last.items() if whole)
+        return cls(over, {number: run for number, (run, _) in last.items() if number not in over})

@@ -11,6 +11,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.metric import Column, Told
 
 _Gap = Callable[[np.ndarray, np.ndarray], Floats]
 _SLACK = 1e-9
@@ -127,3 +128,6 @@ def _overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> np.ndarray
 def _distance(frames: Frames, x: Floats, y: Floats) -> Floats:
     dx, dy = x - frames.x[:, EGO, None], y - frames.y[:, EGO, None]
     return np.sqrt(dx * dx + dy * dy)
+
+
+TOLD = (Told(Column("min_clearance_m", "least clearance", "m", 1), lambda score: score.min_clearance_m),)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import EGO, Contact, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.metric import Column, Told
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.score import Score
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,3 +75,29 @@ class Collisions:
     def result(self) -> tuple[Collision, ...]:
         """Return the ego's collisions in order of time."""
         return tuple(self._found)
+
+
+def _faults(score: Score, *, ego: bool, other: bool) -> int:
+    """Return at how many collisions the ego, and the other, are at fault."""
+    return sum((one.at_fault, one.partner_at_fault) == (ego, other) for one in score.collisions)
+
+
+TOLD = (
+    Told(Column("collisions", "collisions", "", -1, "int32"), lambda score: len(score.collisions)),
+    Told(
+        Column("collisions_ego_fault", "collisions, the ego's fault", "", -1, "int32"),
+        lambda score: _faults(score, ego=True, other=False),
+    ),
+    Told(
+        Column("collisions_other_fault", "collisions, the other's fault", kind="int32"),
+        lambda score: _faults(score, ego=False, other=True),
+    ),
+    Told(
+        Column("collisions_both_fault", "collisions, the fault of both", "", -1, "int32"),
+        lambda score: _faults(score, ego=True, other=True),
+    ),
+    Told(
+        Column("collisions_among_others", "collisions among others", kind="int32"),
+        lambda score: score.collisions_among_others,
+    ),
+)

@@ -11,6 +11,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import LEFT, ON_ROAD
+from dubins_traffic.scoring.metric import Column, Told
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +23,11 @@ class Driven:
     distance_m : float
         Sum of the distances between the centres at consecutive frames.
     standing_share : float
-        Share of the ticks in which the centre moved at less than the still speed of RULES, 0.05 m/s.
+        Share of the ticks in which the centre moved at less than the still speed of docs/rules.md#time, 0.05 m/s.
     off_road_s, off_road_share : float
-        Ticks that end in a frame at which the ego is not on the road (RULES, `on_road`).
+        Ticks that end in a frame at which the ego is not on the road (docs/rules.md#on-road).
     lane_departures : int
-        Frames at which the ego's body begins to reach over the centre line (RULES, `left` rises) and any other car
+        Frames at which the ego's body begins to reach over the centre line (docs/rules.md#left rises) and any other car
         moved, at the still speed or faster, in the tick that ends there. Frame 0 ends no tick.
     """
 
@@ -84,3 +85,15 @@ class Driving:
             self._off_road / ticks,
             self._departures,
         )
+
+
+TOLD = (
+    Told(Column("distance_m", "distance", "m"), lambda score: score.driven.distance_m),
+    Told(Column("standing_share", "standing", "share", -1), lambda score: score.driven.standing_share),
+    Told(Column("off_road_s", "off the road", "s", -1), lambda score: score.driven.off_road_s),
+    Told(Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share),
+    Told(
+        Column("lane_departures", "lane departures", "", -1, "int32"),
+        lambda score: score.driven.lane_departures,
+    ),
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import End, Ending
+from dubins_traffic.scoring.metric import Column, Told
 
 
 def planned_ticks(instance: Instance) -> int:
@@ -33,3 +34,9 @@ def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
 def counted_rounds(rounds: int, *, clean: bool, whole: bool) -> int:
     """Return the rounds that count in a ranking: those of a clean trial that ran its whole duration, else 0."""
     return rounds if clean and whole else 0
+
+
+TOLD = (
+    Told(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
+    Told(Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds),
+)

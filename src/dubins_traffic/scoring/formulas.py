@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -14,9 +15,11 @@ from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.metric import Column, Told
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.valuation import Valuation
+    from dubins_traffic.scoring.score import Score
 
 Status = Literal["true", "presumably true", "presumably false", "false"]
 
@@ -111,3 +114,12 @@ class FormulaVerdicts:
             )
             for (name, text), verdict, tick in found
         )
+
+
+def _in_short(score: Score) -> str | None:
+    """Return what holds of each formula of a user's own, JSON."""
+    found = {one.name: one.verdict for one in score.formulas}
+    return json.dumps(found) if found else None
+
+
+TOLD = (Told(Column("formulas", kind="string"), _in_short),)

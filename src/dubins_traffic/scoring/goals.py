@@ -11,6 +11,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.duration import planned_ticks
+from dubins_traffic.scoring.metric import Column, Told
 
 Mask = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 
@@ -77,7 +78,7 @@ class Visits:
 
 
 class Visiting:
-    """Visits: entries of the ego's centre into a goal's disc, a start inside included (RULES, rule 1).
+    """Visits: entries of the ego's centre into a goal's disc, a start inside included (docs/rules.md#visit).
 
     Between two visits of a goal its centre has been in the disc of another intersection. A round is complete when every
     goal has been visited since the last round; without goals there are none.
@@ -150,3 +151,13 @@ class Visiting:
         rows = zip(self._discs.goals, self._visits.tolist(), gaps.tolist(), strict=True)
         visited = float((self._visits > 0).mean()) if len(self._visits) else 1.0
         return Visits(tuple(GoalVisits(*row) for row in rows), visited, self._rounds.count)
+
+
+TOLD = (
+    Told(Column("rounds", "rounds", "", 1, "int32"), lambda score: score.rounds),
+    Told(Column("goals_visited", "goals visited", "share", 1), lambda score: score.goals_visited),
+    Told(
+        Column("longest_gap_s", "longest gap between visits", "s", -1),
+        lambda score: max((goal.longest_gap_s for goal in score.goals), default=None),
+    ),
+)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.logic.formula import ticks
+from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING

@@ -104,7 +104,7 @@ def _await_problem(session: Session, maestro: ForeignMaestro, instance: Instance
             if text is None:
                 continue
             try:
-                instance = told(instance, text)
+                instance = with_problem(instance, text)
             except InputError as error:
                 session.say(f"{which}: the other maestro's problem is passed over: {error}")
                 continue
@@ -113,7 +113,7 @@ def _await_problem(session: Session, maestro: ForeignMaestro, instance: Instance
         raise TransportError(error.detail) from error
 
 
-def told(instance: Instance, text: str) -> Instance:
+def with_problem(instance: Instance, text: str) -> Instance:
     """Return `instance` with the network, goals and radius of the problem that `text` tells.
 
     Raises

@@ -30,8 +30,7 @@ def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> I
     InputError
         If an instance can't be drawn.
     """
-    session_plan.rehearse()
     transport = Lines(port)
-    yield from session_plan.run(
-        transport, pace, None, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
+    yield from session_plan.over(
+        transport, pace, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -16,6 +16,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import locked
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
@@ -25,8 +26,8 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.runs.plan import check_data_file, check_simulator
-from dubins_traffic.runs.record_folder import check_folder
+from dubins_traffic.runs.plan import check_data_file
+from dubins_traffic.runs.record_folder import Earlier, check_choice, check_folder, claim
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.runs.sources import load
 from dubins_traffic.scoring.score import ScoreSheet
@@ -83,6 +84,7 @@ class SessionPlan:
 
     `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
     the ego drives under the shield. `say` is told, in lines for people, what the session does and waits for.
+    `overwrite` and `append` say what becomes of records that are there (`claim`), and `earlier` what those were.
     """
 
     supply: Callable[[int], Instance]
@@ -93,8 +95,35 @@ class SessionPlan:
     records: Path | None
     data: Path | None
     shield: bool = False
+    overwrite: bool = False
+    append: bool = False
+    earlier: Earlier = field(default_factory=Earlier)
     say: Callable[[str], None] = quiet
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
+
+    def claim(self, transport: str) -> SessionPlan:
+        """Return this session over the transport of that name, with its folder for records made ready.
+
+        Raises
+        ------
+        InputError
+            If the folder holds records that are neither to be removed nor of this session; see `record_folder.claim`.
+        """
+        if self.records is None:
+            return self
+        driver = self.controller or (controllers.shielded(transport) if self.shield else transport)
+        kept = claim(
+            self.records, driver, self._instance, overwrite=self.overwrite, append=self.append, placed=True
+        )
+        earlier = Earlier.of(self.records, kept)
+        if earlier.over:
+            self.say(
+                f"{len(earlier.over)} trials have their records in {self.records}, and are not run again"
+            )
+        return replace(self, earlier=earlier)
+
+    def _instance(self, number: int) -> Instance:
+        return hand_over(self.supply(number), self.remote)
 
     def run(
         self,
@@ -111,7 +140,10 @@ class SessionPlan:
         returns a line for people that says where the transport is. `foreign` starts and ends the trials if it is given,
         see `foreign.run_under`.
         """
+        held = ExitStack()
         try:
+            if self.records is not None:
+                held.enter_context(locked(self.records))
             patience = replace(pace.patience, at_once=foreign is not None)
             link = Link(transport, pace.clock(), ego=self.controller is None, patience=patience)
             if at is not None:
@@ -124,6 +156,7 @@ class SessionPlan:
                 self.controller or (controllers.SHIELDED if self.shield else ""),
                 self.remote,
                 self.records,
+                self.earlier,
                 None if world is None else world(),
                 self.say,
             )
@@ -133,6 +166,7 @@ class SessionPlan:
                 yield from run_under(session, foreign, self.shortest)
         finally:
             transport.close()
+            held.close()
 
     @property
     def shortest(self) -> float:
@@ -141,6 +175,30 @@ class SessionPlan:
         if settings is None:
             return self.supply(0).duration
         return float(settings.duration_bounds[0] if settings.duration is None else settings.duration)
+
+    def over(
+        self,
+        transport: Transport,
+        pace: Pace,
+        maestro: Maestro | None = None,
+        at: Callable[[], str] | None = None,
+    ) -> Iterator[Result]:
+        """Do all that a session is over a transport that needs nothing else: claim the folder, compile, run.
+
+        Parameters
+        ----------
+        transport : Transport
+            Not yet open; closed at the end.
+        pace : Pace
+            How drivers are waited for.
+        maestro : Maestro, optional
+            Whose leave every trial awaits; without one a trial begins when the one before is over.
+        at : callable, optional
+            Returns a line for people that says where the transport is, once it is open.
+        """
+        claimed = self.claim(transport.name)
+        claimed.rehearse()
+        yield from claimed.run(transport, pace, maestro, at=at)
 
     def rehearse(self) -> None:
         """Compile all that trials need, before anyone waits for them."""
@@ -169,7 +227,8 @@ def session_plan(
     data: str | os.PathLike[str] | None = None,
     overwrite_data: bool = False,
     records: str | os.PathLike[str] | None = None,
-    simulator: str | None = None,
+    overwrite: bool = False,
+    append: bool = False,
     shield: bool = False,
 ) -> SessionPlan:
     """Return what a session shall run, checked as far as can be before anything is opened.
@@ -193,9 +252,11 @@ def session_plan(
     data : path, optional
         Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
     records : path, optional
-        Folder for the records, made if missing.
-    simulator : str, optional
-        What moves the cars, whatever the source says.
+        Folder for the records, made if missing. One that holds records is refused, unless one of the following.
+    overwrite : bool
+        Whether records that the folder holds are removed before.
+    append : bool
+        Whether they stay, and their trials are not run again; they must be of the same driver and instances.
     shield : bool
         Whether the ego, wherever it is driven, drives under the shield (`controllers.shield`).
 
@@ -204,6 +265,7 @@ def session_plan(
     InputError
         If anything of this is wrong; then nothing has been written.
     """
+    check_choice(records, data, overwrite=overwrite, append=append)
     found = load(source, rnd=rnd, seed=seed or 0)
     if isinstance(found, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"
@@ -216,9 +278,6 @@ def session_plan(
             "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
         )
     supply = _supply(found, seed or 0)
-    if simulator is not None:
-        check_simulator("--simulator", simulator)
-        supply = partial(moved_by, supply, simulator)
     hand_over(supply(0), remote)
     configuration = found if isinstance(found, Configuration) else None
     if data is not None and configuration is None:
@@ -235,6 +294,8 @@ def session_plan(
         None if records is None else check_folder(records),
         None if data is None else check_data_file(Path(data), overwrite_data),
         shield,
+        overwrite,
+        append,
     )
 
 

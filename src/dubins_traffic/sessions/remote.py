@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 
 from dubins_traffic.cars.state import Pose
@@ -11,6 +12,7 @@ from dubins_traffic.errors import InputError, PeerError, TransportError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, End, Simulator
+from dubins_traffic.runs.record_folder import Earlier
 from dubins_traffic.runs.single import Result, Trial, run_trial
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro, Next, Phase
@@ -42,6 +44,8 @@ class Session:
         Instead of the one that instances name.
     records : Path, optional
         Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
+    earlier : Earlier
+        What an earlier session has run of it: the trials that are over count, and are not run again.
     say : callable
         Is told, in lines for people, what the session does and waits for.
     """
@@ -53,6 +57,7 @@ class Session:
     controller: str | Controller = "lanes"
     remote: tuple[str, ...] = ()
     records: Path | None = None
+    earlier: Earlier = field(default_factory=Earlier)
     simulator: Simulator | None = None
     say: Callable[[str], None] = quiet
 
@@ -86,15 +91,18 @@ def run_remote(session: Session) -> Iterator[Result]:
 
 def _trials(session: Session) -> Iterator[Result]:
     """Run one trial after another."""
-    done = number = repetition = 0
+    earlier = session.earlier
+    done, number, repetition = len(earlier.over), -1, 0
     instance: Instance | None = None
     while session.trials is None or done < session.trials:
         if instance is None:
+            number = next(later for later in count(number + 1) if later not in earlier.over)
+            repetition = earlier.runs.get(number, 0)
             instance = hand_over(session.supply(number), session.remote)
         which = session.which(instance, done)
         asked, instance = _await_start(session, instance, which)
         if asked is Next.DRAW:
-            instance, number, repetition = None, number + 1, 0
+            instance = None
             continue
         ego = "; the first command of ego is waited for" if session.link.ego else ""
         session.say(f"{which}: begins{ego}")
@@ -110,7 +118,7 @@ def _trials(session: Session) -> Iterator[Result]:
         if session.maestro is not None and session.maestro.next is Next.REPEAT:
             repetition += 1
         else:
-            done, instance, number, repetition = done + 1, None, number + 1, 0
+            done, instance = done + 1, None
 
 
 def check_lost(link: Link) -> None:

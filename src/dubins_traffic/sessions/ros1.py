@@ -9,13 +9,14 @@ from dataclasses import replace
 from functools import partial
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros1.external import NAME as WORLD
 from dubins_traffic.transports.ros1.external import ExternalWorld
-from dubins_traffic.transports.ros1.maestro_services import Told
+from dubins_traffic.transports.ros1.maestro_services import SessionParameters
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
@@ -27,11 +28,12 @@ def run_over_ros1(
     session_plan: SessionPlan,
     pace: Pace,
     *,
-    master: int | None = None,
-    clock: bool = False,
-    world: bool = False,
-    poses: str | None = None,
+    master: bool = False,
+    port: int = 11311,
     elsewhere: bool = False,
+    clock: bool = False,
+    simulator: str | None = None,
+    poses: str | None = None,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
@@ -41,16 +43,18 @@ def run_over_ros1(
         What is run.
     pace : Pace
         How drivers are waited for.
-    master : int, optional
-        Port of a master to start on the loopback interface, 0 for any; None: join the one of ``ROS_MASTER_URI``.
-    clock : bool
-        Whether `/clock` is published.
-    world : bool
-        Whether the cars are not simulated here but somewhere in the graph, in real time.
-    poses : str, optional
-        Of such a world: the topic of each car's pose, ``{}`` in place of its name.
+    master : bool
+        Whether a master is started on the loopback interface; else the one of ``ROS_MASTER_URI`` is joined.
+    port : int
+        Of that master, 0 for any.
     elsewhere : bool
         Whether another process is the maestro, such as that of 2016: it tells problems, and starts and ends trials.
+    clock : bool
+        Whether `/clock` is published.
+    simulator : str, optional
+        What moves the cars, whatever the source says; ``ros1-world``: they are somewhere in the graph, in real time.
+    poses : str, optional
+        Of such a world: the topic of each car's pose, ``{}`` in place of its name.
 
     Raises
     ------
@@ -61,32 +65,50 @@ def run_over_ros1(
     InputError
         If an instance can't be drawn.
     """
+    world = simulator == WORLD
+    if poses is not None and not world:
+        raise InputError("is of another world", file="--poses", value=poses, expected=f"--simulator {WORLD}")
     if world and (pace.lockstep or clock or pace.factor != 1.0):
         expected = "neither --lockstep nor --clock nor --factor"
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
     if elsewhere and (pace.lockstep or pace.factor != 1.0):
         expected = "neither --lockstep nor --factor"
         raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
+    if elsewhere and session_plan.append:
+        expected = "--overwrite, or another folder: the other maestro tells other problems"
+        raise InputError("both at once", file="--maestro-elsewhere, --append", expected=expected)
     ego = session_plan.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
-    session_plan.rehearse()
+    simulated = session_plan
+    if simulator is not None:
+        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, simulator))
+    if not world:
+        if simulator is not None:
+            check_simulator("--simulator", simulator)
+        simulated = session_plan
+    session_plan = session_plan.claim(Ros1.name)
+    simulated.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
-        if master is not None:
-            started = Master(master)
+        if master:
+            started = Master(port)
             stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
             uri = started.uri
         session_plan.say(f"ROS master at {uri}")
         stack.callback(leave)
         transport = Ros1(
-            uri, maestro=maestro, told=_told(session_plan), clock=clock, simulated=not world, foreign=foreign
+            uri,
+            maestro=maestro,
+            parameters=_parameters(session_plan),
+            clock=clock,
+            simulated=not world,
+            foreign=foreign,
         )
         if not world:
             yield from session_plan.run(transport, pace, maestro, foreign=foreign)
             return
-        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, WORLD))
         make = partial(_elsewhere, transport, ego, poses)
         yield from session_plan.run(transport, pace, maestro, make, foreign=foreign)
 
@@ -95,9 +117,9 @@ def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:
     return ExternalWorld(transport.rospy, ego=ego, poses=poses)
 
 
-def _told(session_plan: SessionPlan) -> Told:
+def _parameters(session_plan: SessionPlan) -> SessionParameters:
     settings = None if session_plan.configuration is None else session_plan.configuration.settings
-    return Told(
+    return SessionParameters(
         number_trials=session_plan.trials,
         duration_bounds=None if settings is None else settings.duration_bounds,
         number_goals_bounds=None if settings is None else settings.number_goals_bounds,

@@ -45,7 +45,7 @@ def _turns(g: Graph, position: int) -> tuple[int, int]:
 
 @jit_long
 def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
-    """Set `found` (N,) to Cpre(`safe`); `ready` (N+1,) is room."""
+    """Set `found` (N,) to Cpre of `safe` (N,); `ready` (N+1,) is room."""
     count = safe.shape[0]
     ready[count] = 0
     for position in range(count):

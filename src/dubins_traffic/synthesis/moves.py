@@ -187,7 +187,10 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
 
 @jit_inner
 def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
-    """Write the moves of the environment from `work.scenes`; false if there is no room."""
+    """Write the moves of the environment from `work.scenes`; false if there is no room.
+
+    The game has `positions` (count) positions; that number stands for one in which the ego has been rammed.
+    """
     _units(t, work)
     used = out.used[0]
     if work.total[RAMMED]:
@@ -270,7 +273,7 @@ def expand(
     others, positions : int
         E-agents, and number of positions; that number stands for a position in which the ego has been rammed.
     first, last : int
-        The positions.
+        Numbers of the positions.
     work : Work
         Room.
     out : Moves
@@ -304,7 +307,7 @@ def list_moves(t: Tables, others: int, positions: int, position: int, work: Work
     Parameters
     ----------
     t, others, positions, work
-        As for `expand`.
+        Board, number of e-agents, number of positions and room, as for `expand`.
     position : int
         The position.
     out : Moves

@@ -223,11 +223,11 @@ def play_turns(
     ranks : (G, N) int32
         The strategy.
     environment : int
-        `Environment`.
+        Number of an `Environment`.
     seed : uint64
         Of what it draws.
     turns : int
-        How many.
+        Number of turns.
     work, room
         Room for the moves of a position.
     table : Table

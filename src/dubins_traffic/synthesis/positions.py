@@ -95,7 +95,7 @@ class Moves(NamedTuple):
 
 @jit
 def unrank(t: Tables, others: int, position: int, scenes: Ints) -> None:
-    """Set the scene of every node in a position."""
+    """Set `scenes` (V,) to the scene of every node in `position` (number)."""
     left = others
     ego = 1
     rest = position
@@ -119,7 +119,7 @@ def unrank(t: Tables, others: int, position: int, scenes: Ints) -> None:
 
 @jit
 def rank(t: Tables, others: int, scenes: Ints) -> int:
-    """Return the number of a position."""
+    """Return the number of the position with the scenes `scenes` (V,)."""
     left = others
     ego = 1
     total = 0

@@ -20,7 +20,10 @@ STOPPED, RANKED, NEXT_RANK, QUEUED, TAKEN, UNFRIENDLY = range(6)
 
 
 class Graph(NamedTuple):
-    """The game (`game.Game`), and the moves of the ego backwards.
+    """The game (`game.Game`, whose fields have the same shapes here), and the moves of the ego backwards.
+
+    Those into position p are ``back[back_at[p]:back_at[p + 1]]``: `back_at` (N+1,) int64, `back` (F,) int32. `owner`
+    (O,) int32 is the position of each debt.
 
     Of a lean game `to` and `moved` are room for the moves of one position, and `work` and `out` serve to work them
     out; so each thread needs a graph of its own.
@@ -148,7 +151,7 @@ def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
 
 @jit_long
 def own(owed_at: Ints, owner: Numbers) -> None:
-    """Set the position (O,) of each debt."""
+    """Set `owner` (O,) to the position of each debt; those of position p begin at entry p of `owed_at` (N+1,)."""
     for position in range(owed_at.shape[0] - 1):
         for o in range(owed_at[position], owed_at[position + 1]):
             owner[o] = position

@@ -11,10 +11,10 @@ from dubins_traffic.cars.state import EGO, Labels, Observation, State
 from dubins_traffic.errors import PeerError
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Clock, End, Ending, Polled, Streams, Transport, View
-from dubins_traffic.record.wall import summary
+from dubins_traffic.protocols import Clock, End, Ending, Looks, Polled, Streams, Transport, View
 from dubins_traffic.transports.inbox import Inbox, Slot
 from dubins_traffic.transports.patience import Patience
+from dubins_traffic.transports.punctuality import Punctuality
 from dubins_traffic.transports.shown import between, kept, onward
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ class Link:
         self.inbox = Inbox(self._patience.flood)
         self._stream = transport if isinstance(transport, Streams) else None
         self._polled = transport if isinstance(transport, Polled) else None
+        self._looks = transport if isinstance(transport, Looks) else None
         self._between = self._stream is not None and not clock.lockstep
         self._interval = IDLE if self._stream is None else self._stream.interval
         self.mark: Callable[[bool], None] = lambda _running: None
@@ -72,10 +73,7 @@ class Link:
         self._announced = 0.0
         self._begun: float | None = None
         self._sent = 0.0
-        self._late = dict.fromkeys(self._remote, 0)
-        self._answers: dict[str, list[float]] = {car: [] for car in self._remote}
-        self._behind: list[float] = []
-        self._slipped = 0.0
+        self._punctuality = Punctuality(self._remote)
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
@@ -121,8 +119,11 @@ class Link:
         if tick == 0 and self.clock.lockstep:
             until = max(until, self._announced + self._patience.begin)
         answered = self._wait(lambda: self._answers_frame(slot, tick), until, car)
+        if not answered and self.clock.lockstep and self._has_gone(slot):
+            back = monotonic() + self._patience.absence + IDLE
+            answered = self._wait(lambda: self._answers_frame(slot, tick), back, car)
         if answered and slot.arrived is not None:
-            self._answers[car].append(max(0.0, slot.arrived - self._sent))
+            self._punctuality.answers[car].append(max(0.0, slot.arrived - self._sent))
             if self._repeated:
                 self._settle()
         elif self.clock.lockstep:
@@ -130,7 +131,7 @@ class Link:
                 End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
             )
         else:
-            self._late[car] += 1
+            self._punctuality.late[car] += 1
             self._check_silence(slot, tick)
         with self.inbox.condition:
             return slot.speed, slot.yaw_rate
@@ -166,22 +167,11 @@ class Link:
 
     def report(self) -> Mapping[str, Any]:
         """Return how punctual the trial was, for the sidecar of its record (docs/records.md)."""
-        drivers = {
-            car: {
-                "commands": slot.commands,
-                "late": self._late[car],
-                "reconnections": slot.reconnections,
-                "peers": slot.peers,
-                "answer_s": summary(self._answers[car]),
-            }
-            for car, slot in ((car, self.inbox.slot(car)) for car in self._remote)
-        }
         return {
             "name": self.transport.name,
             "clock": "lockstep" if self.clock.lockstep else "real time",
-            "drivers": drivers,
-            "frame_lateness_s": summary(self._behind),
-            "slipped_s": self._slipped,
+            "drivers": self._punctuality.drivers({car: self.inbox.slot(car) for car in self._remote}),
+            **self._punctuality.frames(),
             "unknown_commands": self.inbox.unknown,
         }
 
@@ -199,15 +189,19 @@ class Link:
 
     def _check_silence(self, slot: Slot, tick: int) -> None:
         """Name a peer that is there and says nothing; one that has gone is given its time to come back."""
-        if slot.gone_since is not None:
-            return
         patience = self._patience.silence
         if slot.arrived is None and self._patience.at_once:
             patience = max(patience, self._patience.begin)  # it may be planning
         since = slot.arrived if slot.arrived is not None else self.clock.due(0)
-        if monotonic() - since > patience:
+        if monotonic() - since > patience and not self._has_gone(slot):
             detail = f"no command for {patience:g} s at tick {tick}"
             raise PeerError(End.PEER_SILENT.value, detail)
+
+    def _has_gone(self, slot: Slot) -> bool:
+        """Look whether the peer that does not answer has gone: a busy machine may not have told yet."""
+        if self._looks is not None:
+            self._looks.look()
+        return slot.gone_since is not None
 
     def _wait(self, done: Callable[[], bool], until: float, car: str | None, *, still: bool = False) -> bool:
         """Wait for `done` until then, streaming in between; return whether it came. Faults of `car` end it."""
@@ -227,6 +221,7 @@ class Link:
                 self._polled.receive(pause)
             now = monotonic()
             if now >= until and not done():
+                self._check(car)
                 return False
             if self._streams(still) and now >= self._next_view:
                 self._show(onward(self._state, self._elapsed(now)), self._elapsed(now), now)
@@ -315,9 +310,7 @@ class Link:
         if self.clock.lockstep:
             return
         behind = monotonic() - due
-        self._behind.append(behind)
-        if behind > self.clock.due(1) - self.clock.due(0):
-            self._slipped += behind
+        if self._punctuality.slip(behind, self.clock.due(1) - self.clock.due(0)):
             self.clock.shift(behind)
 
     def _send(self) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Contact
-from dubins_traffic.controllers.blame import said
+from dubins_traffic.controllers.blame import value_text
 from dubins_traffic.errors import ControllerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import End
@@ -31,7 +31,7 @@ def checked_command(command: object, tick: int) -> tuple[float, float]:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # what is no number may do anything when it is read as one
-        detail = f"a command is two numbers (speed, yaw rate): got {said(command, 80)} at tick {tick}"
+        detail = f"a command is two numbers (speed, yaw rate): got {value_text(command, 80)} at tick {tick}"
         raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
     if not (math.isfinite(speed) and math.isfinite(yaw)):
         detail = f"a command is two finite numbers: got ({speed}, {yaw}) at tick {tick}"

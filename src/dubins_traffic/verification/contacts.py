@@ -1,4 +1,4 @@
-"""A record as its poses tell it: labels and contacts found again, whatever it says of them."""
+"""Labels and contacts of a record found again from its poses, whatever the record says of them."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def slack_of(instance: Instance) -> Slack:
 
 
 def world_difference(record: Record) -> Difference | None:
-    """Return the first thing in the frames of `record` that can't have happened.
+    """Return the first place in the frames of `record` that bounds, bodies or times rule out.
 
     No car within its bounds can have done it, or contacts don't fit the poses or are not in order of time.
     """

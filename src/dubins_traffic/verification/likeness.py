@@ -30,7 +30,7 @@ def header_difference(written: bytes, record: Record) -> Difference | None:
 
 
 def instance_difference(record: Record, expected: Instance) -> Difference | None:
-    """Return where the instance of `record` is another than the one that was to be run."""
+    """Return the first difference between the instance of `record` and the one that was to be run."""
     same = instance_from_document(instance_to_document(expected))  # with what it leaves out at its default
     documents = [_as_json(instance_to_document(instance)) for instance in (record.instance, same)]
     return unlike("instance", documents[0], documents[1])

@@ -101,7 +101,7 @@ def _first_difference(record: Record, data: bytes, expected: Instance | None) ->
 
 
 def _earlier(record: Record) -> Difference | None:
-    """Return the first thing that can't be: by the bounds of a world that is not ours, or by what follows."""
+    """Return the earlier of two differences: from the bounds of a world that is not ours, or from simulating again."""
     found = [
         None if record.instance.simulator == OURS else world_difference(record),
         trial_difference(record),

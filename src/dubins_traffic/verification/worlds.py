@@ -56,7 +56,7 @@ def commands_of(frames: Frames) -> Floats:
 class Shown:
     """A world that is not ours, as it was recorded (a `protocols.Simulator`).
 
-    Contacts are those of the record, but where poses alone tell them they are found again.
+    Contacts are those of the record, except where poses alone tell them: there they are found again.
     """
 
     capabilities = Capabilities(batched=False, deterministic=True, lockstep=True)

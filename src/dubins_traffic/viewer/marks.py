@@ -111,17 +111,17 @@ def verdict_text(verdict: Verdict) -> str:
     if own is None:
         task = "and did its task" if verdict.verdict is Ruling.SATISFIED else "and did not do all of its task"
         return f"The ego broke nothing {task}."
-    told = f"The ego broke {own.rule} at {own.time:.2f} s"
+    breach = f"The ego broke {own.rule} at {own.time:.2f} s"
     excuse = verdict.excuse
     if excuse is None:
-        return f"{told}, while the others had kept their part."
+        return f"{breach}, while the others had kept their part."
     fall = excuse.violation
     when = "at the same instant" if fall.tick == own.tick else f"at {fall.time:.2f} s"
     place = fall.where.intersection
     where = "" if place is None else f" near ({place[0]}, {place[1]})"
     words = RULES.get(fall.rule, "a rule broken")
     seen = "the ego sensed it" if excuse.sensed else "the ego did not sense it"
-    return f"{told}. It is excused by {fall.car}, which broke {fall.rule} {when}{where} ({words}); {seen}."
+    return f"{breach}. It is excused by {fall.car}, which broke {fall.rule} {when}{where} ({words}); {seen}."
 
 
 def excuse_mark(instance: Instance, verdict: Verdict) -> Mark | None:

@@ -1,4 +1,4 @@
-"""How notebooks show values: a picture and a few numbers as HTML, with nothing in it that runs or is loaded."""
+"""How notebooks show values: a picture and a few numbers as HTML, without scripts and without anything to load."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def html_of(subject: object) -> str:
     if isinstance(subject, Problem):
         return _page(svg.problem_picture(subject), "Problem", subject.summary)
     if isinstance(subject, Instance):
-        told = f"{subject.title}, {subject.duration:g} s; {subject.problem.summary}"
-        return _page(svg.trial_picture(subject), "Instance", told)
+        caption = f"{subject.title}, {subject.duration:g} s; {subject.problem.summary}"
+        return _page(svg.trial_picture(subject), "Instance", caption)
     if isinstance(subject, Record):
         return record_html(subject)
     if isinstance(subject, ScoreSheet):
@@ -63,13 +63,13 @@ def html_of(subject: object) -> str:
 
 def record_html(record: Record) -> str:
     """Return the HTML of a record: all paths, contacts, and where the cars ended."""
-    told = repr(record).strip("<>").removeprefix("Record")
+    caption = repr(record).strip("<>").removeprefix("Record")
     if len(record.frames) == 0:
-        return _page(svg.trial_picture(record.instance), "Record", told.strip(": "))
+        return _page(svg.trial_picture(record.instance), "Record", caption.strip(": "))
     marks = [contact_mark(record.instance, contact) for contact in record.frames.contacts[:MARKS]]
     own = Paths.of(record.instance, record.frames)
     picture = svg.trial_picture(record.instance, own.last, own.lines(), marks)
-    return _page(picture, "Record", told.strip(": "))
+    return _page(picture, "Record", caption.strip(": "))
 
 
 def trial_html(
@@ -81,8 +81,8 @@ def trial_html(
         marks = breach_marks(instance, score.verdict.violations[:MARKS])
     picture = svg.trial_picture(instance, end or None, paths, marks)
     why = "" if score.verdict is None else verdict_text(score.verdict)
-    told = f"{instance.title}, {score.summary}. {why}"
-    return _page(picture, "Result", told)
+    caption = f"{instance.title}, {score.summary}. {why}"
+    return _page(picture, "Result", caption)
 
 
 def sheet_html(heading: str, sheet: ScoreSheet) -> str:
@@ -107,10 +107,10 @@ def sheet_html(heading: str, sheet: ScoreSheet) -> str:
     return shares_html(heading, sheet.summary, found, table(head, rows, len(sheet.trials)))
 
 
-def shares_html(heading: str, told: str, shares: Mapping[str, Mapping[str, int]], more: str = "") -> str:
+def shares_html(heading: str, caption: str, shares: Mapping[str, Mapping[str, int]], more: str = "") -> str:
     """Return the HTML of counts: a bar for each row, and `more`, which is HTML already."""
     picture = svg.bars({row: dict(sorted(counts.items())) for row, counts in shares.items()})
-    return _page(picture, heading, told) + more
+    return _page(picture, heading, caption) + more
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], total: int) -> str:
@@ -122,5 +122,5 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], total: int) -> str
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>{rest}"
 
 
-def _page(picture: str, heading: str, told: str) -> str:
-    return f"<div>{picture}<p><b>{html.escape(heading)}</b> {html.escape(told)}</p></div>"
+def _page(picture: str, heading: str, caption: str) -> str:
+    return f"<div>{picture}<p><b>{html.escape(heading)}</b> {html.escape(caption)}</p></div>"

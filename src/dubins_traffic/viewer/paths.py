@@ -19,7 +19,9 @@ CARS = 60
 
 
 class Paths:
-    """A sink that keeps every so manieth position of the first cars, and the last pose of all."""
+    """A sink that keeps every k-th position of the first cars, and the last pose of all cars."""
+
+    forks = True
 
     def __init__(self) -> None:
         self._step = 1

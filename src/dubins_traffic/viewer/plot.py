@@ -164,7 +164,7 @@ def _heading(instance: Instance) -> str:
 
 
 def _ground(instance: Instance, lines: Sequence[Floats]) -> Canvas:
-    """Return a canvas with what stands still in an instance, and room for its cars and their paths."""
+    """Return a canvas with roads, goals and obstacles of an instance, and room for its cars and their paths."""
     problem = instance.problem
     spans = [obstacle_points(obstacle) for obstacle in problem.obstacles]
     poses = np.array([[start.x, start.y] for start in instance.starts]).reshape(-1, 2)

@@ -76,7 +76,7 @@ class Lcm:
         except TransportError:
             self.close()
             raise
-        self._lcm.subscribe(connection.MODE, self._asked)
+        self._lcm.subscribe(connection.MODE, self._mode_requested)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars."""
@@ -178,7 +178,7 @@ class Lcm:
 
         return take
 
-    def _asked(self, _channel: str, data: bytes) -> None:
+    def _mode_requested(self, _channel: str, data: bytes) -> None:
         try:
             asked = mode_t.decode(data)
         except GARBAGE:

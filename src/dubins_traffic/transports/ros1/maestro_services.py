@@ -24,7 +24,7 @@ PROBLEM = f"/{NAME}/probleminstance_JSON"
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class SessionParameters:
     """What parameters say of the whole session, as in 2016.
 
     `number_trials` is None for trials without end; bounds are [low, high]; `results_file` is the trial data file.
@@ -47,7 +47,7 @@ class MaestroServices:
         Where requests go.
     maestro : Maestro, optional
         Who answers mode requests; without one there is no mode service.
-    told : Told
+    parameters : SessionParameters
         The session, for parameters.
     simulated : bool
         Whether the cars are simulated here, so that pausing and placing them is served.
@@ -60,7 +60,7 @@ class MaestroServices:
         rospy: Any,
         mailbox: Mailbox,
         maestro: Maestro | None,
-        told: Told,
+        parameters: SessionParameters,
         *,
         simulated: bool = True,
         foreign: ForeignMaestro | None = None,
@@ -87,9 +87,12 @@ class MaestroServices:
             )
         if maestro is not None:
             self._services.append(rospy.Service(f"/{NAME}/mode", m.MMode, self._mode))
-        self._put("/number_trials", told.number_trials)
-        self._put("/dubins_traffic/results_file", told.results_file)
-        for name, bounds in (("duration", told.duration_bounds), ("number_goals", told.number_goals_bounds)):
+        self._put("/number_trials", parameters.number_trials)
+        self._put("/dubins_traffic/results_file", parameters.results_file)
+        for name, bounds in (
+            ("duration", parameters.duration_bounds),
+            ("number_goals", parameters.number_goals_bounds),
+        ):
             self._put(f"/{NAME}/{name}_bounds", None if bounds is None else f"{bounds[0]} {bounds[1]}")
 
     def describe(self, instance: Instance) -> None:

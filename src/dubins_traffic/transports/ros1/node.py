@@ -18,8 +18,8 @@ REFEREE = "dubins_traffic_referee"
 """Name of this process where the maestro is another one."""
 LOOK = 0.1
 """Seconds between two looks at who is connected."""
-PING = 10
-"""Looks between two calls of the master."""
+PING = 1.0
+"""Seconds between two calls of the master."""
 GRACE = 0.5
 MISSED = 2
 """Calls of the master in a row that may go unanswered, and one more."""
@@ -60,6 +60,16 @@ def leave() -> None:
         rospy.signal_shutdown("the session is over")
 
 
+def tell_first(rospy: Any, hook: Callable[[str], None]) -> None:
+    """Let `hook` be told why this node is shut down before anything of it is closed.
+
+    rospy's own first hook closes all topics, and then talks to the master for a while: who publishes meanwhile fails,
+    and could not say why.
+    """
+    with rospy.core._shutdown_lock:
+        rospy.core._preshutdown_hooks.insert(0, hook)
+
+
 def abandon(rospy: Any, detail: str) -> None:
     """Leave a graph whose master has gone.
 
@@ -81,7 +91,9 @@ def _node_at(uri: str, name: str) -> str | None:
 
 
 class Watch:
-    """A thread that looks ten times a second at who is connected, and once a second whether the master lives.
+    """Two threads: one looks ten times a second at who is connected, one asks once a second whether the master lives.
+
+    They are two since a master on a busy machine takes its time to answer, and who has gone is to be seen meanwhile.
 
     Parameters
     ----------
@@ -96,21 +108,23 @@ class Watch:
     def __init__(self, uri: str, look: Callable[[], None], lost: Callable[[str], None]) -> None:
         self._uri, self._look, self._lost = uri, look, lost
         self._over = Event()
-        self._thread = Thread(target=self._run, name="ros1", daemon=True)
-        self._thread.start()
+        self._threads = [Thread(target=run, name="ros1", daemon=True) for run in (self._see, self._ask)]
+        for thread in self._threads:
+            thread.start()
 
     def close(self) -> None:
-        """End the thread."""
+        """End the threads."""
         self._over.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
 
-    def _run(self) -> None:
-        looks = missed = 0
+    def _see(self) -> None:
         while not self._over.wait(LOOK):
             self._look()
-            looks += 1
-            if looks % PING:
-                continue
+
+    def _ask(self) -> None:
+        missed = 0
+        while not self._over.wait(PING):
             missed = 0 if answers(self._uri) else missed + 1
             if missed >= MISSED:
                 self._lost(f"the ROS master at {self._uri} has gone")

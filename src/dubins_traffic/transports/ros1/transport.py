@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import select
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 from xmlrpc.client import Error as XmlRpcError
 
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.ros1.maestro_services import MaestroServices, Told
+from dubins_traffic.transports.ros1.maestro_services import MaestroServices, SessionParameters
 from dubins_traffic.transports.ros1.messages import load
-from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join
+from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join, tell_first
 from dubins_traffic.transports.ros1.world import Topics, World
 from dubins_traffic.transports.stamps import Stamps
 
@@ -35,7 +37,7 @@ class Ros1:
         The ROS master's.
     maestro : Maestro, optional
         Who grants modes; without one trials start by themselves.
-    told : Told
+    parameters : SessionParameters
         The session, for parameters.
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
@@ -55,19 +57,27 @@ class Ros1:
         uri: str,
         *,
         maestro: Maestro | None = None,
-        told: Told | None = None,
+        parameters: SessionParameters | None = None,
         clock: bool = False,
         simulated: bool = True,
         rate: float = 120.0,
         foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
-        self._uri, self._maestro, self._told, self._clock = uri, maestro, told or Told(), clock
+        self._uri, self._maestro, self._parameters, self._clock = (
+            uri,
+            maestro,
+            parameters or SessionParameters(),
+            clock,
+        )
         self._stamps = Stamps(self.interval, clock=clock)
         self._simulated_here, self._foreign = simulated, foreign
         self._world: World | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
+        self._spoke: set[str] = set()
+        self._met: set[str] = set()
+        self._looking = Lock()
         self._open = self._lost = False
 
     @property
@@ -84,13 +94,13 @@ class Ros1:
             self._rospy,
             mailbox,
             self._maestro,
-            self._told,
+            self._parameters,
             simulated=self._simulated_here,
             foreign=self._foreign,
         )
-        self._watch = Watch(self._uri, self._look, self._lose)
+        self._watch = Watch(self._uri, self.look, self._lose)
         self._open = True
-        self._rospy.core.add_preshutdown_hook(self._displaced)
+        tell_first(self._rospy, self._displaced)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
@@ -130,17 +140,36 @@ class Ros1:
             self._listen(())
             self._services.close(forget=not self._lost)
 
+    def look(self) -> None:
+        """Tell the mailbox who has come and gone, also of who came, spoke and went between two looks."""
+        with self._looking:
+            for car, subscriber in self._subscribers.items():
+                before, was_heard = self._there.get(car, 0), car in self._spoke
+                there = self._there[car] = connections(subscriber)
+                most = max(before, there)
+                if most == 0 and was_heard and car not in self._met:
+                    most = 1
+                if most > 0:
+                    self._met.add(car)
+                for _ in range(before, most):
+                    self._mailbox.joined(car)
+                for _ in range(there, most):
+                    self._mailbox.left(car)
+
     def _listen(self, remote: Sequence[str]) -> None:
         """Subscribe to the commands of the cars `remote`, and to no others."""
-        for car in [car for car in self._subscribers if car not in remote]:
-            self._subscribers.pop(car).unregister()
-            for _ in range(self._there.pop(car, 0)):
-                self._mailbox.left(car)
-        for car in remote:
-            if car not in self._subscribers:
-                self._subscribers[car] = self._rospy.Subscriber(
-                    COMMANDS.format(car), load().Twist, partial(self._heard, car), tcp_nodelay=True
-                )
+        with self._looking:
+            for car in [car for car in self._subscribers if car not in remote]:
+                self._subscribers.pop(car).unregister()
+                for _ in range(self._there.pop(car, 0)):
+                    self._mailbox.left(car)
+            self._spoke.clear()
+            self._met.clear()
+            for car in remote:
+                if car not in self._subscribers:
+                    self._subscribers[car] = self._rospy.Subscriber(
+                        COMMANDS.format(car), load().Twist, partial(self._heard, car), tcp_nodelay=True
+                    )
 
     @contextmanager
     def _guarded(self) -> Generator[None]:
@@ -170,18 +199,27 @@ class Ros1:
                 self._world.publish(view, self._stamps.now(), self._stamps.simulated, frame=frame)
 
     def _heard(self, car: str, message: Any) -> None:
+        self._spoke.add(car)
         self._mailbox.command(car, message.linear.x, message.angular.z)
 
-    def _look(self) -> None:
-        """See who has come and who has gone. rospy keeps a lost connection, without a socket, to try again."""
-        for car, subscriber in list(self._subscribers.items()):
-            implementation = subscriber.impl
-            if implementation is None:
-                continue
-            there = sum(connection.socket is not None for connection in list(implementation.connections))
-            before = self._there.get(car, 0)
-            self._there[car] = there
-            for _ in range(before, there):
-                self._mailbox.joined(car)
-            for _ in range(there, before):
-                self._mailbox.left(car)
+
+def connections(subscriber: Any) -> int:
+    """Return how many publishers are connected to a subscriber now, whatever rospy has noticed by now.
+
+    rospy keeps a lost connection, without a socket, to try again; and the system knows that a process has ended before
+    rospy's threads have run.
+    """
+    implementation = subscriber.impl
+    if implementation is None:
+        return 0
+    sockets = [connection.socket for connection in list(implementation.connections)]
+    return sum(each is not None and _is_up(each.fileno()) for each in sockets)
+
+
+def _is_up(descriptor: int) -> bool:
+    """Tell whether the other end of a socket has not hung up; -1 is a socket that is closed."""
+    if descriptor < 0:
+        return False
+    asked = select.poll()
+    asked.register(descriptor, select.POLLRDHUP)
+    return not asked.poll(0)

@@ -1,0 +1,131 @@
+"""E-agents of the user's own, driven in Python: one object for each, from ``module:Class``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol, cast
+
+from dubins_traffic import outside
+from dubins_traffic.cars.state import Labels, Observation, State
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.observations.senses import Senses
+from dubins_traffic.outside import Seam
+from dubins_traffic.problem.instance import EAgent, Instance
+from dubins_traffic.problem.kinds import OWN
+
+FAULT: Final = "e-agent"
+"""Kind of the event that tells what the class of an e-agent raised."""
+_SEAM = Seam(
+    "e-agents",
+    "driver of an e-agent",
+    ("begin", "act"),
+    "begin(instance, car, parameters) and act(observation) -> (speed, yaw rate)",
+)
+
+
+class OwnAgent(Protocol):
+    """Drives one e-agent; a class without arguments, of which one object drives one car through one trial.
+
+    It must do the same again in the same trial: what is random follows from ``instance.seed``, ``instance.trial`` and
+    `car`. A class attribute `parameters`, a mapping of defaults, says which parameters it takes. A fork of a trial goes
+    on with a deep copy; one that has a method ``reseed(seed)`` is told where a fork draws from another seed.
+    """
+
+    def begin(self, instance: Instance, car: int, parameters: Mapping[str, Any]) -> None:
+        """A trial begins, in which it drives number `car`; `parameters` are all of them, defaults filled in."""
+        ...
+
+    def act(self, observation: Observation) -> tuple[float, float]:
+        """Choose speed (m/s) and yaw rate (rad/s) for the coming tick from what it senses, without noise."""
+        ...
+
+
+@dataclass(slots=True)
+class _Driven:
+    """An e-agent on its way: its number, name, driver and senses; a driver that has raised is not asked again."""
+
+    car: int
+    name: str
+    driver: OwnAgent
+    senses: Senses
+    has_raised: bool = False
+
+
+class OwnAgents:
+    """Drives those e-agents of a trial that are the user's own (a `protocols.Driver`).
+
+    What a class raises ends the trial as a fault of that e-agent; an event tells what it was.
+    """
+
+    def reset(self, instances: Sequence[Instance], state: State) -> None:  # noqa: ARG002  # they sense for themselves
+        """Make and begin the drivers of the one trial.
+
+        Raises
+        ------
+        InputError
+            If there are several trials, a class can't be found or made, or takes other parameters.
+        """
+        if len(instances) != 1:
+            raise InputError("these run by themselves", field="type", value=OWN, expected="one trial")
+        (instance,) = instances
+        self._reports: list[tuple[str, str]] = []
+        self._driven = [
+            _begun(instance, car, agent)
+            for car, agent in enumerate(instance.e_agents, start=1)
+            if agent.kind == OWN
+        ]
+
+    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
+        """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
+        for own in self._driven:
+            commands[0, own.car] = self._asked(own, own.senses.observe(tick, state, labels))
+
+    def reseed(self, seed: int) -> None:
+        """Tell the drivers that can be told that what is drawn from now on follows from another seed."""
+        for own in self._driven:
+            tell = getattr(own.driver, "reseed", None)
+            if callable(tell):
+                tell(seed)
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what classes have raised since the last call."""
+        found, self._reports = self._reports, []
+        return found
+
+    def _asked(self, own: _Driven, observation: Observation) -> tuple[float, float]:
+        if own.has_raised:
+            return math.nan, math.nan
+        try:
+            speed, yaw_rate = own.driver.act(observation)
+            return float(speed), float(yaw_rate)
+        except Exception as error:
+            own.has_raised = True
+            self._reports.append((FAULT, f"{own.name} raised {outside.plainly(error)}"))
+            return math.nan, math.nan
+
+
+def _begun(instance: Instance, car: int, agent: EAgent) -> _Driven:
+    maker = outside.find(agent.type, _SEAM)
+    if not isinstance(maker, type):  # what a stranger's record names is not called unless it is such a class
+        raise _SEAM.refuse(f"{agent.type.rpartition(':')[2]} is not a class", agent.type, outside.CLASS)
+    for method in _SEAM.methods:
+        if not callable(getattr(maker, method, None)):
+            problem = f"{maker.__name__} is not a {_SEAM.name}: it lacks the method {method}"
+            raise _SEAM.refuse(problem, agent.type, _SEAM.signature)
+    driver = cast(OwnAgent, outside.make(maker, agent.type, _SEAM))
+    defaults = dict(getattr(driver, "parameters", {}))
+    for name in agent.parameters:
+        if name not in defaults:
+            expected = f"one of {', '.join(defaults)}" if defaults else "no parameters"
+            raise InputError(
+                "unknown parameter", field=f"e-agents[{car - 1}].parameters", value=name, expected=expected
+            )
+    try:
+        driver.begin(instance, car, {**defaults, **agent.parameters})
+    except Exception as error:
+        problem = f"{agent.name} raised {outside.plainly(error)} in begin"
+        raise _SEAM.refuse(problem, agent.type, "an e-agent that can begin") from error
+    return _Driven(car, agent.name, driver, Senses(instance, car))

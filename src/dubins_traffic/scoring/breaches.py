@@ -1,0 +1,56 @@
+"""What tables tell of a verdict: the ruling, its excuse, and how often each rule was broken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from dubins_traffic.scoring.metric import Column, Told, Value
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_NAME, EGO_RULES, Excuse, Verdict, assumption_of
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.score import Score
+
+
+def _of_verdict(value: Callable[[Verdict], Value]) -> Callable[[Score], Value]:
+    """Return what takes a value from a score's verdict; None where there is none."""
+    return lambda score: None if score.verdict is None else value(score.verdict)
+
+
+def _of_excuse(value: Callable[[Excuse], Value]) -> Callable[[Score], Value]:
+    return _of_verdict(lambda verdict: None if verdict.excuse is None else value(verdict.excuse))
+
+
+def _breaches(*, ego: bool) -> Callable[[Score], Value]:
+    return _of_verdict(lambda verdict: sum((one.car == EGO_NAME) == ego for one in verdict.violations))
+
+
+def _broken(rule: str) -> Callable[[Score], Value]:
+    return _of_verdict(
+        lambda verdict: sum(one.car == EGO_NAME and one.rule == rule for one in verdict.violations)
+    )
+
+
+def _fallen(part: str) -> Callable[[Score], Value]:
+    return _of_verdict(
+        lambda verdict: sum(
+            one.car != EGO_NAME and assumption_of(one.rule) == part for one in verdict.violations
+        )
+    )
+
+
+TOLD = (
+    Told(Column("clean", "clean", "share", 1, "bool"), _of_verdict(lambda verdict: verdict.clean)),
+    Told(Column("verdict", kind="string"), _of_verdict(lambda verdict: verdict.verdict.value)),
+    Told(Column("near", kind="bool"), _of_verdict(lambda verdict: verdict.near)),
+    Told(
+        Column("assumption_broken", "assumption broken by others", "share", kind="bool"),
+        _of_verdict(lambda verdict: verdict.assumption_broken),
+    ),
+    Told(Column("excuse", kind="string"), _of_excuse(lambda excuse: excuse.assumption)),
+    Told(Column("excuse_sensed", kind="bool"), _of_excuse(lambda excuse: excuse.sensed)),
+    Told(Column("breaches", "breaches of the ego", "", -1, "int32"), _breaches(ego=True)),
+    Told(Column("breaches_of_others", "breaches of others", kind="int32"), _breaches(ego=False)),
+    *(Told(Column(f"breaches.{rule}", kind="int32"), _broken(rule)) for rule in EGO_RULES),
+    *(Told(Column(f"breaches_of_others.{part}", kind="int32"), _fallen(part)) for part in ASSUMPTIONS),
+)

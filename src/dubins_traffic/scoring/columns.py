@@ -1,0 +1,55 @@
+"""The columns of every score, in the orders of tables and of reports; each stands beside its metric."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from dubins_traffic.scoring import (
+    breaches,
+    clearance,
+    collisions,
+    driving,
+    duration,
+    formulas,
+    goals,
+    icra2016,
+    interventions,
+    paper,
+)
+from dubins_traffic.scoring.metric import Column, Told
+
+_PARTS = (
+    duration.TOLD,
+    goals.TOLD,
+    driving.TOLD,
+    clearance.TOLD,
+    collisions.TOLD,
+    interventions.TOLD,
+    formulas.TOLD,
+    breaches.TOLD,
+    paper.TOLD,
+    icra2016.TOLD,
+)
+_FIRST_IN_TABLES = (
+    "duration_s", "clean", "counted_rounds", "verdict", "near", "assumption_broken", "rounds", "goals_visited",
+    "longest_gap_s", "distance_m", "standing_share", "off_road_s", "off_road_share", "lane_departures",
+    "min_clearance_m", "collisions", "collisions_ego_fault", "collisions_other_fault", "collisions_both_fault",
+    "collisions_among_others", "excuse", "excuse_sensed",
+)  # fmt: skip
+"""Columns whose places in tables are kept since files have them; the rest follow as the parts do."""
+_FIRST_IN_REPORTS = (
+    "clean", "counted_rounds", "rounds", "goals_visited", "longest_gap_s", "breaches", "breaches_of_others",
+    "assumption_broken", "collisions", "collisions_ego_fault", "collisions_other_fault", "collisions_both_fault",
+    "collisions_among_others", "min_clearance_m", "distance_m", "standing_share", "off_road_s", "off_road_share",
+    "lane_departures", "interventions", "duration_s",
+)  # fmt: skip
+"""What ranks controllers first; the rest follow, the score of 2016 last."""
+_KNOWN = {own.column.name: own for part in _PARTS for own in part}
+
+SCORES: Final[Mapping[str, Told]] = {name: _KNOWN[name] for name in (*_FIRST_IN_TABLES, *_KNOWN)}
+"""What is kept of every score, by name, in the order of tables; None where a score has none."""
+REPORTED: Final[tuple[Column, ...]] = tuple(
+    _KNOWN[name].column for name in dict.fromkeys((*_FIRST_IN_REPORTS, *SCORES)) if _KNOWN[name].column.label
+)
+"""Of which of them reports have a line, in their order."""
