@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.campaign.precompile import precompile
+from dubins_traffic.checkup.precompile import precompile
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels import asking
 

@@ -21,7 +21,7 @@ def warm(
 
     Ctrl-C keeps what is compiled.
     """
-    from dubins_traffic.campaign.precompile import precompile
+    from dubins_traffic.checkup.precompile import precompile
     from dubins_traffic.kernels.store import cache_folder
 
     with progress(what="kernels") as tell:
