@@ -12,7 +12,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.kernels.calls import steady
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.lanes import knowledge as columns
 from dubins_traffic.policies.lanes.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
 from dubins_traffic.policies.lanes.knowledge import Knowledge
@@ -67,7 +67,6 @@ class Lanes:
         self._round = self._find_round()
         self._roads = pack([problem.network], [2.0 * problem.car.w])
         self._known = None
-        self._decide = steady(decide)
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -76,6 +75,7 @@ class Lanes:
         known = self._known
         if known is None:
             known = self._known = self._furnish(observation.pose)
+            self._decide = bound(decide, (known, self._roads))
         elif self._blocked or self._closed:
             known = self._known = self._remember(known, observation)
         ego, others = known.ego[0], known.others[0]

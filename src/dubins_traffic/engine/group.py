@@ -36,7 +36,7 @@ from dubins_traffic.engine.feed import Feed
 from dubins_traffic.engine.fork import world_of
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.calls import steady
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
 from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
@@ -140,7 +140,7 @@ class Group:
         self._breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
         self._feed = Feed(instances, places, metrics) if metrics else None
-        self._take = steady(run_trials)
+        self._take = bound(run_trials, (self.active, 1, 1.0, self.commands, self._world))
         self._run(self.active, 1)
         self._aim()
 
@@ -187,7 +187,7 @@ class Group:
         twin._contacts = [list(self._contacts[b]) for b in trials]
         twin._breaches = [list(self._breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
-        twin._take = steady(run_trials)
+        twin._take = bound(run_trials, (taken, 1, 1.0, twin.commands, twin._world))
         twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
         twin._note_rules()
         return twin

@@ -320,11 +320,13 @@ def _compare_quickly() -> None:
     def is_equal(one: Any, other: Any) -> Any:
         return (type(one) is type(other) and one._values == other._values) or thorough(one, other)
 
-    def same_for_all(_one: Any) -> int:
-        return 1
-
     settings.__eq__ = is_equal
-    settings.__hash__ = same_for_all
+    settings.__hash__ = _same
+
+
+def _same(_settings: object) -> int:
+    """Return a hash of settings, of which few differ."""
+    return 1
 
 
 def _index_plainly() -> None:

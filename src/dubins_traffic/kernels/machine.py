@@ -30,12 +30,11 @@ class Loader:
         machine = target.create_target_machine(jit=True)
         self._engine = self._llvm.create_mcjit_compiler(self._llvm.parse_assembly(""), machine)
 
-    def load(self, code: bytes, symbol: str) -> Any:
-        """Return the function `symbol` of an object file, to be called with the frame and a block for the answer."""
+    def load(self, code: bytes, symbol: str) -> int:
+        """Return the address of the function `symbol` of an object file, which takes a frame and room for an answer."""
         self._engine.add_object_file(self._llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
-        address = self._engine.get_function_address(symbol)
-        return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p, ctypes.c_void_p)(address)
+        return self._engine.get_function_address(symbol)
 
 
 _lock = Lock()
@@ -46,8 +45,8 @@ def _loader() -> Loader:
     return Loader()
 
 
-def load(code: bytes, symbol: str) -> Any:
-    """Load an object file into this process and return its function `symbol`, as `Loader.load` does."""
+def load(code: bytes, symbol: str) -> int:
+    """Load an object file into this process and return the address of its function `symbol`."""
     with _lock:
         return _loader().load(code, symbol)
 
@@ -71,17 +70,23 @@ class Code:
         Those of its arguments.
     answer : Kind
         That of what it returns.
-    function : callable
-        What `load` returns.
+    where : int
+        The address that `load` returns.
+
+    Attributes
+    ----------
+    kinds, answer, address
+        The same.
     """
 
-    def __init__(self, kinds: Sequence[Kind], answer: Kind, function: Any) -> None:
+    def __init__(self, kinds: Sequence[Kind], answer: Kind, where: int) -> None:
         self.kinds = tuple(kinds)
-        self.pack = struct.Struct(
+        self._pack = struct.Struct(
             "@" + "".join("q" if not is_number(kind) else letters(kind) for kind in kinds)
         ).pack
-        self.function = function
-        self._answer = answer
+        self.address = where
+        self.answer = answer
+        self._function = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p, ctypes.c_void_p)(where)
         self._read = struct.Struct("@" + letters(answer))
 
     def call(self, whole: Sequence[Any]) -> Any:
@@ -91,7 +96,7 @@ class Code:
         for value, kind in zip(whole, self.kinds, strict=True):
             values.append(value if is_number(kind) else address(value, kind, kept))
         out = self.room()
-        if self.function(self.pack(*values), out):
+        if self._function(self._pack(*values), out):
             raise RuntimeError("a kernel has failed")
         return self.read(out)
 
@@ -102,9 +107,9 @@ class Code:
     def read(self, room: ctypes.Array[ctypes.c_char] | None) -> Any:
         """Return the answer in its room."""
         if room is None:
-            return _built(self._answer, iter(()))
+            return _built(self.answer, iter(()))
         values = self._read.unpack(room)
-        return values[0] if is_number(self._answer) else _built(self._answer, iter(values))
+        return values[0] if is_number(self.answer) else _built(self.answer, iter(values))
 
 
 def address(value: object, kind: Kind, kept: list[Any]) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
-from dubins_traffic.kernels.calls import steady
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Draws, Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
 from dubins_traffic.rules.labeller import Labeller
@@ -77,7 +77,7 @@ class Trial:
         self._buffer = FrameBuffer(instance, sinks)
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0
-        self._all_finite = steady(all_finite)
+        self._all_finite = bound(all_finite, (self._commands,))
         self._tellers = [agent for agent in self._agents if isinstance(agent, Reports)]
         self._note_agents()
         self._observation: Observation | None = None
@@ -171,9 +171,10 @@ class Trial:
         again = seed is not None and seed != self.instance.seed
         instance = replace(self.instance, seed=seed) if again else self.instance
         memo: dict[int, Any] = {id(self.instance): instance}
-        own = {**vars(self), "instance": instance, "_watchers": ()}
+        own = {**vars(self), "instance": instance, "_watchers": (), "_all_finite": None}
         twin = object.__new__(type(self))
         vars(twin).update(deepcopy(own, memo))
+        twin._all_finite = bound(all_finite, (twin._commands,))
         if again:
             twin._reseed()
         return twin
