@@ -118,6 +118,8 @@ def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[
         return {name: value}
     if isinstance(value, Mapping):
         parts = {str(key): part for key, part in value.items()}
+    elif hasattr(value, "_asdict"):
+        parts = value._asdict()
     elif isinstance(value, list | tuple | deque):
         parts = {str(k): part for k, part in enumerate(value)}
     else:
@@ -128,5 +130,7 @@ def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[
         }
     found: dict[str, np.ndarray] = {}
     for key, part in parts.items():
+        if key == "_numba_type_":
+            continue
         found |= arrays_in(part, f"{name}.{key}", seen)
     return found

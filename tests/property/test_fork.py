@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
-from copy import deepcopy
+from copy import copy, deepcopy
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -32,9 +32,10 @@ from dubins_traffic.simulators.embedded import Embedded
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.link import Link
-from dubins_traffic.trial.trial import FORKED
+from dubins_traffic.trial.forking import FORKED
 from tests.forks import KINDS, WORLDS, Kept, arrays_in, configuration, plain
 from tests.property.test_batch import Wheel
+from tests.witness import Witness
 
 SEED = 5
 
@@ -299,15 +300,20 @@ def test_forks_of_some_trials_of_a_batch_equal_the_trials(
 
 def shared(one: Group, other: Group) -> list[str]:
     """Return the names of the arrays that change and that two groups share."""
-    constant = {"stage", "distance", "cycle", "script", "mask"}
-    found: list[str] = []
-    for name, table, others in zip(World._fields, one.world, other.world, strict=True):
-        if name in ("roads", "beside"):
-            continue
-        for part, array, its in zip(table._fields, table, others, strict=True):
-            if part not in constant and np.may_share_memory(array, its):
-                found.append(f"{name}.{part}")
-    return found
+    constant = ("stage", "distance", "cycle", "script", "mask", "description")
+    there = arrays_in(changing(other)).values()
+    return [
+        name
+        for name, array in arrays_in(changing(one)).items()
+        if not name.endswith(constant) and any(np.may_share_memory(array, its) for its in there)
+    ]
+
+
+def changing(group: Group) -> dict[str, Any]:
+    """Return the tables of a group but for those of its roads, and what it has found so far."""
+    tables = zip(World.__annotations__, group.world, strict=True)
+    mine = {name: value for name, value in tables if name not in ("roads", "beside", "labelling", "judging")}
+    return mine | {"commands": group.commands}
 
 
 def test_forks_of_a_batch_with_other_seeds_go_other_ways() -> None:
@@ -372,3 +378,39 @@ def test_a_controller_of_whole_batches_does_not_go_on_twice() -> None:
     own = Controlled([draw(config, SEED, 0)], Wheel, Wheel())
     with pytest.raises(DubinsTrafficError, match="whole batches"):
         own.fork([0])
+
+
+class Copied(Witness):
+    """A metric that tells all that it has seen, and can be copied."""
+
+    def __deepcopy__(self, memo: object) -> Self:
+        twin = copy(self)
+        twin._hash = self._hash.copy()
+        return twin
+
+
+@pytest.mark.parametrize("seed", [SEED, SEED + 1])
+def test_metrics_of_ones_own_go_on_in_forks(seed: int) -> None:
+    instance = draw(configuration(KINDS[3:4], "plain", rules=True, seconds=4), SEED, 0)
+    trial, group = (
+        Trial(instance, sinks=[Scorer([Copied])]),
+        Group([instance], keeps_rules=False, metrics=[Copied]),
+    )
+    swung(trial, 40)
+    for _ in range(40):
+        group.commands[0, 0] = wheel(int(group.ticks[0]), 0.0)
+        group.advance()
+    fork, forks = trial.fork(seed), group.fork([0, 0], [seed, seed])
+    swung(fork, 10**6)
+    (scorer,) = fork.sinks
+    assert isinstance(scorer, Scorer)
+    wanted = plain(scorer.result())
+    assert [own for _, own in finished(forks, keeps_rules=False)] == [wanted, wanted]
+
+
+def test_what_can_t_be_copied_is_named() -> None:
+    instance = draw(configuration((), "plain", rules=False), SEED, 0)
+    with pytest.raises(InputError, match="can't be copied"):
+        Trial(instance, sinks=[Scorer([Witness])]).fork()
+    with pytest.raises(InputError, match="can't be copied"):
+        Group([instance], keeps_rules=False, metrics=[Witness]).fork([0])

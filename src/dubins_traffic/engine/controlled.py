@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -24,6 +24,7 @@ from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
 from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.trial.forking import forked
 from dubins_traffic.trial.seat import Seat, fault
 
 if TYPE_CHECKING:
@@ -84,6 +85,8 @@ class Controlled:
         Makes the controller of a trial.
     shared : BatchController, optional
         Drives the egos of all trials instead.
+    metrics : sequence of callable
+        What makes further metrics of a trial.
 
     Attributes
     ----------
@@ -95,8 +98,8 @@ class Controlled:
         self,
         instances: Sequence[Instance],
         make: Maker,
-        shared: BatchController | None,
-        metrics: Sequence[MetricMaker],
+        shared: BatchController | None = None,
+        metrics: Sequence[MetricMaker] = (),
     ) -> None:
         self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
@@ -133,6 +136,8 @@ class Controlled:
         ------
         DubinsTrafficError
             If one of the trials has ended, or one controller drives all.
+        InputError
+            If a controller can't be copied.
         """
         if not self._seats:
             raise DubinsTrafficError(
@@ -142,8 +147,8 @@ class Controlled:
         twin.group = self.group.fork(trials, seeds)
         own: list[Any] = []
         for b, instance in zip(trials, twin.group.instances, strict=True):
-            memo: dict[int, Any] = {id(self.group.instances[b]): instance}
-            own.append(deepcopy((self._lines[b], self._senses[b], self._seats[b]), memo))
+            mine = self._lines[b], self._senses[b], self._seats[b]
+            own.append(forked(mine, self.group.instances[b], instance))
         twin._lines, twin._senses, twin._seats = map(list, zip(*own, strict=True))
         twin._interventions = [self._interventions[b] for b in trials]
         twin._told = np.zeros(len(trials), dtype=bool)

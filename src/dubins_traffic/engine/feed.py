@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy, deepcopy
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.blocks import cut
 from dubins_traffic.scoring.metric import Maker, Measured
 from dubins_traffic.scoring.own_metrics import OwnMetrics
+from dubins_traffic.trial.forking import forked
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -57,7 +58,7 @@ class Feed:
         twin._events = [list(self._events[b]) for b in trials]
         twin._told = [self._told[b] for b in trials]
         twin._sinks = [
-            deepcopy(self._sinks[b], {id(self._instances[b]): instance})
+            forked(self._sinks[b], self._instances[b], instance)
             for b, instance in zip(trials, instances, strict=True)
         ]
         return twin

@@ -59,6 +59,7 @@ from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
 from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
 from dubins_traffic.trial.endings import agent_fault, collision_detail
+from dubins_traffic.trial.forking import reseeded
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -173,13 +174,13 @@ class Group:
         if ended:
             raise DubinsTrafficError(f"trial {ended[0]} of the group has ended: nothing goes on")
         taken = np.array(trials, dtype=np.int64)
-        seed = None if seeds is None else np.array(seeds, dtype=np.uint64)
+        drawn = None if seeds is None else np.array(seeds, dtype=np.uint64)
         twin = copy(self)
         twin.instances = tuple(
             self.instances[b] if seeds is None else replace(self.instances[b], seed=seeds[k])
             for k, b in enumerate(trials)
         )
-        twin._world = world_of(self._world, taken, seed, 1.0 / self._rate)
+        twin._world = world_of(self._world, taken, drawn, 1.0 / self._rate)
         twin.state, twin.labels = twin._world.state, twin._world.labels
         twin.commands = self.commands[taken]
         twin.endings = [None] * len(trials)
@@ -190,6 +191,10 @@ class Group:
         twin._take = bound(run_trials, (taken, 1, 1.0, twin.commands, twin._world))
         twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
         twin._note_rules()
+        if twin._feed is not None and seeds is not None:
+            for k, seed in enumerate(seeds):
+                if seed != self.instances[trials[k]].seed:
+                    twin._feed.note(k, reseeded(int(twin.ticks[k]), seed))
         return twin
 
     @property

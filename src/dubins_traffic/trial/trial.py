@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -18,14 +17,11 @@ from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import agent_fault, collision_detail
+from dubins_traffic.trial.forking import forked, reseeded
 from dubins_traffic.trial.interrupts import WHOLE
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
-
-
-FORKED: Final = "fork"
-"""Kind of the event in a fork that goes on from another seed."""
 
 
 class Trial:
@@ -157,7 +153,7 @@ class Trial:
         DubinsTrafficError
             If the trial has ended.
         InputError
-            If its simulator or one of its drivers can't go on twice.
+            If its simulator, one of its drivers or a sink can't go on twice.
         """
         if self.ending is not None:
             raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): nothing goes on")
@@ -170,10 +166,10 @@ class Trial:
             )
         again = seed is not None and seed != self.instance.seed
         instance = replace(self.instance, seed=seed) if again else self.instance
-        memo: dict[int, Any] = {id(self.instance): instance}
-        own = {**vars(self), "instance": instance, "_watchers": (), "_all_finite": None}
         twin = object.__new__(type(self))
-        vars(twin).update(deepcopy(own, memo))
+        vars(twin).update(
+            forked({**vars(self), "_watchers": (), "_all_finite": None}, self.instance, instance)
+        )
         twin._all_finite = bound(all_finite, (twin._commands,))
         if again:
             twin._reseed()
@@ -186,7 +182,7 @@ class Trial:
         for agent in self._agents:
             if isinstance(agent, Draws):
                 agent.reseed(seed)
-        self._buffer.note(Event(self._tick, FORKED, NONE, f"from here on all is drawn from seed {seed}"))
+        self._buffer.note(reseeded(self._tick, seed))
 
     def note(self, kind: str, detail: str = "") -> None:
         """Put an event of the ego, at the present tick, into the record."""
