@@ -399,7 +399,8 @@ def test_check_prints_the_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["check", str(judged), str(silent)]) == 0
     text = capsys.readouterr().out
     assert first["verdict"] in text
-    assert "3.stop" in text
+    assert {f"docs/rules.md#{entry['rule']}" for entry in first["violations"]} <= set(text.split())
+    assert "docs/rules.md#3.stop" in text
     assert "not judged" in text
     assert main(["check", str(tmp_path / "none.mcap")]) == 2
     assert main(["replay", str(judged), "-o", str(tmp_path / "page.html")]) == 0

@@ -46,11 +46,11 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN, parameters_of
-from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
+    from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import EAgent, Instance
 
 AS_FAR_AS_2016 = 3.5
@@ -124,6 +124,13 @@ class Fleet:
         told = () if self._counter is None else self._counter.report()
         return told if self._own is None else (*told, *self._own.report())
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._agents.seed[:] = seed
+        for team in (self._lawful, self._counter, self._own):
+            if team is not None:
+                team.reseed(seed)
+
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         done = 0
         while done < commands.shape[0]:
@@ -175,7 +182,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     )
 
 
-def _lawful() -> Driver:
+def _lawful() -> Lawful:
     """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
     from dubins_traffic.agents.lawful import Lawful
 

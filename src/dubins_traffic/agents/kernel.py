@@ -42,7 +42,7 @@ from dubins_traffic.agents.tables import (
     Workspace,
 )
 from dubins_traffic.agents.trail import follow
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import STATE_END, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inner
@@ -62,7 +62,6 @@ BACK = -0.99
 
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 ROADS_END = STATE_END + len(RoadTable._fields)
 OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
 AGENTS_END = OBSTACLES_END + len(Agents._fields)

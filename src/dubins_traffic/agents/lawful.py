@@ -18,6 +18,8 @@ from dubins_traffic.policies.rules.tables import (
     BLOCKS,
     DEPARTS,
     FIRST,
+    GOAL_FIRST,
+    GOAL_LAST,
     GOES,
     KIND,
     LAST,
@@ -64,6 +66,14 @@ class Lawful:
         self._state: State | None = None
         self._labels: Labels | None = None
         self._commands: Floats | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_state": None, "_labels": None, "_commands": None, "_call": None}
+
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._drivers.seed[:] = seed
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
@@ -185,7 +195,7 @@ def _add_stages(
     goals: list[tuple[int, int]] = []
     for b, (problem, number) in enumerate(zip(problems, numbers, strict=True)):
         own, first = fleets[number], len(stage)
-        if own.goers:
+        if own.goers or own.loops:
             stage += dict.fromkeys(problem.goal_vertices)
         goals.append((first, len(stage)))
         for n, cycle in own.loops:
@@ -195,5 +205,7 @@ def _add_stages(
     spans = np.array(goals, dtype=np.int64)
     for number, own in enumerate(fleets):
         trials = np.flatnonzero(whose == number)[:, None]
-        for k, column in enumerate((FIRST, LAST)):
-            ints[trials, own.goers, column] = spans[trials, k]
+        bound_by_e6 = [*own.goers, *(n for n, _ in own.loops)]
+        for k, (first, own_goals) in enumerate(((FIRST, GOAL_FIRST), (LAST, GOAL_LAST))):
+            ints[trials, own.goers, first] = spans[trials, k]
+            ints[trials, bound_by_e6, own_goals] = spans[trials, k]

@@ -15,6 +15,7 @@ from dubins_traffic.observations.senses import Senses
 from dubins_traffic.outside import Seam
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import OWN
+from dubins_traffic.protocols import Draws
 
 FAULT: Final = "e-agent"
 """Kind of the event that tells what the class of an e-agent raised."""
@@ -86,6 +87,12 @@ class OwnAgents:
         """Return what classes have raised since the last call."""
         found, self._reports = self._reports, []
         return found
+
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed, where a class has a method `reseed` for that."""
+        for own in self._driven:
+            if isinstance(own.driver, Draws):
+                own.driver.reseed(seed)
 
     def _asked(self, own: _Driven, observation: Observation) -> tuple[float, float]:
         if own.has_raised:

@@ -171,7 +171,7 @@ def _shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
     for name in campaign.factors:
         values = [cell.values[name] for cell in own]
         text = schema.field(FACTOR + name).type == made.string()
-        known[FACTOR + name] = [told(value) for value in values] if text else values
+        known[FACTOR + name] = [factor_text(value) for value in values] if text else values
     arrays = [
         made.array(known[entry.name], type=entry.type) if entry.name in known else part[entry.name]
         for entry in schema
@@ -179,7 +179,7 @@ def _shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
     return made.Table.from_arrays(arrays, schema=schema)
 
 
-def told(value: object) -> str:
+def factor_text(value: object) -> str:
     """Return the value of a factor as a text; switches as in JSON."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 

@@ -10,7 +10,7 @@ from typing import Any
 from dubins_traffic.cars.near import FEW, candidates
 from dubins_traffic.cars.partners import PARTNERS, VACANT, Workspace, part
 from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import STATE_END, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
@@ -20,7 +20,6 @@ from dubins_traffic.kernels.trig import advance
 MOVED, FULL, CROWDED = range(3)
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 CARS_END = STATE_END + len(CarTable._fields)
 OBSTACLES_END = CARS_END + len(ObstacleTable._fields)
 ROWS_END = OBSTACLES_END + len(Rows._fields)

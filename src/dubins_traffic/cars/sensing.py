@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import NONE, Labels, State
+from dubins_traffic.cars.state import NONE, STATE_END, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
@@ -17,7 +17,6 @@ from dubins_traffic.kernels.trig import sincos
 
 POSITION_DRAW = 200
 HEADING_DRAW = 206
-STATE_END = len(State._fields)
 SEEN_REALS = 6
 SEEN_WHOLES = 6
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Command(NamedTuple):
 
 
 class Propositions(NamedTuple):
-    """The discrete state of one car at one frame (RULES, *Propositions*).
+    """The discrete state of one car at one frame (docs/rules.md#propositions).
 
     `segment` is the nearest segment; `at` the intersection whose disc holds the centre and `crosses` the one whose
     disc the body meets (-1: none); `lane` the lane state, 2 * segment + direction (-1: none); `bits` a union of
@@ -108,6 +108,10 @@ class State(NamedTuple):
         """Return a state of standing cars at the origin."""
         x, y, s, speed, yaw_rate = (np.zeros((trials, cars)) for _ in range(5))
         return State(x, y, np.ones((trials, cars)), s, speed, yaw_rate, np.full(trials, cars, dtype=np.int64))
+
+
+STATE_END: Final = len(State._fields)
+"""Where the arrays of State end among those that a kernel takes one after another."""
 
 
 class Labels(NamedTuple):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +46,11 @@ class Rules:
 
     def __init__(self) -> None:
         self._drivers: Drivers | None = None
+        self._decide: Callable[..., object] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_decide": None}
 
     def start(self, problem: Problem) -> None:
         """Find the round; InputError if the car can't keep the rules."""
@@ -73,8 +80,7 @@ class Rules:
             stage=stage,
             distance=distance,
         )
-        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._scratch)
-        self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
+        self._decide = None
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -87,6 +93,12 @@ class Rules:
             drivers.ints[0, EGO, PLACE] = nearest_stage(
                 drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment
             )
-        self._decide(observation.tick, self._command)
+        call = self._decide or self._bind(drivers)
+        call(observation.tick, self._command)
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)
+
+    def _bind(self, drivers: Drivers) -> Callable[..., object]:
+        tables = (self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch)
+        self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
+        return self._decide

@@ -24,7 +24,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.breach_log import JUDGED, OF_CAR, BreachLog, RefereeParameters
+from dubins_traffic.rules.breach_log import JUDGED, MOST, OF_CAR, BreachLog, RefereeParameters
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
@@ -149,7 +149,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
 def _room(b: int, world: World) -> int:
     """Return the most breaches that a frame of trial b can begin."""
     goals = world.terms.goal_off[b + 1] - world.terms.goal_off[b]
-    return 10 * world.state.count[b] + goals
+    return MOST * world.state.count[b] + goals
 
 
 @jit_inline

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy, deepcopy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,21 @@ class Feed:
         self._sinks = [OwnMetrics(metrics) for _ in instances]
         for sink, instance in zip(self._sinks, instances, strict=True):
             sink.begin(instance)
+
+    def fork(self, trials: Sequence[int], instances: Sequence[Instance]) -> Feed:
+        """Return the feed of forks of some trials, whose instances are `instances`: metrics go on as deep copies."""
+        twin = copy(self)
+        rows = np.array(trials, dtype=np.int64)
+        twin._instances = instances
+        twin._reals, twin._whole = self._reals[:, rows], self._whole[:, rows]
+        twin._bits, twin._first, twin._filled = self._bits[rows], self._first[rows], self._filled[rows]
+        twin._events = [list(self._events[b]) for b in trials]
+        twin._told = [self._told[b] for b in trials]
+        twin._sinks = [
+            deepcopy(self._sinks[b], {id(self._instances[b]): instance})
+            for b, instance in zip(trials, instances, strict=True)
+        ]
+        return twin
 
     def push(
         self,

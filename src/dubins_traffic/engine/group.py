@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
 from dubins_traffic.agents.lawful import pack_drivers
 from dubins_traffic.agents.tables import workspace as agent_workspace
-from dubins_traffic.cars.near import Spacing, spacing
+from dubins_traffic.cars.near import spacing
 from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
@@ -32,6 +33,8 @@ from dubins_traffic.engine.batch_kernel import (
     run_trials,
 )
 from dubins_traffic.engine.feed import Feed
+from dubins_traffic.engine.fork import world_of
+from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
 from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
@@ -40,7 +43,7 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import OF_TRIAL, BreachLog
+from dubins_traffic.rules.breach_log import MOST, OF_TRIAL, BreachLog
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
@@ -59,7 +62,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 FRAMES = 16
-"""For how many frames in which all goes wrong there is room in the breach_log."""
+"""For how many frames of any trial in which all goes wrong there is room in the breach_log."""
 WORK = 500_000
 """Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
 
@@ -115,9 +118,8 @@ class Group:
         cars, obstacles, rows, work = simulator.tables
         terms = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, len(terms.goal))
-        breach_log = breach_log._replace(
-            row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
-        )
+        most = MOST * places + int(np.diff(terms.goal_off).max())
+        breach_log = breach_log._replace(row=np.zeros((FRAMES * most, breach_log.row.shape[1]), np.int64))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         self._world = World(
@@ -127,12 +129,7 @@ class Group:
             new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
             spacing(trials, places, rows.far - cars.reach),
         )  # fmt: skip
-        kinds, index = kinds_of(problems)
-        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-        frames = self._world.tally.pose.shape[1]
-        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
-        numbers: list[int] = index.tolist()
-        self._rules = [rules[k] for k in numbers]
+        self._note_rules()
         self.labels: Labels = labeller.labels
         self.commands: Floats = np.zeros((trials, places, 2))
         self.endings: list[Ending | None] = [None] * trials
@@ -144,15 +141,62 @@ class Group:
         self._run(self.active, 1)
         self._aim()
 
+    def _note_rules(self) -> None:
+        """Note the parameters of the rules, and what the margins follow from."""
+        kinds, index = kinds_of([instance.problem for instance in self.instances])
+        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+        frames = self._world.tally.pose.shape[1]
+        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
+        numbers: list[int] = index.tolist()
+        self._rules = [rules[k] for k in numbers]
+
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Group:
+        """Return a group of forks of some trials, each of which goes on from its present frame by itself.
+
+        Parameters
+        ----------
+        trials : sequence of int
+            Numbers of trials of this group that have not ended. A trial may be named several times.
+        seeds : sequence of int, optional
+            From which each fork draws from here on; by default as its trial does, and then what comes of a fork equals
+            what comes of its trial, bit for bit.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If one of the trials has ended.
+        """
+        ended = [b for b in trials if not self._going[b]]
+        if ended:
+            raise DubinsTrafficError(f"trial {ended[0]} of the group has ended: nothing goes on")
+        taken = np.array(trials, dtype=np.int64)
+        seed = None if seeds is None else np.array(seeds, dtype=np.uint64)
+        twin = copy(self)
+        twin.instances = tuple(
+            self.instances[b] if seeds is None else replace(self.instances[b], seed=seeds[k])
+            for k, b in enumerate(trials)
+        )
+        twin._world = world_of(self._world, taken, seed, 1.0 / self._rate)
+        twin.state, twin.labels = twin._world.state, twin._world.labels
+        twin.commands = self.commands[taken]
+        twin.endings = [None] * len(trials)
+        twin._going = np.ones(len(trials), dtype=bool)
+        twin._contacts = [list(self._contacts[b]) for b in trials]
+        twin._breaches = [list(self._breaches[b]) for b in trials]
+        twin._seen = [set(self._seen[b]) for b in trials]
+        twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
+        twin._note_rules()
+        return twin
+
     @property
     def ticks(self) -> Ints:
         """The present frame of each trial, (B,)."""
         return self._world.progress.ints[:, TICK]
 
     @property
-    def spacing(self) -> Spacing:
-        """How far apart the cars are known to be."""
-        return self._world.spacing
+    def world(self) -> World:
+        """All tables of the group."""
+        return self._world
 
     @property
     def active(self) -> Ints:

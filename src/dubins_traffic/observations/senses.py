@@ -81,6 +81,11 @@ class Senses:
         self._scan: Floats | None = None
         self._state: State | None = None
         self._labels: Labels | None = None
+        self._look: Callable[..., int] = neighbours
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_state": None, "_labels": None, "_look": neighbours}
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the car's driver knows at the beginning of the tick that starts in `state`."""

@@ -95,6 +95,10 @@ class RoadNetwork(Pictured):
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
         return f"{found} on a {rows} x {columns} lattice"
 
+    def __deepcopy__(self, memo: object) -> RoadNetwork:
+        """Return this very network, which never changes."""
+        return self
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind, when pickled, what can be worked out again."""
         return {own.name: getattr(self, own.name) for own in fields(self)}

@@ -1,5 +1,6 @@
-"""The propositions of one frame, for all cars of a batch, in the order of RULES: lane state, still, queue,
-blocked, overtaking, left.
+"""The propositions of one frame, for all cars of a batch.
+
+Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, overtaking, left.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import STATE_END, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
@@ -85,7 +86,6 @@ BESIDE = LONG | LEFT | OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 ROADS_END = STATE_END + len(RoadTable._fields)
 OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
 RULES_END = OBSTACLES_END + len(RuleTable._fields)

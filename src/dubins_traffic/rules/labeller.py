@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ SLACK = 1e-9
 
 
 class Labeller:
-    """Computes the propositions of RULES for every car of a batch, one compiled call per tick.
+    """Computes the propositions of docs/rules.md for every car of a batch, one compiled call per tick.
 
     Parameters
     ----------
@@ -81,6 +82,11 @@ class Labeller:
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
         self._tick = -1
         self._state: State | None = None
+        self._call: Callable[[int], object] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_state": None, "_call": None}
 
     def reset(self, state: State) -> Labels:
         """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
@@ -157,14 +163,15 @@ class Labeller:
         return self.memory.mark[:, :, RANK]
 
     def _label(self, state: State) -> None:
-        if state is not self._state:
+        call = self._call
+        if call is None or state is not self._state:
             self._state = state
-            self._call = bound(label_frame, (0,), (*state, *self._arrays))
-        self._call(self._tick)
+            call = self._call = bound(label_frame, (0,), (*state, *self._arrays))
+        call(self._tick)
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:
-    """Tell of each problem whether it asks for the rules and rule 3 is defined there (RULES, *Ground*)."""
+    """Tell of each problem whether it asks for the rules and rule 3 is defined there (docs/rules.md#room)."""
     known: dict[tuple[int, int], bool] = {}
     judged: list[bool] = []
     kinds: list[int] = index.tolist()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import Spacing, list_near
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import STATE_END, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import distance2, lane_end
@@ -60,7 +60,6 @@ ENTERS = ENTERED | IN_CROSSING
 
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 ROADS_END = STATE_END + len(RoadTable._fields)
 OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
 RULES_END = OBSTACLES_END + len(RuleTable._fields)

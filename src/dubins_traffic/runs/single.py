@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.display import Tabulated
 from dubins_traffic.errors import InputError
+from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
@@ -76,6 +77,77 @@ class Trial(BareTrial):
             sinks=(*writer, *sinks),
             watchers=() if link is None else (link,),
         )
+
+    def fork(
+        self, seed: int | None = None, *, record: Path | str | None = None, overwrite: bool = False
+    ) -> Self:
+        """Return a trial that goes on from the present frame by itself.
+
+        Driven alike it goes on to the bit as this one does, whichever of the two is stepped first. It has no
+        controller: drive it by `step`, or hand it one with `run`.
+
+        Parameters
+        ----------
+        seed : int, optional
+            From which all follows that is drawn from here on, the noise of the present observation too; what e-agents
+            have chosen before stays. By default that of the instance. A fork with another seed notes that as an event,
+            and its instance has that seed.
+        record : Path or str, optional
+            Where to write the record of the fork, from the first frame on; this trial must have a record, and
+            the seed be the same. By default a fork has none.
+        overwrite : bool
+            Whether an existing record may be replaced.
+
+        Returns
+        -------
+        Trial
+            Its `sinks` are copies of those of this trial that can go on twice (`protocols.Forks`): a `Scorer` can, and
+            what writes files does not.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If the trial has ended.
+        InputError
+            If something of the trial can't go on twice: another simulator, e-agents elsewhere; or its record can't.
+
+        Examples
+        --------
+        >>> import dubins_traffic as dt
+        >>> trial = dt.Trial(dt.draw(dt.load_config("demo"), seed=1, trial=0))
+        >>> fork = trial.fork()
+        >>> trial.step((0.5, 0.0)) == fork.step((0.5, 0.0))
+        True
+        """
+        if seed is not None:
+            check_numbers(seed, self.instance.trial)
+        writer = None if record is None else self._writer(seed)
+        twin = super().fork(seed)
+        if writer is not None and record is not None:
+            twin._buffer.add(writer.fork(record, overwrite=overwrite))
+        return twin
+
+    def run(self, controller: str | Controller, deadline: float | None = None) -> Ending:
+        """Let a controller drive from the present frame to the end; it is started first.
+
+        The parameters are those of `run_trial`. What the controller does wrong ends the trial and is not raised.
+        """
+        driver = controllers.load(controller) if isinstance(controller, str) else controller
+        ending, _ = run(self, driver, deadline)
+        return ending
+
+    def _writer(self, seed: int | None) -> RecordWriter:
+        """Return what writes the record of this trial; InputError if that of a fork can't be one."""
+        writers = [sink for sink in self.sinks if isinstance(sink, RecordWriter)]
+        if not writers:
+            raise InputError(
+                "this trial has no record to go on with", field="record", expected="a trial with one"
+            )
+        if seed not in (None, self.instance.seed):
+            raise InputError(
+                "a record follows from one seed", field="seed", value=seed, expected="none, with record"
+            )
+        return writers[0]
 
 
 def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:

@@ -140,13 +140,16 @@ class Score(Tabulated):
 class Scorer:
     """A sink that holds all metrics of one trial.
 
-    It shows them frames by `_BLOCK` at least, not by the second; none of them depends on how the frames are cut.
+    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut. A copy of
+    it goes on in a fork of its trial.
 
     Parameters
     ----------
     metrics : sequence of str or callable
         Further metrics, as `scoring.registry.load` takes them.
     """
+
+    forks = True
 
     def __init__(self, metrics: Sequence[MetricSpec] = ()) -> None:
         self._own = OwnMetrics(registry.makers(metrics)) if metrics else None

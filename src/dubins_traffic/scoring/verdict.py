@@ -1,4 +1,4 @@
-"""The verdict on a trial: whether the ego kept the rules of the road, or others broke them before it did."""
+"""The verdict (docs/rules.md#verdicts): whether the ego kept the rules of the road, or others broke them before."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
@@ -34,7 +35,7 @@ _SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
 
 class Ruling(StrEnum):
-    """What is said of a trial (RULES, *Verdicts*)."""
+    """What is said of a trial (docs/rules.md#verdicts)."""
 
     SATISFIED = "satisfied"
     VIOLATED = "violated"
@@ -72,6 +73,11 @@ class Violation:
     since: float
     where: Place
 
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states the rule, as ``docs/rules.md#3.stop``."""
+        return clause(self.rule)
+
     def to_json(self) -> dict[str, Any]:
         """Return the breach as a JSON object: rule, car, time, since, where."""
         return {
@@ -94,6 +100,11 @@ class Excuse:
     assumption: str
     violation: Violation
     sensed: bool
+
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states this part of the assumption, as ``docs/rules.md#E3``."""
+        return clause(self.assumption)
 
     def to_json(self) -> dict[str, Any]:
         """Return the excuse as a JSON object."""
@@ -286,7 +297,7 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3 (docs/rules.md#E1)."""
     return rule[:2] if rule.startswith("E") else "E1"
 
 

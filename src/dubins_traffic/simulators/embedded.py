@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Embedded:
     The order of events is that of `docs/semantics.md`; the method is in `kernels.boxes` and `cars.motion`.
     """
 
-    capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
+    capabilities = Capabilities(batched=True, deterministic=True, lockstep=True, forks=True)
 
     def reset(self, instances: Sequence[Instance], grain: int = 1) -> State:
         """Place the cars of a batch of instances, which share one control rate.
@@ -95,6 +95,10 @@ class Embedded:
 
     def close(self) -> None:
         """Nothing is held outside memory."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the call that is bound to these arrays: a copy binds its own."""
+        return {**vars(self), "_call": None}
 
     def _bind(self, commands: Floats) -> Callable[..., int]:
         arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
+from dubins_traffic.cars.state import STATE_END, Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.protocols import Ending, Sink
+from dubins_traffic.protocols import Ending, Forks, Sink
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
-
-
-STATE_END = len(State._fields)
 
 
 @jit
@@ -67,9 +64,25 @@ class FrameBuffer:
         self._state: State | None = None
         self._labels: Labels | None = None
         self._commands: Floats | None = None
+        self._keep: Callable[..., None] = keep
         for sink in self._sinks:
             sink.begin(instance)
         self._renew()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the sinks that stay behind, and the call that is bound to these arrays: a copy binds its own."""
+        carried = tuple(sink for sink in self._sinks if isinstance(sink, Forks) and sink.forks)
+        unbound = {"_state": None, "_labels": None, "_commands": None, "_keep": keep}
+        return {**vars(self), **unbound, "_sinks": carried}
+
+    @property
+    def sinks(self) -> tuple[Sink, ...]:
+        """Who gets the frames."""
+        return self._sinks
+
+    def add(self, sink: Sink) -> None:
+        """Hand the blocks from that in hand on to one more sink, which has been handed all before."""
+        self._sinks = (*self._sinks, sink)
 
     def push(
         self,

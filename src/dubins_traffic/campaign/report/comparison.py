@@ -159,7 +159,7 @@ def _factors(campaign: Campaign) -> dict[str, list[str]]:
     """Return what varied, with its values as texts, in their order; the configuration is one of them."""
     found = {CONFIGURATION: list(dict.fromkeys(cell.configuration for cell in campaign.cells))}
     for name in campaign.factors:
-        found[name] = list(dict.fromkeys(table.told(cell.values[name]) for cell in campaign.cells))
+        found[name] = list(dict.fromkeys(table.factor_text(cell.values[name]) for cell in campaign.cells))
     varied = {name: values for name, values in found.items() if len(values) > 1}
     return varied or {CONFIGURATION: found[CONFIGURATION]}
 
@@ -239,9 +239,9 @@ def _levels(
 ) -> Iterator[Level]:
     for factor, levels in factors.items():
         name = factor if factor == CONFIGURATION else table.FACTOR + factor
-        told: Any = np.array([table.told(value) for value in results[name].to_pylist()], dtype=object)
+        texts: Any = np.array([table.factor_text(value) for value in results[name].to_pylist()], dtype=object)
         for level in levels:
-            here = told == level
+            here = texts == level
             for controller, own in chosen.items():
                 for metric in metrics:
                     found = estimate(values[metric.name][here & own], median=False)

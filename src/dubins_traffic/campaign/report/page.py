@@ -14,8 +14,10 @@ from dubins_traffic.campaign.report.comparison import Comparison, Difference, St
 from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
+from dubins_traffic.rules.clauses import clause
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.notice import assumption_notice
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
 
 MINUS = "\N{MINUS SIGN}"
 HOW = (
@@ -229,7 +231,9 @@ def _shares(comparison: Comparison) -> str:
             [_name(standing, k), *(_share(group.get(name)) for name in names)]
             for k, (standing, group) in enumerate(zip(standings, groups, strict=True))
         ]
-        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}")
+        cited = ", ".join(clause(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS))
+        note = f"<p>Clauses: {cited}</p>" if cited else ""
+        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}{note}")
     return "".join(parts)
 
 

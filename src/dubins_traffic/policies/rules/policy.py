@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import FEW
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import STATE_END, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
@@ -81,7 +81,6 @@ NOBODY, SEEN, ALL = range(3)
 """Who is in the lists of the segments: nobody, all whom the ego sees, all."""
 
 # Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
 LABELS_END = STATE_END + len(Labels._fields)
 ROADS_END = LABELS_END + len(RoadTable._fields)
 OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)

@@ -20,7 +20,8 @@ ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
 
 KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, VIOLATIONS, WATCHED, KEPT_OUT = range(13)
-INTS = 13
+WITHIN, GOAL_FIRST, GOAL_LAST = range(13, 16)
+INTS = 16
 """Columns of `Drivers.ints`.
 
 KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, LAST: its rows of `stage` are FIRST to
@@ -28,7 +29,9 @@ LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the r
 the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
 which it has been its turn to enter the crossing ahead; OWED: the same, over all of this wait; WAITED: ticks for which
 something has been in its way; VIOLATIONS: which rules it breaks on this lane; WATCHED: ticks for which what it may
-pass has not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter.
+pass has not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter; WITHIN:
+ticks for which its body has met the crossing at the end of its lane. GOAL_FIRST, GOAL_LAST: the goals of its trial
+are the rows GOAL_FIRST to GOAL_LAST - 1 of `stage`, if the car minds them.
 """
 
 SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y, DEPARTS = (
@@ -46,8 +49,8 @@ DEPARTS: seconds from the beginning for which it parks.
 
 REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
 DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
-STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME, APPROACHES = range(19, 24)
-VEHICLE = 24
+STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME, APPROACHES, GOAL_TIME = range(19, 25)
+VEHICLE = 25
 """Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
 driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
 crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
@@ -55,7 +58,8 @@ place; least speed in a disc, m/s; how far left of the centre line a body may re
 stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, and after
 how long a car that does not move stands, s; how far anybody may back up, and how far from the disc who stands in a lane
 leaves it free (E4), metres; for how long an e-agent may stand with a free way (E5), s;
-how near to a crossing a car takes its place in the order, metres.
+how near to a crossing a car takes its place in the order, metres; within how many seconds every goal has to be free
+once (E6).
 """
 
 IN, OUT, CROSSING, LENGTH = range(4)
@@ -201,5 +205,6 @@ def _build_of(problems: Sequence[Problem]) -> Floats:
         np.array([own.exit_gap for own in rules]),
         np.array([own.rest_time for own in rules]),
         np.array([own.approach_distance for own in rules]),
+        np.array([own.goal_time for own in rules]),
     )
     return np.stack([column.astype(np.float64) for column in columns], axis=1)
