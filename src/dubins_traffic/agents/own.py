@@ -81,7 +81,7 @@ class OwnAgents:
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
         for own in self._driven:
-            commands[0, own.car] = self._asked(own, own.senses.observe(tick, state, labels))
+            commands[0, own.car] = self._command(own, own.senses.observe(tick, state, labels))
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what classes have raised since the last call."""
@@ -94,7 +94,7 @@ class OwnAgents:
             if isinstance(own.driver, Draws):
                 own.driver.reseed(seed)
 
-    def _asked(self, own: _Driven, observation: Observation) -> tuple[float, float]:
+    def _command(self, own: _Driven, observation: Observation) -> tuple[float, float]:
         if own.has_raised:
             return math.nan, math.nan
         try:

@@ -12,9 +12,18 @@ def box_gap(
     ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
     bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
 ) -> float:  # fmt: skip
-    """Return the distance between two oriented boxes, 0 where they overlap, as `scoring.clearance.box_distance` does.
+    """Return the distance between two oriented boxes in metres, 0 where they overlap.
 
-    A box is its centre, the cosine and sine of its heading, its half length and half width.
+    `scoring.clearance.box_distance` does the same for many.
+
+    Parameters
+    ----------
+    ax, ay, bx, by
+        Centres of the boxes, m.
+    ac, az, bc, bz
+        Cosines and sines of their headings, which are unit vectors.
+    a_length, a_width, b_length, b_width
+        Their half lengths and half widths, m.
     """
     if _overlap(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width):
         return 0.0
