@@ -19,7 +19,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.kinds import KINDS, REMOTE
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import read
-from dubins_traffic.runs.single import run_trial
+from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.scoring.score import score
 from dubins_traffic.verification.verify import verify
 from tests.property.test_batch import SEED, configuration, plain
@@ -53,6 +53,17 @@ def test_alone_in_a_batch_and_from_a_record_it_does_the_same(
         assert plain(outcome.score) == plain(alone.score) == plain(again.score) == plain(score(read(record)))
         assert record.read_bytes() == (tmp_path / "again.mcap").read_bytes()
         assert verify(record).verified
+
+
+def test_a_fork_goes_on_as_its_trial(entries: list[dict[str, Any]]) -> None:
+    drawn = configuration(**{"e-agents": entries, "duration_bounds": [2, 2]})
+    with Trial(draw(drawn, SEED, 0)) as trial:
+        for _ in range(25):
+            trial.step((0.3, 0.1))
+        with trial.fork() as twin:
+            while trial.ending is None:
+                assert trial.step((0.3, 0.1)) == twin.step((0.3, 0.1))
+            assert trial.ending == twin.ending
 
 
 def test_it_moves_and_leaves_the_ego_alone(entries: list[dict[str, Any]], tmp_path: Path) -> None:

@@ -124,8 +124,8 @@ def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
     parts = {"breaches.", "breaches_of_others."}
     numbers = {
         name
-        for name, told in SCORES.items()
-        if told.column.kind != "string" and not any(name.startswith(part) for part in parts)
+        for name, own in SCORES.items()
+        if own.column.kind != "string" and not any(name.startswith(part) for part in parts)
     }
     assert compared == numbers - {"excuse_sensed", "near"}
     means = {

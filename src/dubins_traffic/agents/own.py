@@ -15,6 +15,7 @@ from dubins_traffic.observations.senses import Senses
 from dubins_traffic.outside import Seam
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import OWN
+from dubins_traffic.protocols import Draws
 
 FAULT: Final = "e-agent"
 """Kind of the event that tells what the class of an e-agent raised."""
@@ -81,21 +82,20 @@ class OwnAgents:
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
         for own in self._driven:
-            commands[0, own.car] = self._asked(own, own.senses.observe(tick, state, labels))
-
-    def reseed(self, seed: int) -> None:
-        """Tell the drivers that can be told that what is drawn from now on follows from another seed."""
-        for own in self._driven:
-            tell = getattr(own.driver, "reseed", None)
-            if callable(tell):
-                tell(seed)
+            commands[0, own.car] = self._command(own, own.senses.observe(tick, state, labels))
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what classes have raised since the last call."""
         found, self._reports = self._reports, []
         return found
 
-    def _asked(self, own: _Driven, observation: Observation) -> tuple[float, float]:
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed, where a class has a method `reseed` for that."""
+        for own in self._driven:
+            if isinstance(own.driver, Draws):
+                own.driver.reseed(seed)
+
+    def _command(self, own: _Driven, observation: Observation) -> tuple[float, float]:
         if own.has_raised:
             return math.nan, math.nan
         try:

@@ -25,5 +25,5 @@ def rows_of(subject: object) -> list[dict[str, Any]]:
 
 def _row(score: Score) -> dict[str, Any]:
     identity = {name: getattr(score, name) for name in ("trial", "seed", "controller", "record", "end")}
-    scores = {name: told.of(score) for name, told in SCORES.items()}
+    scores = {name: own.of(score) for name, own in SCORES.items()}
     return {**identity, **scores, **{own.column.name: own.value for own in score.metrics}}

@@ -39,7 +39,7 @@ def row(number: int, ending: Ending, score: Score, act_s: Mapping[str, float]) -
         "number": number,
         "end": ending.end.value,
         "reason": ending.detail[:LONGEST_REASON] or None,
-        **{name: told.of(score) for name, told in SCORES.items()},
+        **{name: own.of(score) for name, own in SCORES.items()},
         **{own.column.name: own.value for own in score.metrics},
         "time_to_begin_s": score.time_to_begin_s,
         **{name: act_s.get(figure) for name, figure in _ACTS.items()},
@@ -83,7 +83,7 @@ def part_schema(metrics: Sequence[Column] = ()) -> Any:
     """Return the Arrow schema of a part: what comes from running trials, with the columns of further metrics."""
     made = arrow()
     types = {"number": "int64", "end": "string", "reason": "string"}
-    types |= {name: told.column.kind for name, told in SCORES.items()}
+    types |= {name: own.column.kind for name, own in SCORES.items()}
     types |= {own.name: own.kind for own in metrics}
     types |= dict.fromkeys(WALL, "float64")
     names = {"bool": "bool_", "string": "string"}

@@ -12,7 +12,7 @@ def box_gap(
     ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
     bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
 ) -> float:  # fmt: skip
-    """Return the distance between two oriented boxes, 0 where they overlap, as `scoring.clearance.box_distance` does.
+    """Return the distance between two oriented boxes in metres, 0 where they overlap.
 
     Parameters
     ----------

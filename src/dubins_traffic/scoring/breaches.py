@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from dubins_traffic.scoring.metric import Column, Told, Value
+from dubins_traffic.scoring.metric import Column, ScoreColumn, Value
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_NAME, EGO_RULES, Excuse, Verdict, assumption_of
 
 if TYPE_CHECKING:
@@ -39,18 +39,18 @@ def _fallen(part: str) -> Callable[[Score], Value]:
     )
 
 
-TOLD = (
-    Told(Column("clean", "clean", "share", 1, "bool"), _of_verdict(lambda verdict: verdict.clean)),
-    Told(Column("verdict", kind="string"), _of_verdict(lambda verdict: verdict.verdict.value)),
-    Told(Column("near", kind="bool"), _of_verdict(lambda verdict: verdict.near)),
-    Told(
+COLUMNS = (
+    ScoreColumn(Column("clean", "clean", "share", 1, "bool"), _of_verdict(lambda verdict: verdict.clean)),
+    ScoreColumn(Column("verdict", kind="string"), _of_verdict(lambda verdict: verdict.verdict.value)),
+    ScoreColumn(Column("near", kind="bool"), _of_verdict(lambda verdict: verdict.near)),
+    ScoreColumn(
         Column("assumption_broken", "assumption broken by others", "share", kind="bool"),
         _of_verdict(lambda verdict: verdict.assumption_broken),
     ),
-    Told(Column("excuse", kind="string"), _of_excuse(lambda excuse: excuse.assumption)),
-    Told(Column("excuse_sensed", kind="bool"), _of_excuse(lambda excuse: excuse.sensed)),
-    Told(Column("breaches", "breaches of the ego", "", -1, "int32"), _breaches(ego=True)),
-    Told(Column("breaches_of_others", "breaches of others", kind="int32"), _breaches(ego=False)),
-    *(Told(Column(f"breaches.{rule}", kind="int32"), _broken(rule)) for rule in EGO_RULES),
-    *(Told(Column(f"breaches_of_others.{part}", kind="int32"), _fallen(part)) for part in ASSUMPTIONS),
+    ScoreColumn(Column("excuse", kind="string"), _of_excuse(lambda excuse: excuse.assumption)),
+    ScoreColumn(Column("excuse_sensed", kind="bool"), _of_excuse(lambda excuse: excuse.sensed)),
+    ScoreColumn(Column("breaches", "breaches of the ego", "", -1, "int32"), _breaches(ego=True)),
+    ScoreColumn(Column("breaches_of_others", "breaches of others", kind="int32"), _breaches(ego=False)),
+    *(ScoreColumn(Column(f"breaches.{rule}", kind="int32"), _broken(rule)) for rule in EGO_RULES),
+    *(ScoreColumn(Column(f"breaches_of_others.{part}", kind="int32"), _fallen(part)) for part in ASSUMPTIONS),
 )

@@ -11,7 +11,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 _Gap = Callable[[np.ndarray, np.ndarray], Floats]
 _SLACK = 1e-9
@@ -130,4 +130,6 @@ def _distance(frames: Frames, x: Floats, y: Floats) -> Floats:
     return np.sqrt(dx * dx + dy * dy)
 
 
-TOLD = (Told(Column("min_clearance_m", "least clearance", "m", 1), lambda score: score.min_clearance_m),)
+COLUMNS = (
+    ScoreColumn(Column("min_clearance_m", "least clearance", "m", 1), lambda score: score.min_clearance_m),
+)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dubins_traffic.cars.state import EGO, Contact, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.metric import Column, Told
-
-if TYPE_CHECKING:
-    from dubins_traffic.scoring.score import Score
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,26 +74,26 @@ class Collisions:
         return tuple(self._found)
 
 
-def _faults(score: Score, *, ego: bool, other: bool) -> int:
+def _faults(collisions: Sequence[Collision], *, ego: bool, other: bool) -> int:
     """Return at how many collisions the ego, and the other, are at fault."""
-    return sum((one.at_fault, one.partner_at_fault) == (ego, other) for one in score.collisions)
+    return sum((one.at_fault, one.partner_at_fault) == (ego, other) for one in collisions)
 
 
-TOLD = (
-    Told(Column("collisions", "collisions", "", -1, "int32"), lambda score: len(score.collisions)),
-    Told(
+COLUMNS = (
+    ScoreColumn(Column("collisions", "collisions", "", -1, "int32"), lambda score: len(score.collisions)),
+    ScoreColumn(
         Column("collisions_ego_fault", "collisions, the ego's fault", "", -1, "int32"),
-        lambda score: _faults(score, ego=True, other=False),
+        lambda score: _faults(score.collisions, ego=True, other=False),
     ),
-    Told(
+    ScoreColumn(
         Column("collisions_other_fault", "collisions, the other's fault", kind="int32"),
-        lambda score: _faults(score, ego=False, other=True),
+        lambda score: _faults(score.collisions, ego=False, other=True),
     ),
-    Told(
+    ScoreColumn(
         Column("collisions_both_fault", "collisions, the fault of both", "", -1, "int32"),
-        lambda score: _faults(score, ego=True, other=True),
+        lambda score: _faults(score.collisions, ego=True, other=True),
     ),
-    Told(
+    ScoreColumn(
         Column("collisions_among_others", "collisions among others", kind="int32"),
         lambda score: score.collisions_among_others,
     ),

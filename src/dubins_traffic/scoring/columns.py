@@ -17,19 +17,19 @@ from dubins_traffic.scoring import (
     interventions,
     paper,
 )
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 _PARTS = (
-    duration.TOLD,
-    goals.TOLD,
-    driving.TOLD,
-    clearance.TOLD,
-    collisions.TOLD,
-    interventions.TOLD,
-    formulas.TOLD,
-    breaches.TOLD,
-    paper.TOLD,
-    icra2016.TOLD,
+    duration.COLUMNS,
+    goals.COLUMNS,
+    driving.COLUMNS,
+    clearance.COLUMNS,
+    collisions.COLUMNS,
+    interventions.COLUMNS,
+    formulas.COLUMNS,
+    breaches.COLUMNS,
+    paper.COLUMNS,
+    icra2016.COLUMNS,
 )
 _FIRST_IN_TABLES = (
     "duration_s", "clean", "counted_rounds", "verdict", "near", "assumption_broken", "rounds", "goals_visited",
@@ -47,7 +47,7 @@ _FIRST_IN_REPORTS = (
 """What ranks controllers first; the rest follow, the score of 2016 last."""
 _KNOWN = {own.column.name: own for part in _PARTS for own in part}
 
-SCORES: Final[Mapping[str, Told]] = {name: _KNOWN[name] for name in (*_FIRST_IN_TABLES, *_KNOWN)}
+SCORES: Final[Mapping[str, ScoreColumn]] = {name: _KNOWN[name] for name in (*_FIRST_IN_TABLES, *_KNOWN)}
 """What is kept of every score, by name, in the order of tables; None where a score has none."""
 REPORTED: Final[tuple[Column, ...]] = tuple(
     _KNOWN[name].column for name in dict.fromkeys((*_FIRST_IN_REPORTS, *SCORES)) if _KNOWN[name].column.label

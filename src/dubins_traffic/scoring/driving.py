@@ -11,7 +11,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import LEFT, ON_ROAD
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +87,14 @@ class Driving:
         )
 
 
-TOLD = (
-    Told(Column("distance_m", "distance", "m"), lambda score: score.driven.distance_m),
-    Told(Column("standing_share", "standing", "share", -1), lambda score: score.driven.standing_share),
-    Told(Column("off_road_s", "off the road", "s", -1), lambda score: score.driven.off_road_s),
-    Told(Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share),
-    Told(
+COLUMNS = (
+    ScoreColumn(Column("distance_m", "distance", "m"), lambda score: score.driven.distance_m),
+    ScoreColumn(Column("standing_share", "standing", "share", -1), lambda score: score.driven.standing_share),
+    ScoreColumn(Column("off_road_s", "off the road", "s", -1), lambda score: score.driven.off_road_s),
+    ScoreColumn(
+        Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share
+    ),
+    ScoreColumn(
         Column("lane_departures", "lane departures", "", -1, "int32"),
         lambda score: score.driven.lane_departures,
     ),

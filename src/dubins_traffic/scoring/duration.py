@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import End, Ending
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 def planned_ticks(instance: Instance) -> int:
@@ -36,7 +36,9 @@ def counted_rounds(rounds: int, *, clean: bool, whole: bool) -> int:
     return rounds if clean and whole else 0
 
 
-TOLD = (
-    Told(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
-    Told(Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds),
+COLUMNS = (
+    ScoreColumn(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
+    ScoreColumn(
+        Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds
+    ),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -15,11 +16,10 @@ from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.valuation import Valuation
-    from dubins_traffic.scoring.score import Score
 
 Status = Literal["true", "presumably true", "presumably false", "false"]
 
@@ -116,10 +116,10 @@ class FormulaVerdicts:
         )
 
 
-def _in_short(score: Score) -> str | None:
+def _in_short(formulas: Sequence[FormulaVerdict]) -> str | None:
     """Return what holds of each formula of a user's own, JSON."""
-    found = {one.name: one.verdict for one in score.formulas}
+    found = {one.name: one.verdict for one in formulas}
     return json.dumps(found) if found else None
 
 
-TOLD = (Told(Column("formulas", kind="string"), _in_short),)
+COLUMNS = (ScoreColumn(Column("formulas", kind="string"), lambda score: _in_short(score.formulas)),)

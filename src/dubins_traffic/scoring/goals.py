@@ -11,7 +11,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.duration import planned_ticks
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 Mask = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 
@@ -153,10 +153,10 @@ class Visiting:
         return Visits(tuple(GoalVisits(*row) for row in rows), visited, self._rounds.count)
 
 
-TOLD = (
-    Told(Column("rounds", "rounds", "", 1, "int32"), lambda score: score.rounds),
-    Told(Column("goals_visited", "goals visited", "share", 1), lambda score: score.goals_visited),
-    Told(
+COLUMNS = (
+    ScoreColumn(Column("rounds", "rounds", "", 1, "int32"), lambda score: score.rounds),
+    ScoreColumn(Column("goals_visited", "goals visited", "share", 1), lambda score: score.goals_visited),
+    ScoreColumn(
         Column("longest_gap_s", "longest gap between visits", "s", -1),
         lambda score: max((goal.longest_gap_s for goal in score.goals), default=None),
     ),

@@ -25,7 +25,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.goals import GoalDiscs, Rounds
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 COLLISION_DISTANCE = 0.36
 """Centres closer than this are a collision, metres."""
@@ -142,6 +142,8 @@ class _Road:
         return (along >= 0.0) & (along <= self._length[segment]) & (np.abs(beside) <= ROAD_HALF_WIDTH)
 
 
-TOLD = (
-    Told(Column("icra2016", "ICRA 2016, counts samples", "", 1, bounded=True), lambda score: score.icra2016),
+COLUMNS = (
+    ScoreColumn(
+        Column("icra2016", "ICRA 2016, counts samples", "", 1, bounded=True), lambda score: score.icra2016
+    ),
 )

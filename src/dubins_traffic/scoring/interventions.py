@@ -5,7 +5,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import SHIELD, Ending
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 class Interventions:
@@ -27,8 +27,8 @@ class Interventions:
         return self._count
 
 
-TOLD = (
-    Told(
+COLUMNS = (
+    ScoreColumn(
         Column("interventions", "interventions of a shield", "ticks", -1, "int32", rare=True),
         lambda score: score.interventions,
     ),

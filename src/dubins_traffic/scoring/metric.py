@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, Protocol, TypeAlias
+from typing import Any, Final, Literal, Protocol, TypeAlias
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-
-if TYPE_CHECKING:
-    from dubins_traffic.scoring.score import Score
 
 Value: TypeAlias = float | int | bool | str | None
 """What a metric tells; None where a trial has no such value."""
@@ -107,11 +104,11 @@ class Metric(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """A column of every score, and how its value is taken from a `Score`."""
+class ScoreColumn:
+    """A column of every score, and how its value is taken from a `scoring.score.Score`."""
 
     column: Column
-    of: Callable[[Score], Value]
+    of: Callable[[Any], Value]
 
 
 Maker = Callable[[], Metric]

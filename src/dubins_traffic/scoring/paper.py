@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.metric import Column, Told
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 COLLISION_SCORE = -1.0
 
@@ -55,4 +55,4 @@ def paper_score(instance: Instance, collisions: Sequence[Collision], rounds: int
     return len(agents) * network_size(instance.problem.network) * rounds / max(1.0, off_road_s)
 
 
-TOLD = (Told(Column("paper_score", "score of the paper", "", 1), lambda score: score.paper_score),)
+COLUMNS = (ScoreColumn(Column("paper_score", "score of the paper", "", 1), lambda score: score.paper_score),)

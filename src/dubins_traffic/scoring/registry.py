@@ -7,7 +7,7 @@ new one is a file beside this one and a line in `BUILT_IN`, or a class outside t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from typing import Any, cast, get_args
@@ -121,14 +121,8 @@ def _maker(spec: MetricSpec) -> Maker:
 
 @cache
 def _registered() -> Mapping[str, Maker]:
-    from importlib.metadata import entry_points
-
-    found: dict[str, Callable[[], Any]] = {
-        name: getattr(import_module(place), own) for name, (place, own) in BUILT_IN.items()
-    }
-    for entry in sorted(entry_points(group=GROUP), key=lambda own: own.name):
-        found.setdefault(entry.name, entry.load())
-    return found
+    ours = {name: getattr(import_module(place), own) for name, (place, own) in BUILT_IN.items()}
+    return {**outside.of_packages(GROUP), **ours}
 
 
 def _line(maker: Maker) -> str:

@@ -96,7 +96,8 @@ def time_to_touch(x: Floats, y: Floats, vx: Floats, vy: Floats, touch: float) ->
     square = vx * vx + vy * vy
     closing = -(x * vx + y * vy)
     over = x * x + y * y - touch * touch
-    inner = closing * closing - square * over
+    beside = x * vy - y * vx
+    inner = square * touch * touch - beside * beside
     meets = (closing > 0.0) & (inner >= 0.0) & (square > 0.0)
     root = np.sqrt(np.where(meets, inner, 0.0))
     # The smaller root of the quadratic, in the form that loses no digits.

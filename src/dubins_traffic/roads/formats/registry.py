@@ -172,10 +172,7 @@ def _built_in() -> Mapping[str, MapFormat]:
 
 @cache
 def _others() -> tuple[MapFormat, ...]:
-    from importlib.metadata import entry_points
-
-    found = sorted(entry_points(group=GROUP), key=lambda own: own.name)
-    return tuple(_made(own.load(), own.value) for own in found)
+    return tuple(_made(maker, name) for name, maker in outside.of_packages(GROUP).items())
 
 
 def _made(maker: Any, spec: str) -> MapFormat:
