@@ -21,14 +21,15 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.kernels.records import Rows as TableOf
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.breach_log import JUDGED, OF_CAR, BreachLog, RefereeParameters
+from dubins_traffic.rules.breach_log import MOST, BreachLog, RefereeParameters, RefereeTables
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
-from dubins_traffic.rules.tables import Memory, RuleTable
+from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
 from dubins_traffic.scoring.tally import CLEARANCE, SEALED, SIGHT2, Tally, count_frame
 
 RUNNING, ENDED, COLLIDED, FAULTY, NO_CONTACTS, NO_PAIRS, NO_SIGHT, NO_DOCKET = range(8)
@@ -69,8 +70,8 @@ class World(NamedTuple):
     work: Workspace
     roads: RoadTable
     beside: ObstacleLanes
-    rules: RuleTable
-    terms: RefereeParameters
+    rules: TableOf[TrialRules]
+    terms: TableOf[RefereeParameters]
     labels: Labels
     memory: Memory
     breach_log: BreachLog
@@ -135,7 +136,10 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own[TICK] = tick + 1
     keep_apart(world.state, b, tick + 1, world.spacing)
-    label_trial(b, tick + 1, world.state, world.roads, world.beside, world.rules, world.labels, world.memory)
+    label_trial(
+        b, tick + 1,
+        LabelTables(world.state, world.roads, world.beside, world.rules, world.labels, world.memory),
+    )  # fmt: skip
     _observe(b, tick + 1, world)
     if ego_hit:
         world.tally.ints[b, SEALED] = 1
@@ -148,8 +152,8 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
 @jit_inline
 def _room(b: int, world: World) -> int:
     """Return the most breaches that a frame of trial b can begin."""
-    goals = world.terms.goal_off[b + 1] - world.terms.goal_off[b]
-    return 10 * world.state.count[b] + goals
+    own = world.terms[b]
+    return MOST * world.state.count[b] + own.goals_end - own.goals_begin
 
 
 @jit_inline
@@ -210,15 +214,18 @@ def _observe(b: int, tick: int, world: World) -> None:
     count_frame(
         b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
     )
-    if world.terms.whole[b, JUDGED] == 0:
+    if world.terms[b].judged == 0:
         return
     first = breach_log.filled[0]
     judge_trial(
-        b, tick, world.spacing, world.state, world.roads, world.beside,
-        world.rules, world.terms, world.labels, world.memory, breach_log,
+        b, tick,
+        RefereeTables(
+            world.state, world.roads, world.beside, world.rules, world.terms, world.labels, world.memory,
+            breach_log, world.spacing,
+        ),
     )  # fmt: skip
     for k in range(first, breach_log.filled[0]):
-        n = breach_log.row[k, OF_CAR]
+        n = breach_log.row[k].car
         world.progress.place[k, 0] = world.state.x[b, n]
         world.progress.place[k, 1] = world.state.y[b, n]
         if n == EGO:

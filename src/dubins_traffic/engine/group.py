@@ -32,6 +32,7 @@ from dubins_traffic.engine.batch_kernel import (
     run_trials,
 )
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
 from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
@@ -39,13 +40,12 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import OF_TRIAL, BreachLog
+from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
-from dubins_traffic.rules.tables import NET
 from dubins_traffic.scoring.margins_kernel import margin_table
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
@@ -105,13 +105,11 @@ class Group:
         labeller = Labeller(instances)
         labeller.begin(trials, places)
         roads, beside, rules = labeller.tables
-        net = rules.whole[:, NET].copy()
+        net = rules["net"].copy()
         cars, obstacles, rows, work = simulator.tables
-        terms = terms_of(problems)
-        breach_log = BreachLog.empty(trials, places, len(terms.goal))
-        breach_log = breach_log._replace(
-            row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
-        )
+        terms, goals = terms_of(problems)
+        breach_log = BreachLog.empty(trials, places, goals)
+        breach_log = breach_log._replace(row=table(FoundBreach, FRAMES * (MOST * places + 8)))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         self._world = World(
@@ -244,16 +242,15 @@ class Group:
     def _drain(self) -> None:
         """Take over the contacts and breaches that have been found, and make room."""
         world = self._world
-        found, filled = int(world.work.found[0]), int(world.breach_log.filled[0])
+        found, rows = int(world.work.found[0]), world.breach_log.found()
         notes = zip(world.work.contact[:found].tolist(), world.progress.contact[:found].tolist(), strict=True)
         for row, (tick, own, other, own_seen, other_seen) in notes:
             b, contact = int(row[0]), contact_of(row, tick, self._rate)
             self._contacts[b].append(with_fault_by(contact, own, other))
             pair = ((contact.car, own_seen), (contact.other, other_seen))
             self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
-        rows: list[list[int]] = world.breach_log.row[:filled].tolist()
-        for row, (x, y) in zip(rows, world.progress.place[:filled].tolist(), strict=True):
-            b, breach = row[OF_TRIAL], breach_of(row, x, y)
+        for breached, (x, y) in zip(rows, world.progress.place[: len(rows)].tolist(), strict=True):
+            b, breach = int(breached.trial), breach_of(breached, x, y)
             self._breaches[b].append(breach)
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))

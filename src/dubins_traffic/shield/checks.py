@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import Labels, Pose, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -35,7 +35,7 @@ from dubins_traffic.roads.lookup import (
     nearest_vertex,
 )
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.lane_state import lane_state
+from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.tables import (
@@ -204,11 +204,13 @@ def _leaves_lane(
     build = drivers.build[b]
     lane = labels.lane[b, EGO]
     back = guards.limit[b, TURN_BACK]
-    after, top, progress, lateral, turned = lane_state(
-        roads, net, at, labels.at[b, EGO], lane, guards.memory[b, TOP], segment, off2, x, y, c, s, back
-    )
-    if after < 0:
+    if at >= 0:
         return NOTHING
+    pose = Pose(x, y, c, s)
+    after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
+    after, top, progress, lateral, turned = along_lane(
+        roads, net, after, fresh, guards.memory[b, TOP], back, pose
+    )
     if turned:
         return TURN
     if after == lane and top - progress > back - TURNING:
