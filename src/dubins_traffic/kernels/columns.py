@@ -14,10 +14,11 @@ columns are apart and puts loops over them into vectors.
 from __future__ import annotations
 
 from collections.abc import Callable
-from operator import itemgetter
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
+
+from dubins_traffic.kernels.records import Table
 
 R = TypeVar("R")
 
@@ -30,16 +31,28 @@ def columns(size: int) -> Callable[[type[R]], type[R]]:
 
     def make(kind: type[R]) -> type[R]:
         names = list(get_type_hints(kind))
-        members: dict[str, Any] = {name: property(itemgetter(name)) for name in names}
-        members |= {
-            "__doc__": kind.__doc__,
-            "__module__": kind.__module__,
-            "__qualname__": kind.__qualname__,
-            "__slots__": (),
-            "FIRST_VALUES": {},
-        }
-        row = type(kind.__name__, (np.void,), members)
-        cast(Any, row).LAYOUT = np.dtype((row, np.dtype([(name, "f8", (size,)) for name in names])))
+        layout = np.dtype([(name, "f8", (size,)) for name in names])
+
+        def at(rows: Any, far: int) -> Any:
+            block = np.ndarray((), layout, rows, far)
+            own = cast(Any, row)()
+            for name in names:
+                setattr(own, name, block[name])
+            return own
+
+        row = type(
+            kind.__name__,
+            (),
+            {
+                "__doc__": kind.__doc__,
+                "__module__": kind.__module__,
+                "__qualname__": kind.__qualname__,
+                "__slots__": tuple(names),
+                "FIRST_VALUES": {},
+                "LAYOUT": layout,
+                "TABLE": type(f"{kind.__name__}Table", (Table,), {"KIND": staticmethod(at)}),
+            },
+        )
         return cast(type[R], row)
 
     return make
