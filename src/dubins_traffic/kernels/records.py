@@ -59,6 +59,31 @@ class Rows(Protocol[R_co]):
     def __len__(self) -> int: ...
 
 
+class Grid(Protocol[R_co]):
+    """As `Rows`, with two axes: a row at each place (b, n)."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the array's axes."""
+        ...
+
+    @overload
+    def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
+    @overload
+    def __getitem__(self, place: int) -> Rows[R_co]: ...
+    @overload
+    def __getitem__(self, place: tuple[int, int]) -> R_co: ...
+    def __getitem__(self, place: str | int | tuple[int, int]) -> Any:
+        """Return the row at a place, those of one number, or a field of all rows as an array."""
+        ...
+
+    def __setitem__(self, field: str, values: Any) -> None:
+        """Write a field of all rows."""
+        ...
+
+    def __len__(self) -> int: ...
+
+
 class Table(np.ndarray[Any, Any]):
     """A structured array whose rows are made once: what `table` returns.
 
@@ -90,7 +115,7 @@ class Table(np.ndarray[Any, Any]):
         if isinstance(place, str):
             return found.view(np.ndarray)
         if isinstance(found, np.void):
-            axes = place if isinstance(place, tuple) else (place,)
+            axes: tuple[int, ...] = place if isinstance(place, tuple) else (place,)
             far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
             found = self.KIND(self, far)
         self.known[place] = found
@@ -129,7 +154,7 @@ def record(kind: type[R]) -> type[R]:
         "__qualname__": kind.__qualname__,
         "__slots__": (),
         "__setattr__": _set,
-        "_numba_type_": property(lambda row: _numba_type(type(row))),
+        "_numba_type_": property(_numba_type_of),
         "data": property(memoryview),
         "FIRST_VALUES": {name: vars(kind)[name] for name in fields if name in vars(kind)},
     }
@@ -139,6 +164,10 @@ def record(kind: type[R]) -> type[R]:
         f"{kind.__name__}Table", (Table,), {"KIND": row.from_buffer, "__module__": kind.__module__}
     )
     return cast(type[R], row)
+
+
+def _numba_type_of(row: Any) -> Any:
+    return _numba_type(type(row))
 
 
 @cache
@@ -167,7 +196,11 @@ def layout(kind: type[Any]) -> np.dtype[Any]:
     return kind.LAYOUT
 
 
-def table(kind: type[R], shape: int | tuple[int, ...]) -> Rows[R]:
+@overload
+def table(kind: type[R], shape: int) -> Rows[R]: ...
+@overload
+def table(kind: type[R], shape: tuple[int, ...]) -> Any: ...
+def table(kind: type[R], shape: int | tuple[int, ...]) -> Any:
     """Return an array of new rows of a record, each with the first values of its fields.
 
     Parameters

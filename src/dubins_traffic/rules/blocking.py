@@ -52,8 +52,8 @@ def obstacle_narrows(
     end = min(far, place.length)
     segment = place.lane // 2
     back = place.lane % 2 == 1
-    k = obstacles.start[base + segment]
-    stop = obstacles.start[base + segment + 1]
+    k: int = obstacles.start[base + segment]
+    stop: int = obstacles.start[base + segment + 1]
     while k < stop:
         owner = obstacles.part[k].owner
         low = 1e300

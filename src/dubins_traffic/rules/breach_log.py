@@ -11,7 +11,7 @@ from dubins_traffic.cars.near import Spacing
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.tables import GRAIN, Memory, TrialRules, ticks
@@ -160,7 +160,7 @@ class BreachLog(NamedTuple):
         How many rows are filled.
     """
 
-    car: Rows[JudgedCar]
+    car: Grid[JudgedCar]
     goal: Rows[JudgedGoal]
     goal_due: Ints
     look: Ints

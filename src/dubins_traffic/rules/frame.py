@@ -92,7 +92,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
     labels, memory, t = tables.labels, tables.memory, tables.roads
     own, head, row, members = tables.rules[b], memory.head[b], memory.car[b], memory.member[b]
     bits, lanes = labels.bits[b], labels.lane[b]
-    cars = tables.state.count[b]
+    cars: int = tables.state.count[b]
     for n in range(cars):
         if bits[n] & STOPPED == 0:
             continue
@@ -102,7 +102,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
             keep_order(t, own, queue, head[v].crossers == 0, tick)
             _flag_queue(n, row, bits)
     for n in range(cars):
-        lane = lanes[n]
+        lane: int = lanes[n]
         if lane >= 0 and head[lane].lane == n:
             put_in_order(head[lane], row)
     for n in range(cars):
@@ -120,15 +120,17 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
 def _look_beside(b: int, tables: LabelTables) -> None:
     """Find who of trial b is blocked, overtakes and is left."""
     segments, head, row = tables.labels.segment[b], tables.memory.head[b], tables.memory.car[b]
-    cars = tables.state.count[b]
+    cars: int = tables.state.count[b]
     for n in range(cars):
-        first = head[segments[n]]
+        segment: int = segments[n]
+        first = head[segment]
         row[n].next_on_segment = first.segment
         first.segment = n
     for n in range(cars):
         _block(b, n, tables)
     for n in range(cars):
-        head[segments[n]].segment = -1
+        segment = segments[n]
+        head[segment].segment = -1
 
 
 @jit_inline
@@ -141,8 +143,8 @@ def _stop(b: int, n: int, tick: int, tables: LabelTables) -> Any:
     own, row, head = tables.rules[b], memory.car[b], memory.head[b]
     car = row[n]
     gap2 = car.gap2
-    lane = labels.lane[b, n]
-    crosses = labels.crosses[b, n]
+    lane: int = labels.lane[b, n]
+    crosses: int = labels.crosses[b, n]
     bits = np.int64(labels.bits[b, n]) & ~CLEAR
     car.rank = -1
     left = LEFT if car.reach > own.left_set else 0

@@ -88,14 +88,15 @@ def rank_queue(t: RoadTable, net: int, queue: Queue, group_ticks: int) -> int:
         How much later than the first of a group its last may come.
     """
     cars, members, count = queue.cars, queue.members, queue.count
+    front: int = members[0]
     if count == 1:
-        cars[members[0]].rank = 0
-        return members[0]
+        cars[front].rank = 0
+        return front
     for k in range(count):
-        car = cars[members[k]]
+        n: int = members[k]
+        car = cars[n]
         car.rank = -1
         car.in_group = 0
-    front = -1
     waiting = 0
     for place in range(count):
         if waiting == 0:
@@ -122,12 +123,14 @@ def _open_group(queue: Queue, group_ticks: int) -> int:
     """Put the unplaced member with the earliest ticket, and all just after, into a group; return its size."""
     earliest = -1
     for k in range(queue.count):
-        car = queue.cars[queue.members[k]]
+        n: int = queue.members[k]
+        car = queue.cars[n]
         if car.rank < 0 and (earliest < 0 or car.ticket < earliest):
             earliest = car.ticket
     size = 0
     for k in range(queue.count):
-        car = queue.cars[queue.members[k]]
+        n = queue.members[k]
+        car = queue.cars[n]
         if car.rank < 0 and car.ticket <= earliest + group_ticks:
             car.in_group = 1
             size += 1
@@ -138,7 +141,7 @@ def _open_group(queue: Queue, group_ticks: int) -> int:
 def _yields(t: RoadTable, net: int, queue: Queue, n: int) -> bool:
     """Tell whether a member of the present group, not placed yet, is on the right of member n."""
     for k in range(queue.count):
-        other = queue.members[k]
+        other: int = queue.members[k]
         if other == n or queue.cars[other].in_group == 0 or queue.cars[other].rank >= 0:
             continue
         if on_the_right(t, net, queue.lanes[n], queue.lanes[other]):
@@ -162,7 +165,7 @@ def keep_order(t: RoadTable, own: TrialRules, queue: Queue, clear: bool, tick: i
         first.first_since = -1
         front = rank_queue(t, own.net, queue, own.group_ticks)
     for k in range(queue.count):
-        n = queue.members[k]
+        n: int = queue.members[k]
         if n != front or not clear:
             cars[n].first_since = -1
         elif cars[n].first_since < 0:

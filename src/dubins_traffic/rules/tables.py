@@ -12,7 +12,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
 from dubins_traffic.kernels.columns import columns
-from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.roads.lookup import ValidCell
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
@@ -208,13 +208,13 @@ class Memory(NamedTuple):
         Scratch: the members of a queue, lowest index first.
     """
 
-    car: Rows[CarMemory]
-    cell: Rows[ValidCell]
-    kept: Rows[Kept]
+    car: Grid[CarMemory]
+    cell: Grid[ValidCell]
+    kept: Grid[Kept]
     trail_x: Floats
     trail_y: Floats
     growth: Floats
-    head: Rows[Heads]
+    head: Grid[Heads]
     due: Ints
     member: Ints
 
