@@ -115,7 +115,7 @@ class Table(np.ndarray[Any, Any]):
         if isinstance(place, str):
             return found.view(np.ndarray)
         if isinstance(found, np.void):
-            axes: tuple[int, ...] = place if isinstance(place, tuple) else (place,)
+            axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
             far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
             found = self.KIND(self, far)
         self.known[place] = found
@@ -167,7 +167,8 @@ def record(kind: type[R]) -> type[R]:
 
 
 def _numba_type_of(row: Any) -> Any:
-    return _numba_type(type(row))
+    kind = cast(Any, type(row))
+    return _numba_type(kind)
 
 
 @cache
