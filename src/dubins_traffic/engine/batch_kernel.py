@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
-from dubins_traffic.agents.tables import Agents
+from dubins_traffic.agents.tables import Agents, Scene
 from dubins_traffic.agents.tables import Workspace as AgentSpace
 from dubins_traffic.cars.motion import FULL, MOVED, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
@@ -156,11 +156,11 @@ def _room(b: int, world: World) -> int:
 def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
     if own[DECIDED] != 0:
         return
-    if own[OTHERS] != 0 and not decide_others(
-        b, tick, world.state, world.roads, world.obstacles, world.agents, world.space, commands
-    ):
-        own[STATUS] = NO_SIGHT
-        return
+    if own[OTHERS] != 0:
+        scene = Scene(world.state, world.roads, world.obstacles, world.agents, world.space)
+        if not decide_others(b, tick, scene, commands):
+            own[STATUS] = NO_SIGHT
+            return
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(

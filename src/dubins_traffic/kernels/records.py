@@ -48,6 +48,10 @@ class Rows(Protocol[R_co]):
         """Return the row at a place with a number for each axis, or a field of all rows as an array."""
         ...
 
+    def __setitem__(self, field: str, values: Any) -> None:
+        """Write a field of all rows."""
+        ...
+
     def __len__(self) -> int: ...
 
 
