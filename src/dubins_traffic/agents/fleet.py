@@ -20,6 +20,7 @@ from dubins_traffic.agents.tables import (
     Agent,
     Agents,
     Point,
+    Scene,
     Stretch,
     Team,
     Trail,
@@ -88,10 +89,7 @@ class Fleet:
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
-        self._gather()
-
-    def _gather(self) -> None:
-        self._arrays = (*self._roads, *self._obstacles, *self._agents, *self._work)
+        self._scene = Scene(state, self._roads, self._obstacles, self._agents, self._work)
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of the e-agents for [t_k, t_k+1) into `commands` (B, N, 2)."""
@@ -107,15 +105,17 @@ class Fleet:
         return () if self._counter is None else self._counter.report()
 
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
+        if state is not self._scene.state:
+            self._scene = self._scene.replace(state=state)
         done = 0
         while done < commands.shape[0]:
-            reached = decide(tick, done, commands, *state, *self._arrays)
+            reached = decide(tick, done, commands, self._scene)
             done = reached
             if reached < 0:
                 done = -1 - reached
                 pairs = 4 * len(self._work.pair)
-                self._work = self._work._replace(pair=np.zeros((pairs, 2), dtype=np.int64))
-                self._gather()
+                self._work = self._work.replace(pair=np.zeros((pairs, 2), dtype=np.int64))
+                self._scene = self._scene.replace(work=self._work)
 
 
 def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:

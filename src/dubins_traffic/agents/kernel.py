@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dubins_traffic.agents.lanes import nearer_exit, random_exit
 from dubins_traffic.agents.sight import look
 from dubins_traffic.agents.tables import (
@@ -15,15 +13,12 @@ from dubins_traffic.agents.tables import (
     TIGHT,
     WEARY,
     Agent,
-    Agents,
     Scene,
     Stretch,
     Team,
-    Workspace,
 )
 from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inner
 from dubins_traffic.kernels.random import below
@@ -42,31 +37,13 @@ BACK = -0.99
 """Cosine of the turn between two lanes below which it counts as turning round."""
 
 
-# Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
-ROADS_END = STATE_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
-AGENTS_END = OBSTACLES_END + len(Agents._fields)
-
-
 @jit
-def decide(tick: int, begin: int, commands: Floats, *arrays: Any) -> int:
+def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
     """Write the commands of all e-agents of the trials from `begin` on.
 
-    `arrays` are those of State, RoadTable, ObstacleTable, Agents and Workspace, one after another: a call from Python
-    with arrays takes a third of the time of one with tables of them. Returns the number of trials, or -1 - b where
-    the room for pairs of neighbours was too small for trial b, which is then untouched, like those after it.
+    Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which is
+    then untouched, like those after it.
     """
-    scene = Scene(
-        State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
-        ObstacleTable(*arrays[ROADS_END:OBSTACLES_END]), Agents(*arrays[OBSTACLES_END:AGENTS_END]),
-        Workspace(*arrays[AGENTS_END:]),
-    )  # fmt: skip
-    return _decide(tick, begin, scene, commands)
-
-
-@jit
-def _decide(tick: int, begin: int, scene: Scene, commands: Floats) -> int:
     count = scene.state.count
     for b in range(begin, count.shape[0]):
         if count[b] > 1 and not decide_trial(b, tick, scene, commands):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, record
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 
 WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
@@ -150,7 +151,7 @@ class Trail:
     """How far the ego had driven, metres."""
 
 
-class Agents(NamedTuple):
+class Agents(Tables):
     """The e-agents of a batch.
 
     `team` (B,), `agent` (B, N); `cycle` (M,): lanes in order; `script` (M,). Of the ego's path, for every car that
@@ -165,7 +166,7 @@ class Agents(NamedTuple):
     point: Rows[Point]
 
 
-class Workspace(NamedTuple):
+class Workspace(Tables):
     """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), why cars must stand, lanes."""
 
     pair: Ints
@@ -177,7 +178,7 @@ class Workspace(NamedTuple):
     queue: Ints
 
 
-class Scene(NamedTuple):
+class Scene(Tables):
     """All that the e-agents of a batch go by."""
 
     state: State

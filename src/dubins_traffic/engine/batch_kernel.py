@@ -6,8 +6,6 @@ memory. The order of events in a tick is that of `docs/semantics.md`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
@@ -21,6 +19,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.table import RoadTable
@@ -45,7 +44,7 @@ drivers do. ENDS: whether a collision of the ego ends it.
 """
 
 
-class Progress(NamedTuple):
+class Progress(Tables):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
     `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
@@ -59,7 +58,7 @@ class Progress(NamedTuple):
     place: Floats
 
 
-class World(NamedTuple):
+class World(Tables):
     """All tables of a batch."""
 
     state: State

@@ -109,7 +109,7 @@ class Group:
         cars, obstacles, rows, work = simulator.tables
         terms = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, len(terms.goal))
-        breach_log = breach_log._replace(
+        breach_log = breach_log.replace(
             row=np.zeros((FRAMES * (10 * places + 8), breach_log.row.shape[1]), np.int64)
         )
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
@@ -226,10 +226,10 @@ class Group:
         """Enlarge what was too small, and write down how trials ended."""
         status = self._world.progress.ints[active, STATUS]
         if (status == NO_PAIRS).any():
-            self._world = self._world._replace(work=enlarged(self._world.work))
+            self._world = self._world.replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
             room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
-            self._world = self._world._replace(space=self._world.space._replace(pair=room))
+            self._world = self._world.replace(space=self._world.space.replace(pair=room))
         numbers: list[int] = active.tolist()
         for b, why in zip(numbers, status.tolist(), strict=True):
             if why == ENDED:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.rules.tables import GRAIN, ticks
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ ON_LANE: Final = 6
 COLUMNS: Final = 7
 
 
-class RefereeParameters(NamedTuple):
+class RefereeParameters(Tables):
     """The terms by which each trial is judged.
 
     Attributes
@@ -115,7 +116,7 @@ class RefereeParameters(NamedTuple):
     goal: Ints
 
 
-class BreachLog(NamedTuple):
+class BreachLog(Tables):
     """What the referee remembers, and what he has found.
 
     Attributes

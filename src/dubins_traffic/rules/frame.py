@@ -84,31 +84,9 @@ LONG = STILL | LINGERS
 BESIDE = LONG | LEFT | OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
-# Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
-ROADS_END = STATE_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
-RULES_END = OBSTACLES_END + len(RuleTable._fields)
-LABELS_END = RULES_END + len(Labels._fields)
-
 
 @jit
-def label_frame(tick: int, *arrays: Any) -> None:
-    """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
-
-    Before frame 0 both are as they are made: no lane, no vertex, no flag. `arrays` are those of State, RoadTable,
-    ObstacleLanes, RuleTable, Labels and Memory, one after another: a call from Python with arrays takes a third of
-    the time of one with tables of them.
-    """
-    label_tables(
-        tick, State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
-        ObstacleLanes(*arrays[ROADS_END:OBSTACLES_END]), RuleTable(*arrays[OBSTACLES_END:RULES_END]),
-        Labels(*arrays[RULES_END:LABELS_END]), Memory(*arrays[LABELS_END:]),
-    )  # fmt: skip
-
-
-@jit_inner
-def label_tables(
+def label_frame(
     tick: int,
     state: State,
     roads: RoadTable,
@@ -117,7 +95,10 @@ def label_tables(
     labels: Labels,
     memory: Memory,
 ) -> None:
-    """Do what `label_frame` does, for a kernel that has the tables."""
+    """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
+
+    Before frame 0 both are as they are made: no lane, no vertex, no flag.
+    """
     for b in range(state.count.shape[0]):
         label_trial(b, tick, state, roads, obstacles, rules, labels, memory)
 

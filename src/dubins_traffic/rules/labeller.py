@@ -9,7 +9,6 @@ import numpy as np
 from dubins_traffic.cars.state import NONE, Contact, Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.table import RoadTable, pack_distinct
 from dubins_traffic.rules.fault import with_fault
@@ -80,7 +79,6 @@ class Labeller:
         self._obstacles = place_obstacles(obstacles, self._roads, nets)
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
         self._tick = -1
-        self._state: State | None = None
 
     def reset(self, state: State) -> Labels:
         """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
@@ -95,8 +93,6 @@ class Labeller:
         linger = max(1, int(self._rules.whole[:, LINGER_TICKS].max()))
         self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
         self.labels = Labels.zeros(trials, cars)
-        self._arrays = (*self._roads, *self._obstacles, *self._rules, *self.labels, *self.memory)
-        self._state = None
         self._tick = -1
 
     def update(
@@ -157,10 +153,7 @@ class Labeller:
         return self.memory.mark[:, :, RANK]
 
     def _label(self, state: State) -> None:
-        if state is not self._state:
-            self._state = state
-            self._call = bound(label_frame, (0,), (*state, *self._arrays))
-        self._call(self._tick)
+        label_frame(self._tick, state, *self.tables, self.labels, self.memory)
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:

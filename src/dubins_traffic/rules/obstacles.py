@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 
 
-class ObstacleLanes(NamedTuple):
+class ObstacleLanes(Tables):
     """Parts of obstacles by segment.
 
     Attributes

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -226,7 +225,7 @@ class Referee:
             self._docket,
             self._spacing,
         )
-        judge_frame(tick, *state, *chain.from_iterable(tables))
+        judge_frame(tick, state, *tables)
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._docket.filled[0] and not any(contacts):

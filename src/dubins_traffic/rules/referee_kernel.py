@@ -36,7 +36,7 @@ from dubins_traffic.rules.breaches import (
     judge_road,
 )
 from dubins_traffic.rules.duties import judge_agent, judge_goals
-from dubins_traffic.rules.frame import label_tables
+from dubins_traffic.rules.frame import label_frame
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.propositions import (
     ENTERED,
@@ -59,35 +59,8 @@ from dubins_traffic.rules.tables import (
 ENTERS = ENTERED | IN_CROSSING
 
 
-# Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
-ROADS_END = STATE_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
-RULES_END = OBSTACLES_END + len(RuleTable._fields)
-TERMS_END = RULES_END + len(RefereeParameters._fields)
-LABELS_END = TERMS_END + len(Labels._fields)
-MEMORY_END = LABELS_END + len(Memory._fields)
-DOCKET_END = MEMORY_END + len(BreachLog._fields)
-
-
 @jit
-def judge_frame(tick: int, *arrays: Any) -> None:
-    """Add the breaches that begin in frame `tick`, which has been labelled, to the breach_log.
-
-    `arrays` are those of State, RoadTable, ObstacleLanes, RuleTable, RefereeParameters, Labels, Memory, BreachLog and
-    Spacing, one after another: a call from Python with arrays takes a third of the time of one with tables of them.
-    """
-    judge_tables(
-        tick, State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
-        ObstacleLanes(*arrays[ROADS_END:OBSTACLES_END]), RuleTable(*arrays[OBSTACLES_END:RULES_END]),
-        RefereeParameters(*arrays[RULES_END:TERMS_END]), Labels(*arrays[TERMS_END:LABELS_END]),
-        Memory(*arrays[LABELS_END:MEMORY_END]), BreachLog(*arrays[MEMORY_END:DOCKET_END]),
-        Spacing(*arrays[DOCKET_END:]),
-    )  # fmt: skip
-
-
-@jit_inner
-def judge_tables(
+def judge_frame(
     tick: int,
     state: State,
     roads: RoadTable,
@@ -99,7 +72,7 @@ def judge_tables(
     breach_log: BreachLog,
     spacing: Spacing,
 ) -> None:
-    """Do as `judge_frame`, for kernels."""
+    """Add the breaches that begin in frame `tick`, which has been labelled, to the breach_log."""
     for b in range(state.count.shape[0]):
         if terms.whole[b, JUDGED] != 0:
             judge_trial(b, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, breach_log)
@@ -278,8 +251,8 @@ def judge_frames(
             state.y[0, n] = poses[1, f, n]
             state.c[0, n] = poses[2, f, n]
             state.s[0, n] = poses[3, f, n]
-        label_tables(first + f, state, roads, obstacles, rules, labels, memory)
-        judge_tables(first + f, state, roads, obstacles, rules, terms, labels, memory, breach_log, spacing)
+        label_frame(first + f, state, roads, obstacles, rules, labels, memory)
+        judge_frame(first + f, state, roads, obstacles, rules, terms, labels, memory, breach_log, spacing)
         for n in range(poses.shape[2]):
             bits[f, n] = labels.bits[0, n]
     return poses.shape[1]

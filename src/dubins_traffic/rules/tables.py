@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.parameters import RuleParameters
@@ -102,7 +103,7 @@ NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
 
 
-class RuleTable(NamedTuple):
+class RuleTable(Tables):
     """The rules of each trial: `real` (B, REALS) float64 and `whole` (B, WHOLES) int64, columns as named above.
 
     `CROSS2`, `APPROACH2`, `STOP2` and `QUEUE2` are squared distances of the body, without its rounding, from a vertex:
@@ -113,7 +114,7 @@ class RuleTable(NamedTuple):
     whole: Ints
 
 
-class Memory(NamedTuple):
+class Memory(Tables):
     """What the propositions remember, all of it explicit.
 
     Attributes
