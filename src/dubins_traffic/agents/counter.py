@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from math import hypot
 from typing import TYPE_CHECKING, Any, Final
 
@@ -111,8 +110,7 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
-        decide(tick, commands, *chain.from_iterable(tables))
+        decide(tick, commands, state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
                 self._hold(car, commands[0, car.car])

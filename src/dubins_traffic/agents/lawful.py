@@ -11,7 +11,6 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
@@ -59,18 +58,11 @@ class Lawful:
         )
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._drivers = pack_drivers(instances, cars, net)
-        own = scratch(cars, int(np.diff(self._roads.seg_off).max()))
-        self._arrays = (*self._roads, *self._obstacles, *self._drivers, *own)
-        self._state: State | None = None
-        self._labels: Labels | None = None
-        self._commands: Floats | None = None
+        self._scratch = scratch(cars, int(np.diff(self._roads.seg_off).max()))
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
-        if state is not self._state or labels is not self._labels or commands is not self._commands:
-            self._state, self._labels, self._commands = state, labels, commands
-            self._call = bound(decide, (0, commands), (*state, *labels, *self._arrays))
-        self._call(tick, commands)
+        decide(tick, commands, state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
 
 
 def pack_drivers(

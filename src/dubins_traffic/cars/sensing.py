@@ -17,21 +17,20 @@ from dubins_traffic.kernels.trig import sincos
 
 POSITION_DRAW = 200
 HEADING_DRAW = 206
-STATE_END = len(State._fields)
 SEEN_REALS = 6
 SEEN_WHOLES = 6
 
 
 @jit
-def neighbours(b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, *arrays: Any) -> int:
+def neighbours(
+    b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, state: State, labels: Labels
+) -> int:
     """Write the viewer and then the other cars within `radius` of it, by index, into two arrays; return the number.
 
     A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
-    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. `arrays` are those of State and
-    of Labels, one after another. Where `wholes` was as it is now already, minus the number is returned.
+    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. Where `wholes` was
+    as it is now already, minus the number is returned.
     """
-    state = State(*arrays[:STATE_END])
-    labels = Labels(*arrays[STATE_END:])
     limit = radius * radius
     x = state.x[b, viewer]
     y = state.y[b, viewer]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import chain
-
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
@@ -73,8 +70,6 @@ class Rules:
             stage=stage,
             distance=distance,
         )
-        tables = (self._state, self._labels, self._roads, self._obstacles, self._drivers, self._scratch)
-        self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -87,6 +82,9 @@ class Rules:
             drivers.ints[0, EGO, PLACE] = nearest_stage(
                 drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment
             )
-        self._decide(observation.tick, self._command)
+        decide(
+            observation.tick, self._command, self._state, self._labels, self._roads, self._obstacles, drivers,
+            self._scratch,
+        )  # fmt: skip
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)

@@ -111,7 +111,7 @@ class Synthesized(Rules):
             vertices,
         )
         drivers.ints[0, EGO, [FIRST, LAST, PLACE]] = 0, 1, 0
-        self._drivers = drivers._replace(
+        self._drivers = drivers.replace(
             stage=np.array([NO_GOAL]), distance=np.zeros((1, arena.network.lanes))
         )
         self._points: list[list[float]] = problem.network.points.tolist()

@@ -6,12 +6,10 @@ memory. The order of events in a tick is that of `docs/semantics.md`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
-from dubins_traffic.agents.tables import Agents
+from dubins_traffic.agents.tables import Agents, Scene
 from dubins_traffic.agents.tables import Workspace as AgentSpace
 from dubins_traffic.cars.motion import FULL, MOVED, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
@@ -22,6 +20,7 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.table import RoadTable
@@ -46,7 +45,7 @@ drivers do. ENDS: whether a collision of the ego ends it.
 """
 
 
-class Progress(NamedTuple):
+class Progress(Tables):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
     `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
@@ -60,7 +59,7 @@ class Progress(NamedTuple):
     place: Floats
 
 
-class World(NamedTuple):
+class World(Tables):
     """All tables of a batch."""
 
     state: State
@@ -82,6 +81,9 @@ class World(NamedTuple):
     tally: Tally
     progress: Progress
     spacing: Spacing
+    labelling: LabelTables
+    judging: RefereeTables
+    """The same tables, as labels and referee take them."""
 
 
 @jit_wide
@@ -136,10 +138,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own[TICK] = tick + 1
     keep_apart(world.state, b, tick + 1, world.spacing)
-    label_trial(
-        b, tick + 1,
-        LabelTables(world.state, world.roads, world.beside, world.rules, world.labels, world.memory),
-    )  # fmt: skip
+    label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
         world.tally.ints[b, SEALED] = 1
@@ -160,11 +159,11 @@ def _room(b: int, world: World) -> int:
 def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
     if own[DECIDED] != 0:
         return
-    if own[OTHERS] != 0 and not decide_others(
-        b, tick, world.state, world.roads, world.obstacles, world.agents, world.space, commands
-    ):
-        own[STATUS] = NO_SIGHT
-        return
+    if own[OTHERS] != 0:
+        scene = Scene(world.state, world.roads, world.obstacles, world.agents, world.space)
+        if not decide_others(b, tick, scene, commands):
+            own[STATUS] = NO_SIGHT
+            return
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(
@@ -217,13 +216,7 @@ def _observe(b: int, tick: int, world: World) -> None:
     if world.terms[b].judged == 0:
         return
     first = breach_log.filled[0]
-    judge_trial(
-        b, tick,
-        RefereeTables(
-            world.state, world.roads, world.beside, world.rules, world.terms, world.labels, world.memory,
-            breach_log, world.spacing,
-        ),
-    )  # fmt: skip
+    judge_trial(b, tick, world.judging)
     for k in range(first, breach_log.filled[0]):
         n = breach_log.row[k].car
         world.progress.place[k, 0] = world.state.x[b, n]

@@ -40,7 +40,7 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach
+from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeTables
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
@@ -109,15 +109,20 @@ class Group:
         cars, obstacles, rows, work = simulator.tables
         terms, goals = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, goals)
-        breach_log = breach_log._replace(row=table(FoundBreach, FRAMES * (MOST * places + 8)))
+        breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * (MOST * places + 8)))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
+        apart = spacing(trials, places, rows.far - cars.reach)
+        labelling = labeller.seeing(self.state)
+        judging = RefereeTables(
+            self.state, roads, beside, rules, terms, labeller.labels, labeller.memory, breach_log, apart
+        )
         self._world = World(
             self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
             labeller.memory, breach_log, pack_drivers(instances, places, net, rounds), scratch(places, segments),
             pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
             new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
-            spacing(trials, places, rows.far - cars.reach),
+            apart, labelling, judging,
         )  # fmt: skip
         kinds, index = kinds_of(problems)
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
@@ -224,10 +229,10 @@ class Group:
         """Enlarge what was too small, and write down how trials ended."""
         status = self._world.progress.ints[active, STATUS]
         if (status == NO_PAIRS).any():
-            self._world = self._world._replace(work=enlarged(self._world.work))
+            self._world = self._world.replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
             room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
-            self._world = self._world._replace(space=self._world.space._replace(pair=room))
+            self._world = self._world.replace(space=self._world.space.replace(pair=room))
         numbers: list[int] = active.tolist()
         for b, why in zip(numbers, status.tolist(), strict=True):
             if why == ENDED:

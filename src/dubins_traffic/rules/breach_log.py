@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.tables import GRAIN, Memory, TrialRules, ticks
@@ -141,7 +142,7 @@ class FoundBreach:
     lane: int
 
 
-class BreachLog(NamedTuple):
+class BreachLog(Tables):
     """What the referee remembers, and what he has found.
 
     Attributes
@@ -197,7 +198,7 @@ class BreachLog(NamedTuple):
         return [self.row[k] for k in range(int(self.filled[0]))]
 
 
-class RefereeTables(NamedTuple):
+class RefereeTables(Tables):
     """All that the frames of a batch are judged by, and what is found (`rules.referee_kernel.judge_frame`)."""
 
     state: State

@@ -111,15 +111,11 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
 
 
 @jit
-def find_ways(tick: int, found: Any, *tables: Any) -> None:
-    """Write down which cars of a frame that has been judged are in a lane with a free way ahead, (B, N) bool.
-
-    `tables` are those of `RefereeTables`, one after another.
-    """
-    own = RefereeTables(*tables)
-    for b in range(own.state.count.shape[0]):
-        for n in range(own.state.count[b]):
-            found[b, n] = has_way(b, n, tick, own)
+def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
+    """Write which cars of frame `tick`, which has been judged, are in a lane with a free way ahead, (B, N) bool."""
+    for b in range(tables.state.count.shape[0]):
+        for n in range(tables.state.count[b]):
+            found[b, n] = has_way(b, n, tick, tables)
 
 
 @jit_inner

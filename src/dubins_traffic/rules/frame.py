@@ -45,15 +45,13 @@ BESIDE = LONG | LEFT | OVERTAKING
 
 
 @jit
-def label_frame(tick: int, *tables: Any) -> None:
+def label_frame(tick: int, tables: LabelTables) -> None:
     """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
 
-    Before frame 0 both are as they are made: no lane, no vertex, no flag. `tables` are those of `LabelTables`, one
-    after another.
+    Before frame 0 both are as they are made: no lane, no vertex, no flag.
     """
-    own = LabelTables(*tables)
-    for b in range(own.state.count.shape[0]):
-        label_trial(b, tick, own)
+    for b in range(tables.state.count.shape[0]):
+        label_trial(b, tick, tables)
 
 
 @jit_inner

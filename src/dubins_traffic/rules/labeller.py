@@ -9,7 +9,6 @@ import numpy as np
 from dubins_traffic.cars.state import NONE, Contact, Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.table import RoadTable, pack_distinct
@@ -66,7 +65,7 @@ class Labeller:
         self._obstacles = place_obstacles(obstacles, self._roads, nets)
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
         self._tick = -1
-        self._state: State | None = None
+        self._tables: LabelTables | None = None
 
     def reset(self, state: State) -> Labels:
         """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
@@ -81,7 +80,7 @@ class Labeller:
         linger = max(1, int(self._rules["linger_ticks"].max()))
         self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
         self.labels = Labels.zeros(trials, cars)
-        self._state = None
+        self._tables = None
         self._tick = -1
 
     def update(
@@ -141,12 +140,14 @@ class Labeller:
         """Places of the cars in the order of the crossing ahead, 0 first, (B, N); -1 without a ticket."""
         return self.memory.car["rank"]
 
+    def seeing(self, state: State) -> LabelTables:
+        """Return all that `label_frame` takes, of a batch in this state."""
+        if self._tables is None or self._tables.state is not state:
+            self._tables = LabelTables(state, *self.tables, self.labels, self.memory)
+        return self._tables
+
     def _label(self, state: State) -> None:
-        if state is not self._state:
-            self._state = state
-            tables = LabelTables(state, *self.tables, self.labels, self.memory)
-            self._call = bound(label_frame, (0,), tables)
-        self._call(self._tick)
+        label_frame(self._tick, self.seeing(state))
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 
 
@@ -26,7 +27,7 @@ class ObstaclePart:
     """Number of the obstacle."""
 
 
-class ObstacleLanes(NamedTuple):
+class ObstacleLanes(Tables):
     """Parts of obstacles by segment.
 
     Attributes

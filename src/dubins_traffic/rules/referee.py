@@ -14,7 +14,6 @@ from dubins_traffic.cars.near import unknown
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
     COLLISION,
@@ -31,7 +30,7 @@ from dubins_traffic.rules.fault import with_fault
 from dubins_traffic.rules.judged import Judged, Posed, kinds_of
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee_kernel import Poses, judge_frame, judge_frames
+from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
 from dubins_traffic.rules.tables import spread
 
 _PENDING = (
@@ -113,7 +112,7 @@ class Referee:
         self._judged = [bool(problem.rules) for problem in problems]
         self._roads, self._obstacles, self._rules = self._labeller.tables
         self._state: State | None = None
-        self._seen: State | None = None
+        self._tables: RefereeTables | None = None
 
     def reset(self, state: State) -> Sequence[Sequence[Breach]]:
         """Judge frame 0; return the breaches of each trial, in order."""
@@ -122,7 +121,7 @@ class Referee:
         trials, cars = state.x.shape
         self._log = BreachLog.empty(trials, cars, self._goals)
         self._spacing = unknown(trials, cars)
-        self._seen = None
+        self._tables = None
         self._judge(0, state)
         return self._collect(state, [()] * trials)
 
@@ -193,22 +192,21 @@ class Referee:
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, of these poses."""
         found = np.zeros(state.x.shape, dtype=np.bool_)
-        find_ways(self._tick, found, *self._tables(state))
+        find_ways(self._tick, self._seeing(state), found)
         return found
 
-    def _tables(self, state: State) -> RefereeTables:
-        own = self._labeller
-        return RefereeTables(
-            state, self._roads, self._obstacles, self._rules, self._terms, own.labels, own.memory, self._log,
-            self._spacing,
-        )  # fmt: skip
+    def _seeing(self, state: State) -> RefereeTables:
+        if self._tables is None or self._tables.state is not state:
+            own = self._labeller
+            self._tables = RefereeTables(
+                state, self._roads, self._obstacles, self._rules, self._terms, own.labels, own.memory, self._log,
+                self._spacing,
+            )  # fmt: skip
+        return self._tables
 
     def _judge(self, tick: int, state: State) -> None:
         self._tick = tick
-        if state is not self._seen:
-            self._seen = state
-            self._call = bound(judge_frame, (0,), self._tables(state))
-        self._call(tick)
+        judge_frame(tick, self._seeing(state))
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._log.filled[0] and not any(contacts):
@@ -236,18 +234,20 @@ class Referee:
             self._spacing = unknown(1, cars)
             self._next = 0
             own.begin(1, cars)
+            self._tables = None
         if self._state is None or frames.first != self._next:
             raise ValueError(f"frames must follow one another: got {frames.first}, and none before it")
         self._next += len(frames)
-        poses = Poses(frames.x, frames.y, frames.c, frames.s)
+        columns = (frames.x, frames.y, frames.c, frames.s, frames.speed, frames.yaw_rate)
+        poses = State(*(np.ascontiguousarray(column) for column in columns), self._state.count)
         before = own.labels.bits[0].copy()
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []
         room = self._log.room_of_a_frame
-        tables = self._tables(self._state)
+        labelling, judging = own.seeing(self._state), self._seeing(self._state)
         done = 0
         while done < len(frames):
-            done = judge_frames(frames.first, done, room, poses, bits, *tables)
+            done = judge_frames(frames.first, done, room, poses, bits, labelling, judging)
             for row in self._log.found():
                 f, n = int(row.tick) - frames.first, int(row.car)
                 breaches.append(breach_of(row, float(frames.x[f, n]), float(frames.y[f, n])))

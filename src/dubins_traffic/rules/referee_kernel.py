@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from dubins_traffic.cars.near import list_near
-from dubins_traffic.cars.state import EGO, Labels
-from dubins_traffic.kernels.arrays import Bits, Floats
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.kernels.arrays import Bits
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import distance2, lane_end
 from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, RefereeTables
@@ -28,15 +28,11 @@ ENTERS = ENTERED | IN_CROSSING
 
 
 @jit
-def judge_frame(tick: int, *tables: Any) -> None:
-    """Add the breaches that begin in frame `tick`, which has been labelled, to the log.
-
-    `tables` are those of `RefereeTables`, one after another.
-    """
-    own = RefereeTables(*tables)
-    for b in range(own.state.count.shape[0]):
-        if own.terms[b].judged != 0:
-            judge_trial(b, tick, own)
+def judge_frame(tick: int, tables: RefereeTables) -> None:
+    """Add the breaches that begin in frame `tick`, which has been labelled, to the log."""
+    for b in range(tables.state.count.shape[0]):
+        if tables.terms[b].judged != 0:
+            judge_trial(b, tick, tables)
 
 
 @jit_inner
@@ -144,36 +140,33 @@ def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: Refer
     judge_entry(b, n, tick, v, stopped, count, tables)
 
 
-class Poses(NamedTuple):
-    """Where the cars of one trial are in some frames: metres, and the headings as unit vectors, (F, N) each."""
-
-    x: Floats
-    y: Floats
-    c: Floats
-    s: Floats
-
-
 @jit
-def judge_frames(first: int, begin: int, room: int, poses: Poses, bits: Bits, *tables: Any) -> int:
-    """Label and judge `poses` of one trial from row `begin` on; return the row after the last.
+def judge_frames(
+    first: int,
+    begin: int,
+    room: int,
+    poses: State,
+    bits: Bits,
+    labelling: LabelTables,
+    judging: RefereeTables,
+) -> int:
+    """Label and judge frames of one trial from row `begin` on; return the row after the last.
 
-    Row f is frame `first` + f. The flags found are written to `bits` (F, N). Ends early when there may not be room
-    in the log for another frame, which needs `room` rows. `tables` are those of `RefereeTables`, one after another.
+    Row f, frame `first` + f, of `poses` (F, N) says where the cars are. The flags found are written to `bits` (F, N).
+    Ends early when there may not be room in the log for another frame, which needs `room` rows.
     """
-    own = RefereeTables(*tables)
-    state, labels = own.state, own.labels
+    state, log, flags = judging.state, judging.log, judging.labels.bits
     for f in range(begin, bits.shape[0]):
-        if own.log.filled[0] + room > own.log.row.shape[0]:
+        if log.filled[0] + room > log.row.shape[0]:
             return f
         for n in range(bits.shape[1]):
             state.x[0, n] = poses.x[f, n]
             state.y[0, n] = poses.y[f, n]
             state.c[0, n] = poses.c[f, n]
             state.s[0, n] = poses.s[f, n]
-        tick = first + f
-        label_trial(0, tick, LabelTables(state, own.roads, own.obstacles, own.rules, labels, own.memory))
-        if own.terms[0].judged != 0:
-            judge_trial(0, tick, own)
+        label_trial(0, first + f, labelling)
+        if judging.terms[0].judged != 0:
+            judge_trial(0, first + f, judging)
         for n in range(bits.shape[1]):
-            bits[f, n] = labels.bits[0, n]
+            bits[f, n] = flags[0, n]
     return bits.shape[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
 from dubins_traffic.kernels.columns import columns
 from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.lookup import ValidCell
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
@@ -183,7 +184,7 @@ class Kept:
     was_lingering: Floats
 
 
-class Memory(NamedTuple):
+class Memory(Tables):
     """What the propositions remember, all of it explicit.
 
     Attributes
@@ -237,7 +238,7 @@ class Memory(NamedTuple):
         )
 
 
-class LabelTables(NamedTuple):
+class LabelTables(Tables):
     """All that labels of a batch are found from, and the labels: what `rules.frame.label_frame` takes."""
 
     state: State

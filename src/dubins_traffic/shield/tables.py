@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.tables import (
     FIRST,
     FLOATS,
@@ -78,7 +79,7 @@ SETTINGS: Final = 2
 """Columns of `Guards.setting`: SURE, LAW or NEVER; how many cars there are."""
 
 
-class Alone(NamedTuple):
+class Alone(Tables):
     """An ego that sees no other car: tables of one car per trial, and what the law that drives it remembers."""
 
     state: State
@@ -89,7 +90,7 @@ class Alone(NamedTuple):
     commands: Floats
 
 
-class Guards(NamedTuple):
+class Guards(Tables):
     """What the shield knows of each trial, `limit` (B, LIMITS), `setting` (B, SETTINGS) and the `obstacles` in lanes.
 
     What it remembers, `memory` and `mark` (B, MARKS); and the ego as it would drive `alone`.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.protocols import Ending, Sink
 
@@ -17,14 +16,11 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 
-STATE_END = len(State._fields)
-
-
 @jit
-def keep(f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, *arrays: Any) -> None:
+def keep(
+    f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, state: State, labels: Labels
+) -> None:
     """Copy trial 0 of the arrays of State and Labels, and its commands, into frame f of a block."""
-    state = State(*arrays[:STATE_END])
-    labels = Labels(*arrays[STATE_END:])
     for n in range(reals.shape[2]):
         reals[0, f, n] = state.x[0, n]
         reals[1, f, n] = state.y[0, n]
@@ -64,9 +60,6 @@ class FrameBuffer:
         self._cars = len(instance.starts)
         self._sinks = tuple(sinks)
         self._first = 0
-        self._state: State | None = None
-        self._labels: Labels | None = None
-        self._commands: Floats | None = None
         for sink in self._sinks:
             sink.begin(instance)
         self._renew()
@@ -81,11 +74,7 @@ class FrameBuffer:
     ) -> None:
         """Take the frame just reached, the clipped commands that led to it, and what happened in its tick."""
         f = self._filled
-        if state is not self._state or labels is not self._labels or commands is not self._commands:
-            self._state, self._labels, self._commands = state, labels, commands
-            first = (0, self._reals, self._whole, self._bits, commands)
-            self._keep = bound(keep, first, (*state, *labels))
-        self._keep(f, self._reals, self._whole, self._bits, commands)
+        keep(f, self._reals, self._whole, self._bits, commands, state, labels)
         if contacts:
             self._contacts += contacts
         if events:

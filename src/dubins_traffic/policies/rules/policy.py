@@ -80,33 +80,13 @@ DAWDLE = 0.12
 NOBODY, SEEN, ALL = range(3)
 """Who is in the lists of the segments: nobody, all whom the ego sees, all."""
 
-# Where each table begins and ends among the arrays of a call.
-STATE_END = len(State._fields)
-LABELS_END = STATE_END + len(Labels._fields)
-ROADS_END = LABELS_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
-DRIVERS_END = OBSTACLES_END + len(Drivers._fields)
-
 
 @jit
-def decide(tick: int, commands: Floats, *arrays: Any) -> None:
-    """Write the commands of all cars that the law drives.
-
-    `arrays` are those of State, Labels, RoadTable, ObstacleTable, Drivers and Scratch, one after another: a call from
-    Python with arrays takes a third of the time of one with tables of them.
-    """
-    _decide(
-        tick, State(*arrays[:STATE_END]), Labels(*arrays[STATE_END:LABELS_END]),
-        RoadTable(*arrays[LABELS_END:ROADS_END]), ObstacleTable(*arrays[ROADS_END:OBSTACLES_END]),
-        Drivers(*arrays[OBSTACLES_END:DRIVERS_END]), Scratch(*arrays[DRIVERS_END:]), commands,
-    )  # fmt: skip
-
-
-@jit_inline
-def _decide(
-    tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
-    scratch: Scratch, commands: Floats,
+def decide(
+    tick: int, commands: Floats, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
+    drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
+    """Write the commands of all cars that the law drives."""
     for b in range(drivers.active.shape[0]):
         if drivers.active[b] != 0:
             decide_trial(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
 
@@ -93,7 +94,7 @@ curvature, 1/m; the heading (C, S); and the yaw rate that is found, rad/s, as th
 """
 
 
-class Drivers(NamedTuple):
+class Drivers(Tables):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
@@ -114,7 +115,7 @@ class Drivers(NamedTuple):
     distance: Floats
 
 
-class Scratch(NamedTuple):
+class Scratch(Tables):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
     lanes that the ego will probably take; `late`: commands put off; `apart` (N,): for
     who does not know how far cars are apart, 0; `listed` (1,): who is in the lists.
