@@ -239,7 +239,8 @@ class Referee:
             raise ValueError(f"frames must follow one another: got {frames.first}, and none before it")
         self._next += len(frames)
         columns = (frames.x, frames.y, frames.c, frames.s, frames.speed, frames.yaw_rate)
-        poses = State(*(np.ascontiguousarray(column) for column in columns), self._state.count)
+        x, y, c, s, speed, yaw_rate = (np.ascontiguousarray(column) for column in columns)
+        poses = State(x, y, c, s, speed, yaw_rate, self._state.count)
         before = own.labels.bits[0].copy()
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []
