@@ -33,8 +33,7 @@ from dubins_traffic.engine.batch_kernel import (
 )
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.records import table
-from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
-from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
+from dubins_traffic.policies.rules.tables import ROUND, scratch
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
@@ -210,10 +209,10 @@ class Group:
         world = self._world
         drivers, labels = world.drivers, world.labels
         world.progress.ints[:, LAWFUL] = drivers.active
-        for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
-            own = drivers.ints[b, EGO]
+        for b in np.flatnonzero(drivers.car["kind"][:, EGO] == ROUND).tolist():
+            own = drivers.car[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
-            own[PLACE] = nearest_stage(drivers.distance, int(own[FIRST]), int(own[LAST_STAGE]), lane, segment)
+            own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most

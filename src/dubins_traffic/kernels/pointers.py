@@ -9,29 +9,22 @@ import hashlib
 from typing import Any, cast
 
 import numba  # pyright: ignore[reportMissingTypeStubs]
-from llvmlite import ir
-from numba.core import cgutils, types  # pyright: ignore[reportMissingTypeStubs]
-from numba.core.typing.templates import AttributeTemplate  # pyright: ignore[reportMissingTypeStubs]
-from numba.extending import (  # pyright: ignore[reportMissingTypeStubs]
-    NativeValue,
-    infer_getattr,
-    lower_getattr_generic,
-    models,
-    register_model,
-    typeof_impl,
-    unbox,
-)
+from llvmlite import ir as _ir  # pyright: ignore[reportMissingTypeStubs]
+from numba import extending as _extending  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import cgutils as _cgutils  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import types as _types  # pyright: ignore[reportMissingTypeStubs]
+from numba.core.typing import templates as _templates  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.kernels.tables import Tables
 
 WORD = 8
 """Bytes of what is known of an array: its address, and each of its lengths."""
 
-_library = cast(Any, numba)
-_types = cast(Any, types)
+library, ir, extending = cast(Any, numba), cast(Any, _ir), cast(Any, _extending)
+cgutils, types, templates = cast(Any, _cgutils), cast(Any, _types), cast(Any, _templates)
 
 
-class TablesType(_types.Type):
+class TablesType(types.Type):
     """The type of a `Tables` whose arrays have certain types.
 
     Parameters
@@ -64,30 +57,30 @@ class TablesType(_types.Type):
 
 def type_of(tables: Tables) -> TablesType:
     """Return the type of tables."""
-    fields = zip(tables.FIELDS, tables, strict=True)
-    return TablesType(type(tables).__name__, tuple((name, _library.typeof(value)) for name, value in fields))
+    fields = zip(tables.field_names, tables, strict=True)
+    return TablesType(type(tables).__name__, tuple((name, library.typeof(value)) for name, value in fields))
 
 
-@register_model(TablesType)
-class _Pointer(models.OpaqueModel):  # pyright: ignore[reportUnusedClass, reportUntypedBaseClass]
+@extending.register_model(TablesType)
+class _Pointer(extending.models.OpaqueModel):  # pyright: ignore[reportUnusedClass]
     pass
 
 
-@typeof_impl.register(Tables)
+@extending.typeof_impl.register(Tables)
 def _typeof(value: Tables, _context: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
     return value._numba_type_  # pyright: ignore[reportPrivateUsage]
 
 
-@unbox(TablesType)
+@extending.unbox(TablesType)
 def _unbox(_kind: Any, value: Any, c: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
     address = c.pyapi.object_getattr_string(value, "address")
     number = c.pyapi.number_as_ssize_t(address)
     c.pyapi.decref(address)
-    return NativeValue(c.builder.inttoptr(number, ir.IntType(8).as_pointer()))
+    return extending.NativeValue(c.builder.inttoptr(number, ir.IntType(8).as_pointer()))
 
 
-@infer_getattr
-class _Fields(AttributeTemplate):  # pyright: ignore[reportUnusedClass, reportUntypedBaseClass]
+@extending.infer_getattr
+class _Fields(templates.AttributeTemplate):  # pyright: ignore[reportUnusedClass]
     key = TablesType
 
     def generic_resolve(self, kind: TablesType, name: str) -> Any:
@@ -95,7 +88,7 @@ class _Fields(AttributeTemplate):  # pyright: ignore[reportUnusedClass, reportUn
         return dict(kind.fields).get(name)
 
 
-@lower_getattr_generic(TablesType)
+@extending.lower_getattr_generic(TablesType)
 def _read(context: Any, builder: Any, kind: TablesType, pointer: Any, name: str) -> Any:  # pyright: ignore[reportUnusedFunction]
     field, begin = kind.place(name)
     start = builder.gep(pointer, [ir.IntType(64)(begin)])

@@ -52,8 +52,8 @@ class Rows(Protocol[R_co]):
         """Return the row at a place with a number for each axis, or a field of all rows as an array."""
         ...
 
-    def __setitem__(self, field: str, values: Any) -> None:
-        """Write a field of all rows."""
+    def __setitem__(self, place: str | int | tuple[int, ...], value: Any) -> None:
+        """Write a row, or a field of all rows."""
         ...
 
     def __len__(self) -> int: ...

@@ -31,14 +31,14 @@ class Tables:
     It can't be changed: what kernels know of the arrays is written down once.
     """
 
-    FIELDS: ClassVar[tuple[str, ...]] = ()
+    field_names: ClassVar[tuple[str, ...]] = ()
     """Names of the arrays, in order."""
 
     def __init_subclass__(cls) -> None:
-        cls.FIELDS = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
+        cls.field_names = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
 
     def __init__(self, *values: Any, **named: Any) -> None:
-        fields = self.FIELDS
+        fields = self.field_names
         given = {**dict(zip(fields, values, strict=False)), **named}
         if len(given) != len(values) + len(named) or given.keys() != set(fields):
             raise TypeError(f"{type(self).__name__} is made of {', '.join(fields)}")
@@ -48,7 +48,7 @@ class Tables:
         raise AttributeError(f"{type(self).__name__} can't be changed; see replace")
 
     def __iter__(self) -> Iterator[Any]:
-        return (vars(self)[name] for name in self.FIELDS)
+        return (vars(self)[name] for name in self.field_names)
 
     def __getitem__(self, places: slice) -> tuple[Any, ...]:
         """Return some of the arrays."""
@@ -58,11 +58,11 @@ class Tables:
         return type(self), tuple(self)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {', '.join(self.FIELDS)}>"
+        return f"<{type(self).__name__}: {', '.join(self.field_names)}>"
 
     def replace(self, **changes: Any) -> Self:
         """Return these tables with some of them others."""
-        return type(self)(**{**{name: vars(self)[name] for name in self.FIELDS}, **changes})
+        return type(self)(**{**{name: vars(self)[name] for name in self.field_names}, **changes})
 
     @cached_property
     def description(self) -> Ints:

@@ -13,7 +13,6 @@ from dubins_traffic.policies.rules.tables import Drivers, Scratch, scratch
 from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
-    REASON,
     REASONS,
     Guards,
     Overtakes,
@@ -77,7 +76,7 @@ class ShieldFilter:
         self._scratch: Scratch = scratch(cars, len(problem.network.segments))
         net = np.zeros(1, dtype=np.int64)
         self._drivers: Drivers = egos([problem], cars, net)
-        self._guards: Guards = guards([problem], self._roads, net, overtakes=self._overtakes)
+        self._guards: Guards = guards([problem], self._roads, self._drivers, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
         self._shield()  # compiles, so that nobody waits for that in the first tick
 
@@ -97,7 +96,7 @@ class ShieldFilter:
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
         self._shield()
-        reason = int(self._guards.mark[0, REASON])
+        reason = int(self._guards.ego[0].reason)
         given = Command(*self._command[0, EGO].tolist())
         self.intervention = None
         if reason:

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
 from dubins_traffic.policies.rules.passing import BACK, BERTH, NARROWS, SLIP, TURNING, stop_line
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import (
-    DISC,
-    FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LEFT_TIME,
-    MIDDLE,
-    REACH,
-    ROUNDING,
-    Drivers,
-)
+from dubins_traffic.policies.rules.tables import Drivers, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import on_way, way_between
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -31,39 +19,39 @@ the disc."""
 
 @jit
 def is_barred(
-    roads: RoadTable, net: int, lane: int, obstacles: ObstacleTable, first: int, last: int, build: Any
+    roads: RoadTable, net: int, lane: int, obstacles: ObstacleTable, first: int, last: int, vehicle: Vehicle
 ) -> bool:
     """Tell whether one of the obstacle parts `first` to `last` - 1 is in the way in a lane and can't be passed there.
 
     What `find_way_past` asks of cars that stand or come is left out: these go.
     """
     length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
-    wide = build[HALF_WIDTH] + build[ROUNDING]
+    wide = vehicle.half_width + vehicle.rounding
     done = 0.0
     for _ in range(last - first):
-        begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, build)
+        begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, vehicle)
         if begin >= length:
             return False
         done = end + 1e-6
-        own = begin - build[REACH] - QUEUE_GAP
-        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) != 0.0
-        if within and own >= LATE * build[DISC]:
+        own = begin - vehicle.reach - QUEUE_GAP
+        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, vehicle) != 0.0
+        if within and own >= LATE * vehicle.disc:
             continue
-        if own < build[DISC] + build[REACH] + EDGE:
+        if own < vehicle.disc + vehicle.reach + EDGE:
             return True
-        own = begin - build[REACH] - SLIP
-        back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
+        own = begin - vehicle.reach - SLIP
+        back = end + SLIP + 2.0 * vehicle.half_length + BACK
         offset += BERTH + wide
-        aside = offset > 3.0 * build[MIDDLE] - EDGE
-        if aside or back > length + stop_line(build) or own < build[DISC] + build[REACH] + EDGE:
+        aside = offset > 3.0 * vehicle.middle - EDGE
+        if aside or back > length + stop_line(vehicle) or own < vehicle.disc + vehicle.reach + EDGE:
             return True
-        if (back - own) / (0.8 * build[FASTEST]) + TURNING > build[LEFT_TIME]:
+        if (back - own) / (0.8 * vehicle.fastest) + TURNING > vehicle.left_time:
             return True
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            far = build[REACH] + obstacles.part[p, 7]
-            beside = abs(left + build[MIDDLE] - offset) < wide + BESIDE + obstacles.part[p, 7]
-            if own - far < along < back + far and left + build[MIDDLE] > 0.0 and beside:
+            far = vehicle.reach + obstacles.part[p, 7]
+            beside = abs(left + vehicle.middle - offset) < wide + BESIDE + obstacles.part[p, 7]
+            if own - far < along < back + far and left + vehicle.middle > 0.0 and beside:
                 return True
     return False
 
@@ -77,7 +65,7 @@ def next_narrow(
     obstacles: ObstacleTable,
     first: int,
     last: int,
-    build: Any,
+    vehicle: Vehicle,
 ) -> tuple[float, float, float]:
     """Return (begin, end, left) of the next obstacles in the way in a lane, none of which begins before `done`.
 
@@ -85,11 +73,11 @@ def next_narrow(
     to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
     """
     begin = INFINITE
-    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
+    wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(first, last):
         along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
         size = obstacles.part[p, 7]
-        if abs(left + build[MIDDLE]) < wide + size and along - size >= done:
+        if abs(left + vehicle.middle) < wide + size and along - size >= done:
             begin = min(begin, along - size)
     end = begin
     offset = -1.0
@@ -99,12 +87,12 @@ def next_narrow(
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
             size = obstacles.part[p, 7]
-            in_way = abs(left + build[MIDDLE]) < wide + size and begin <= along - size <= end + NARROWS
+            in_way = abs(left + vehicle.middle) < wide + size and begin <= along - size <= end + NARROWS
             if in_way and along + size > end:
                 end = along + size
                 found = True
             if in_way:
-                offset = max(offset, left + build[MIDDLE] + size)
+                offset = max(offset, left + vehicle.middle + size)
     return begin, end, offset
 
 
@@ -137,15 +125,15 @@ def is_shut(
     b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
 ) -> bool:
     """Tell whether an obstacle is in the way from a lane to the lane `out`, or can't be passed in that."""
-    net, build = drivers.net[b], drivers.build[b]
-    if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], vehicle):
         return True
-    way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
-    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
+    way = way_between(roads, net, lane, out, vehicle.middle, vehicle.disc)
+    wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         dx, dy = row[0] - way.x, row[1] - way.y
-        far = build[DISC] + row[7]
+        far = vehicle.disc + row[7]
         _, _, left, _, _ = on_way(way, row[0], row[1])
         if dx * dx + dy * dy < far * far and abs(left) < wide + row[7]:
             return True

@@ -7,7 +7,7 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
 from dubins_traffic.policies.rules.room import has_room, room_in
-from dubins_traffic.policies.rules.tables import CROSSING, LANE, NEXT, WAITED, Drivers, Scratch
+from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.policies.rules.turn_arcs import BEFORE
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -28,15 +28,15 @@ def take_another(
     in which an obstacle can't be passed, unless all are such.
     """
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    v = lane_end(roads, net, ints[LANE])
+    car = drivers.car[b, n]
+    v = lane_end(roads, net, car.lane)
     row = roads.vert_off[net] + v
     price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
     wanted = 0.0
     least = INFINITE
     for k in range(roads.degree[row]):
         least = min(least, scratch.cost[k])
-        if roads.arms[row, k] == ints[NEXT]:
+        if roads.arms[row, k] == car.next_lane:
             wanted = scratch.cost[k]
     allowed = 0
     for k in range(roads.degree[row]):
@@ -44,13 +44,13 @@ def take_another(
         cheap = scratch.cost[k] - wanted < budget and (scratch.cost[k] < BARRED or least >= BARRED)
         if (
             cheap
-            and out != ints[NEXT]
+            and out != car.next_lane
             and has_room(b, n, out, 0, state, labels, roads, obstacles, drivers, scratch)
         ):
             allowed |= 1 << k
     best = cheapest(v, roads.vert_off[net], allowed, roads, scratch)
     if best >= 0:
-        ints[NEXT] = best
+        car.next_lane = best
     return best >= 0
 
 
@@ -61,8 +61,8 @@ def take_widest(
 ) -> None:  # fmt: skip
     """Choose the exit in which there is most room, though it is not enough; `scratch.cost` has what they count."""
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    row = roads.vert_off[net] + lane_end(roads, net, ints[LANE])
+    car = drivers.car[b, n]
+    row = roads.vert_off[net] + lane_end(roads, net, car.lane)
     most = -INFINITE
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
@@ -70,7 +70,7 @@ def take_widest(
         room -= INFINITE * 0.5 if scratch.cost[k] >= BARRED else 0.0
         if room > most:
             most = room
-            ints[NEXT] = out
+            car.next_lane = out
 
 
 @jit
@@ -80,7 +80,7 @@ def turn_elsewhere(
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
     if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, scratch):
-        drivers.ints[b, n, WAITED] = 0
+        drivers.car[b, n].waited = 0
 
 
 @jit
@@ -89,13 +89,13 @@ def find_way_out(
     drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
-    ints = drivers.ints[b, n]
-    build = drivers.build[b]
-    crossing = drivers.way[b, n, CROSSING] != 0.0
-    if not crossing and (part == BEFORE or ints[WAITED] <= ticks_of(STUCK, build)):
+    car = drivers.car[b, n]
+    vehicle = drivers.vehicle[b]
+    crossing = drivers.way[b, n].crossing != 0
+    if not crossing and (part == BEFORE or car.waited <= ticks_of(STUCK, vehicle)):
         return
     if crossing and tick % 4 != 0:
         return
-    if crossing and has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
+    if crossing and has_room(b, n, car.next_lane, 0, state, labels, roads, obstacles, drivers, scratch):
         return
     turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, scratch)

@@ -14,9 +14,7 @@ from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, slowed, steer
 from dubins_traffic.policies.rules.tables import (
-    ASIDE,
     DUE,
-    KIND,
     LATE,
     LATE_BEND,
     LATE_C,
@@ -26,10 +24,7 @@ from dubins_traffic.policies.rules.tables import (
     LATE_X,
     LATE_Y,
     LATE_YAW,
-    PERIOD,
     ROUND,
-    TIGHTEST,
-    YAW_MOST,
     Drivers,
     Scratch,
 )
@@ -69,13 +64,13 @@ def defer(
     """Leave the command of a car with nothing close around it, that just drives on, to `decide_deferred`, if it is
     one.
     """
-    build = drivers.build[b]
-    free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.ints[b, n, KIND] != ROUND
-    bound = drivers.floats[b, n, ASIDE] != 0.0 or build[TIGHTEST] > 0.0
+    vehicle = drivers.vehicle[b]
+    free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.car[b, n].kind != ROUND
+    bound = drivers.car[b, n].aside != 0.0 or vehicle.tightest > 0.0
     astray = labels.lane[b, n] < 0 and left > ASTRAY
     if not free or bound or astray or np.int64(labels.bits[b, n]) & LEFT != 0:
         return False
-    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, scratch)
+    note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, state, scratch)
     return True
 
 
@@ -86,8 +81,8 @@ def decide_deferred(b: int, state: State, drivers: Drivers, scratch: Scratch, co
     The columns of a block are a fixed number of cars apart, and nothing in the loop over its cars is a branch: so the
     compiler sees that several may be taken at once.
     """
-    build = drivers.build[b]
-    limit, period = build[YAW_MOST], build[PERIOD]
+    vehicle = drivers.vehicle[b]
+    limit, period = vehicle.yaw_most, vehicle.period
     late = scratch.late
     for first in range(0, state.count[b], BLOCK):
         here = min(state.count[b] - first, BLOCK)

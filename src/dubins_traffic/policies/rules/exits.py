@@ -10,34 +10,17 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
 from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    BLOCKS,
-    FIRST,
-    GOAL,
-    HOLD,
-    KEPT_OUT,
-    KIND,
-    LANE,
-    LAST,
     LEFT_SIDE,
-    LEFTS,
     LOOP,
     NEMESIS,
-    NEXT,
-    PARK_TIME,
-    PARKS,
-    PERIOD,
-    PLACE,
     PLACES,
     ROLLING,
-    ROLLS,
     ROUND,
-    TAILGATES,
     TAILGATING,
-    TURN,
-    VIOLATIONS,
+    Driver,
     Drivers,
     Scratch,
+    Vehicle,
 )
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -63,49 +46,44 @@ def take_lane(
     obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    car = drivers.car[b, n]
     seed = drivers.seed[b]
     trial = drivers.trial[b]
-    before = ints[LANE]
-    ints[LANE] = lane
-    ints[TURN] = 0
-    ints[KEPT_OUT] = 0
-    floats[ASIDE] = 0.0
-    if ints[KIND] == LOOP:
-        following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
-        if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
-            following = place_of(lane, ints[FIRST], ints[LAST], drivers.stage)
-        ints[PLACE] = following
+    before = car.lane
+    car.lane = lane
+    car.turn = 0
+    car.kept_out = 0
+    car.aside = 0.0
+    if car.kind == LOOP:
+        following = car.place + 1 if car.place + 1 < car.last else car.first
+        if car.place < 0 or before < 0 or drivers.stage[following] != lane:
+            following = place_of(lane, car.first, car.last, drivers.stage)
+        car.place = following
     v = lane_end(roads, drivers.net[b], lane)
     violations = 0
-    floats[HOLD] = 0.0
-    if floats[ROLLS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < floats[ROLLS]:
+    car.hold = 0.0
+    if car.rolls > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < car.rolls:
         violations |= ROLLING
-    if floats[LEFTS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < floats[LEFTS]:
+    if car.lefts > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < car.lefts:
         violations |= LEFT_SIDE
-    if floats[TAILGATES] > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < floats[TAILGATES]:
+    if car.tailgates > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < car.tailgates:
         violations |= TAILGATING
-    if floats[BLOCKS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < floats[BLOCKS]:
-        floats[HOLD] = BLOCK_TIME
-    if (
-        floats[PARKS] > 0.0
-        and is_goal(v, ints, drivers)
-        and uniform(seed, trial, n, tick, DRAW + 8) < floats[PARKS]
-    ):
-        floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
-    ints[VIOLATIONS] = violations
+    if car.blocks > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < car.blocks:
+        car.hold = BLOCK_TIME
+    if car.parks > 0.0 and is_goal(v, car, drivers) and uniform(seed, trial, n, tick, DRAW + 8) < car.parks:
+        car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW + 9)
+    car.violations = violations
     price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
-    ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
+    car.next_lane = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
 
 
 @jit_inline
-def is_goal(v: int, ints: Any, drivers: Drivers) -> bool:
+def is_goal(v: int, car: Driver, drivers: Drivers) -> bool:
     """Tell whether v is among the goals that the car knows."""
-    if ints[KIND] == LOOP:
+    if car.kind == LOOP:
         return False
     found = False
-    for k in range(ints[FIRST], ints[LAST]):
+    for k in range(car.first, car.last):
         found = found or drivers.stage[k] == v
     return found
 
@@ -127,23 +105,23 @@ def price_exits(
 ) -> None:  # fmt: skip
     """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    lane = ints[LANE]
+    car = drivers.car[b, n]
+    lane = car.lane
     v = lane_end(roads, net, lane)
     row = roads.vert_off[net] + v
-    kind = ints[KIND]
-    on_loop = kind == LOOP and ints[PLACE] >= 0
+    kind = car.kind
+    on_loop = kind == LOOP and car.place >= 0
     follow = -1
     if on_loop:
-        follow = drivers.stage[ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]]
+        follow = drivers.stage[car.place + 1 if car.place + 1 < car.last else car.first]
     known = aim(b, n, tick, v, state, labels, roads, drivers, scratch)
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
         cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
-        if kind == ROUND and ints[PLACE] >= 0:
-            place = ints[PLACE]
+        if kind == ROUND and car.place >= 0:
+            place = car.place
             if drivers.stage[place] == v:
-                place = place + 1 if place + 1 < ints[LAST] else ints[FIRST]
+                place = place + 1 if place + 1 < car.last else car.first
             cost = min(drivers.distance[place, out], UNREACHABLE)
         elif on_loop and out == follow:
             cost = -1.0
@@ -167,24 +145,24 @@ def aim(
 ) -> bool:  # fmt: skip
     """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    kind = ints[KIND]
-    if kind == PLACES and (ints[GOAL] < 0 or ints[GOAL] == v):
+    car = drivers.car[b, n]
+    kind = car.kind
+    if kind == PLACES and (car.goal < 0 or car.goal == v):
         count = roads.vert_off[net + 1] - roads.vert_off[net]
-        ints[GOAL] = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
+        car.goal = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
     elif kind == NEMESIS:
-        ints[GOAL] = foreseen(b, state, labels, roads, drivers, ints)
-    seeks_loop = kind == LOOP and ints[PLACE] < 0 and ints[LAST] > ints[FIRST]
-    if not seeks_loop and (kind not in (PLACES, NEMESIS) or ints[GOAL] < 0):
+        car.goal = foreseen(b, state, labels, roads, drivers, car)
+    seeks_loop = kind == LOOP and car.place < 0 and car.last > car.first
+    if not seeks_loop and (kind not in (PLACES, NEMESIS) or car.goal < 0):
         return False
     if seeks_loop:
         forget(net, roads, scratch)
         found = 0
-        for k in range(ints[FIRST], ints[LAST]):
+        for k in range(car.first, car.last):
             found = aim_for(drivers.stage[k], scratch.hops, scratch.queue, found)
         spread(roads, net, scratch.hops, scratch.queue, found)
         return True
-    seek(net, ints[GOAL], roads, scratch)
+    seek(net, car.goal, roads, scratch)
     if kind == NEMESIS:
         seek_ego(b, net, labels, roads, scratch)
     return True
@@ -238,14 +216,14 @@ def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratc
 
 
 @jit
-def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, ints: Any) -> int:
+def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, car: Driver) -> int:
     """Return the goal to which the ego is nearest, but for the one it is at; -1 without goals."""
     net = drivers.net[b]
     best = -1
     least = 1e300
-    for k in range(ints[FIRST], ints[LAST]):
+    for k in range(car.first, car.last):
         goal = drivers.stage[k]
-        if goal == labels.at[b, 0] or (goal == ints[PLACE] and ints[LAST] - ints[FIRST] > 1):
+        if goal == labels.at[b, 0] or (goal == car.place and car.last - car.first > 1):
             continue
         dx = roads.vert[roads.vert_off[net] + goal, 0] - state.x[b, 0]
         dy = roads.vert[roads.vert_off[net] + goal, 1] - state.y[b, 0]
@@ -258,21 +236,21 @@ def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Dr
 @jit_inline
 def watch_ego(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
     """A nemesis remembers in PLACE the goal at which the ego has been last."""
-    ints = drivers.ints[b, n]
+    car = drivers.car[b, n]
     at = labels.at[b, 0]
-    if at >= 0 and is_goal(at, ints, drivers):
-        ints[PLACE] = at
+    if at >= 0 and is_goal(at, car, drivers):
+        car.place = at
 
 
 @jit_inline
 def count_visit(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
     """A car on its round takes the next goal once it is at this one."""
-    ints = drivers.ints[b, n]
-    if ints[PLACE] >= 0 and labels.at[b, n] == drivers.stage[ints[PLACE]]:
-        ints[PLACE] = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
+    car = drivers.car[b, n]
+    if car.place >= 0 and labels.at[b, n] == drivers.stage[car.place]:
+        car.place = car.place + 1 if car.place + 1 < car.last else car.first
 
 
 @jit_inline
-def ticks_of(seconds: float, build: Any) -> int:
+def ticks_of(seconds: float, vehicle: Vehicle) -> int:
     """Return a duration in whole ticks, rounded down."""
-    return int(seconds / build[PERIOD] + 1e-9)
+    return int(seconds / vehicle.period + 1e-9)

@@ -40,29 +40,16 @@ from dubins_traffic.policies.rules.steering import move
 from dubins_traffic.policies.rules.tables import (
     ABSENT,
     ALONE,
-    ASIDE,
-    CROSSING,
     CROWDED,
-    DEPARTS,
-    DISC,
-    HOLD,
-    KIND,
-    LANE,
     LEFT_SIDE,
-    MIDDLE,
     NEMESIS,
-    NEXT,
-    PERIOD,
-    REACH,
     ROUND,
     TAILGATING,
-    TURN,
     UNSURE,
-    UNTIL,
-    VIOLATIONS,
-    WAITED,
+    Driver,
     Drivers,
     Scratch,
+    Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.safety import VERGE, leaves_road
@@ -105,7 +92,7 @@ def decide_trial(
     given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
     """
     scratch.listed[0] = NOBODY
-    enough = loss + alone(drivers.build[b])
+    enough = loss + alone(drivers.vehicle[b])
     others = UNSURE if state.count[b] <= FEW else CROWDED
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
@@ -114,7 +101,7 @@ def decide_trial(
         company = others if apart[n] > 0.0 else CROWDED
         if apart[n] > enough:
             company = ALONE
-        kind = drivers.ints[b, n, KIND]
+        kind = drivers.car[b, n].kind
         if kind == ROUND:
             count_visit(b, n, labels, drivers)
         if kind == ABSENT:
@@ -132,7 +119,7 @@ def decide_trial(
 @jit_inline
 def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
     """Tell whether a car still stands where it has started: it may, unless it would keep others from a crossing."""
-    if tick * drivers.build[b, PERIOD] >= drivers.floats[b, n, DEPARTS]:
+    if tick * drivers.vehicle[b].period >= drivers.car[b, n].departs:
         return False
     bits = np.int64(labels.bits[b, n])
     return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
@@ -180,36 +167,35 @@ def drive(
     obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
 ) -> None:  # fmt: skip
     """Write the command of a car; `company` says what is known of the cars around it."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     x, y = state.x[b, n], state.y[b, n]
     stop_coasting(drivers.way[b, n])
-    if ints[KIND] == NEMESIS:
+    if car.kind == NEMESIS:
         watch_ego(b, n, labels, drivers)
     way = keep_place(
         b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, obstacles, drivers, scratch
     )
     part, key, left, px, py = on_way(way, x, y)
-    outside = labels.lane[b, n] == ints[LANE]
+    outside = labels.lane[b, n] == car.lane
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    leaves = ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE])
-    chooses = leaves and drivers.way[b, n, CROSSING] != 0.0
-    free = company != CROWDED and not chooses and just_drives(ints, floats)
+    leaves = car.kind != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
+    chooses = leaves and drivers.way[b, n].crossing != 0
+    free = company != CROWDED and not chooses and just_drives(car)
     if free and company != ALONE:
-        free = meets_nobody(b, n, part, key, left, x, y, way, state, build)
+        free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
     if free and drive_on(b, n, part, left, px, py, outside, way, state, labels, roads, drivers, scratch):
         return
     enlist(b, n, sight2, state, labels, scratch)
     near = 0
-    if not (free and drivers.way[b, n, CROSSING] != 0.0):
-        near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, scratch)
+    if not (free and drivers.way[b, n].crossing != 0):
+        near = gather(b, n, car.lane, x, y, way, labels, roads, drivers, scratch)
     gap, who, close = look_ahead(
-        b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, scratch
+        b, part, key, left, x, y, way, near, state, labels, obstacles, vehicle, car, scratch
     )
-    rides = ints[VIOLATIONS] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
-    speed = cruise(rides or floats[ASIDE] != 0.0, labels.crosses[b, n] >= 0, build, floats)
+    rides = car.violations & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == car.lane
+    speed = cruise(rides or car.aside != 0.0, labels.crosses[b, n] >= 0, vehicle, car)
     speed = yield_at_line(
         b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, obstacles, drivers, scratch
     )
@@ -244,16 +230,16 @@ def drive(
         b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,
         labels, obstacles, drivers, scratch,
     )  # fmt: skip
-    if speed != 0.0 and ints[KIND] == ROUND and strays(b, n, speed, yaw_rate, way, state, roads, drivers):
+    if speed != 0.0 and car.kind == ROUND and strays(b, n, speed, yaw_rate, way, state, roads, drivers):
         speed = 0.0
     commands[b, n, 0] = speed
     commands[b, n, 1] = yaw_rate
 
 
 @jit_inline
-def just_drives(ints: Any, floats: Any) -> bool:
+def just_drives(car: Driver) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
-    return ints[KIND] != NEMESIS and ints[VIOLATIONS] & TAILGATING == 0 and floats[ASIDE] == 0.0
+    return car.kind != NEMESIS and car.violations & TAILGATING == 0 and car.aside == 0.0
 
 
 @jit_inline
@@ -262,15 +248,15 @@ def follow(
     state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (speed, gap to keep) of a car that has `who` ahead."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
+    kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, car, part, vehicle.reach)
     if kept > QUEUE_GAP and not rides and who != -1:
-        turn = part == BEFORE and ints[TURN] > 0
+        turn = part == BEFORE and car.turn > 0
         if turn or is_pressed(b, n, state, labels, roads, drivers, scratch):
             kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
-    return min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead), kept
+    return min(speed, max(0.0, gap - kept) / vehicle.period + ahead), kept
 
 
 @jit_inline
@@ -279,17 +265,12 @@ def dawdle(
     scratch: Scratch,
 ) -> float:  # fmt: skip
     """Return the speed of a car that may hold up the ego, or stand in a disc, on purpose."""
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
-    passes = floats[ASIDE] != 0.0
-    if (
-        ints[KIND] == NEMESIS
-        and not passes
-        and before_ego(b, n, near, state, labels, roads, drivers, scratch)
-    ):
+    car = drivers.car[b, n]
+    passes = car.aside != 0.0
+    if car.kind == NEMESIS and not passes and before_ego(b, n, near, state, labels, roads, drivers, scratch):
         speed = min(speed, DAWDLE)
-    if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
-        floats[HOLD] -= drivers.build[b, PERIOD]
+    if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):
+        car.hold -= drivers.vehicle[b].period
         speed = 0.0
     return speed
 
@@ -311,7 +292,7 @@ def strays(
         return False
     net = drivers.net[b]
     edge = float(roads.half_width[net]) - VERGE
-    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.build[b, PERIOD], edge, roads, net)
+    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.vehicle[b].period, edge, roads, net)
 
 
 @jit_inline
@@ -321,37 +302,34 @@ def pass_what_stands(
     scratch: Scratch,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (speed, offset to the left of the way): of a car that drives on the left, or passes, or waits to."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     bits = np.int64(labels.bits[b, n])
-    if outside and (bits & BLOCKED != 0 or floats[ASIDE] != 0.0):
-        watch(b, n, who, state, ints, floats, ints[LANE], scratch)
-    offset = 2.0 * build[MIDDLE] if ints[VIOLATIONS] & LEFT_SIDE != 0 and outside else 0.0
+    if outside and (bits & BLOCKED != 0 or car.aside != 0.0):
+        watch(b, n, who, state, car, car.lane, scratch)
+    offset = 2.0 * vehicle.middle if car.violations & LEFT_SIDE != 0 and outside else 0.0
     stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
-    ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
-    if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
-        ints[VIOLATIONS] &= ~LEFT_SIDE
-    idle = floats[ASIDE] == 0.0 or (
-        within_lane(floats[ASIDE], build) and ints[WAITED] > ticks_of(STUCK, build)
-    )
+    car.waited = car.waited + 1 if stubborn and gap < kept + 0.05 else 0
+    if offset != 0.0 and car.waited > ticks_of(STUCK, vehicle):
+        car.violations &= ~LEFT_SIDE
+    idle = car.aside == 0.0 or (within_lane(car.aside, vehicle) and car.waited > ticks_of(STUCK, vehicle))
     if who < -1 and part == BEFORE and idle and offset == 0.0:
         keep_off(b, n, -2 - who, way, state, labels, obstacles, drivers, scratch)
     if not outside:
-        there = part == BEFORE and within_lane(floats[ASIDE], build)
-        floats[ASIDE] = offset = floats[ASIDE] if there else 0.0
-    elif floats[ASIDE] != 0.0:
+        there = part == BEFORE and within_lane(car.aside, vehicle)
+        car.aside = offset = car.aside if there else 0.0
+    elif car.aside != 0.0:
         speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, scratch)
-        offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0
-    elif (bits & BLOCKED != 0 or who < -1) and waited_long(ints, bits, build):
+        offset = car.aside if way_to_go(way, state.x[b, n], state.y[b, n]) < car.until else 0.0
+    elif (bits & BLOCKED != 0 or who < -1) and waited_long(car, bits, vehicle):
         find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, scratch)
     return speed, offset
 
 
 @jit_inline
-def waited_long(ints: Any, bits: Any, build: Any) -> bool:
+def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether it is time to look for a way past: not in every tick, and sooner for who is left already."""
-    return (ints[WAITED] >= ticks_of(PASSING_WAIT, build) or bits & LEFT != 0) and ints[WAITED] % 4 == 0
+    return (car.waited >= ticks_of(PASSING_WAIT, vehicle) or bits & LEFT != 0) and car.waited % 4 == 0
 
 
 @jit_inline
@@ -361,19 +339,19 @@ def keep_place(
 ) -> ReferencePath:  # fmt: skip
     """Keep LANE and NEXT in step with where the car is; return its way."""
     net = drivers.net[b]
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     seen = labels.lane[b, n]
-    if ints[LANE] < 0:
+    if car.lane < 0:
         lane = seen if seen >= 0 else lane_at(roads, net, x, y, c, s)
         take_lane(b, n, tick, lane, state, labels, roads, obstacles, drivers, scratch)
-    elif seen >= 0 and seen != ints[LANE]:
+    elif seen >= 0 and seen != car.lane:
         take_lane(b, n, tick, seen, state, labels, roads, obstacles, drivers, scratch)
     way = way_of(b, n, roads, drivers)
-    if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * build[DISC]:
+    if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * vehicle.disc:
         part, _, _, _, _ = on_way(way, x, y)
         if part == AFTER:
-            take_lane(b, n, tick, ints[NEXT], state, labels, roads, obstacles, drivers, scratch)
+            take_lane(b, n, tick, car.next_lane, state, labels, roads, obstacles, drivers, scratch)
             way = way_of(b, n, roads, drivers)
     return way
 

@@ -15,30 +15,16 @@ from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
 from dubins_traffic.policies.rules.tables import (
-    APPROACHES,
-    CROSSING,
-    DISC,
-    FORFEIT,
-    HALF_WIDTH,
-    KEPT_OUT,
-    KIND,
-    LANE,
     LEFT_SIDE,
-    MIDDLE,
     NEMESIS,
-    NEXT,
-    OWED,
-    PERIOD,
-    REACH,
-    REST_TIME,
     ROLLING,
     ROUND,
-    ROUNDING,
     TAILGATING,
-    TURN,
-    VIOLATIONS,
+    Driver,
     Drivers,
+    KeptPath,
     Scratch,
+    Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import INFINITE, lane_end
@@ -72,29 +58,29 @@ def yield_at_line(
 ) -> float:  # fmt: skip
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
     net = drivers.net[b]
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     if not faces_gate(b, n, part, labels, roads, drivers):
         return speed
     bits = np.int64(labels.bits[b, n])
-    its_turn = count_turn(bits, drivers.way[b, n], ints)
-    line = to_line(left, x, y, way, build)
-    minds = n != EGO and ints[VIOLATIONS] & TAILGATING == 0
+    its_turn = count_turn(bits, drivers.way[b, n], car)
+    line = to_line(left, x, y, way, vehicle)
+    minds = n != EGO and car.violations & TAILGATING == 0
     behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
-    if behind and drivers.way[b, n, CROSSING] != 0.0:
-        line -= build[APPROACHES]
+    if behind and drivers.way[b, n].crossing != 0:
+        line -= vehicle.approaches
         its_turn = False
-    if line >= speed * build[PERIOD]:
+    if line >= speed * vehicle.period:
         return speed
-    v = lane_end(roads, net, ints[LANE])
-    if drivers.way[b, n, CROSSING] != 0.0:
+    v = lane_end(roads, net, car.lane)
+    if drivers.way[b, n].crossing != 0:
         free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
-        free = free or ints[VIOLATIONS] & ROLLING != 0
+        free = free or car.violations & ROLLING != 0
     else:
         free = may_enter_bend(b, n, v, way, near, state, labels, roads, obstacles, drivers, scratch)
-    if bits & LEFT != 0 and ints[VIOLATIONS] & LEFT_SIDE == 0:
+    if bits & LEFT != 0 and car.violations & LEFT_SIDE == 0:
         free = False
-    return speed if free else max(0.0, line) / build[PERIOD]
+    return speed if free else max(0.0, line) / vehicle.period
 
 
 @jit
@@ -106,62 +92,60 @@ def may_enter_bend(
 
     An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone.
     """
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
-    turns = turns_round(ints)
+    turns = turns_round(car)
     inside = 0
     held = False
     for k in range(near):
         j = scratch.near[k]
         if labels.crosses[b, j] == v:
-            inside += 1 if turns else shares_way(b, j, way, degree, state, build)
-            held = held or (n != EGO and (j == EGO or turns_round(drivers.ints[b, j])))
+            inside += 1 if turns else shares_way(b, j, way, degree, state, vehicle)
+            held = held or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
         elif turns and degree > 1:
             held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
-        free = has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, scratch)
-        long = ints[KIND] != ROUND and ints[KEPT_OUT] * build[PERIOD] > PATIENT * build[REST_TIME]
+        free = has_room(b, n, car.next_lane, inside, state, labels, roads, obstacles, drivers, scratch)
+        long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
         if long and inside == 0:
-            free = free or is_free(b, n, ints[NEXT], state, roads, drivers, scratch)
-    ints[KEPT_OUT] = 0 if free else ints[KEPT_OUT] + 1
+            free = free or is_free(b, n, car.next_lane, state, roads, drivers, scratch)
+    car.kept_out = 0 if free else car.kept_out + 1
     return free
 
 
 @jit_inline
 def faces_gate(b: int, n: int, part: int, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
     """Tell whether a car is before the disc at the end of its lane."""
-    return part == BEFORE and labels.crosses[b, n] != lane_end(
-        roads, drivers.net[b], drivers.ints[b, n, LANE]
-    )
+    return part == BEFORE and labels.crosses[b, n] != lane_end(roads, drivers.net[b], drivers.car[b, n].lane)
 
 
 @jit_inline
-def count_turn(bits: Any, way: Any, ints: Any) -> bool:
+def count_turn(bits: Any, way: KeptPath, car: Driver) -> bool:
     """Tell whether it is the turn of a car before a disc, and count for how long; `way` is its row of `Drivers.way`."""
-    its_turn = way[CROSSING] != 0.0 and bits & GOES_NOW == GOES_NOW
-    ints[TURN] = ints[TURN] + 1 if its_turn else 0
-    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
+    its_turn = way.crossing != 0 and bits & GOES_NOW == GOES_NOW
+    car.turn = car.turn + 1 if its_turn else 0
+    car.owed = 0 if bits & STOPPED == 0 else car.owed + (1 if its_turn else 0)
     return its_turn
 
 
 @jit_inline
-def to_line(left: float, x: float, y: float, way: ReferencePath, build: Any) -> float:
+def to_line(left: float, x: float, y: float, way: ReferencePath, vehicle: Vehicle) -> float:
     """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
-    edge = build[DISC] + build[REACH] + MARGIN
-    aside = left - build[MIDDLE]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    aside = left - vehicle.middle
     return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
 
 
 @jit_inline
-def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, build: Any) -> int:
+def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, vehicle: Vehicle) -> int:
     """Return 1 if a car in the disc is on this way, or in a disc that is no bend."""
     if degree != 2:
         return 1
     _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
-    return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+    return 1 if abs(left) < 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE else 0
 
 
 @jit_inline
@@ -173,15 +157,15 @@ def is_behind_ego(
     Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
     again, and then bars the way of who would be first.
     """
-    if labels.lane[b, EGO] != drivers.ints[b, n, LANE]:
+    if labels.lane[b, EGO] != drivers.car[b, n].lane:
         return False
     return way_to_go(way, state.x[b, EGO], state.y[b, EGO]) > way_to_go(way, x, y)
 
 
 @jit_inline
-def turns_round(ints: Any) -> bool:
+def turns_round(car: Driver) -> bool:
     """Tell whether a car that the law drives is about to turn round at the end of its lane, or does it."""
-    return ints[NEXT] >= 0 and ints[NEXT] == ints[LANE] ^ 1
+    return car.next_lane >= 0 and car.next_lane == car.lane ^ 1
 
 
 @jit_inline
@@ -190,13 +174,13 @@ def comes_first(
 ) -> bool:
     """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
     lane, net = labels.lane[b, j], drivers.net[b]
-    if lane < 0 or lane == drivers.ints[b, n, LANE] or lane_end(roads, net, int(lane)) != v:
+    if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
         return False
     row = roads.vert_off[net] + v
     dx = state.x[b, j] - roads.vert[row, 0]
     dy = state.y[b, j] - roads.vert[row, 1]
-    near = drivers.build[b, DISC] + drivers.build[b, REACH] + SOON
-    first = n == EGO or j < n or not turns_round(drivers.ints[b, j])
+    near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON
+    first = n == EGO or j < n or not turns_round(drivers.car[b, j])
     return dx * dx + dy * dy < near * near and first
 
 
@@ -206,25 +190,25 @@ def may_go(
     drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
-    ints = drivers.ints[b, n]
-    build = drivers.build[b]
+    car = drivers.car[b, n]
+    vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    due = ints[KIND] != ROUND and is_due(ints[TURN], bits, build)
+    due = car.kind != ROUND and is_due(car.turn, bits, vehicle)
     if (
-        ints[KIND] == NEMESIS
+        car.kind == NEMESIS
         and bits & FORFEITED == 0
-        and ints[TURN] < ticks_of(LINGER * build[FORFEIT], build)
+        and car.turn < ticks_of(LINGER * vehicle.forfeit, vehicle)
     ):
         dx = state.x[b, 0] - state.x[b, n]
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
-    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
+    if has_room(b, n, car.next_lane, 0, state, labels, roads, obstacles, drivers, scratch):
         return True
-    waited = ints[OWED] - ticks_of(CHOOSY, build)
+    waited = car.owed - ticks_of(CHOOSY, vehicle)
     if not due and (waited < 0 or waited % 8 != 0):
         return False
-    budget = BUDGET * ints[OWED] * build[PERIOD] if ints[KIND] == ROUND else INFINITE
+    budget = BUDGET * car.owed * vehicle.period if car.kind == ROUND else INFINITE
     if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
         return True
     if due:
@@ -233,10 +217,10 @@ def may_go(
 
 
 @jit_inline
-def is_due(turn: int, bits: Any, build: Any) -> bool:
+def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether an e-agent whose turn it is has to enter now, or it loses its place a second time."""
     if bits & FORFEITED == 0:
         return False
-    forfeit = ticks_of(build[FORFEIT], build)
+    forfeit = ticks_of(vehicle.forfeit, vehicle)
     since = turn - forfeit if turn >= forfeit else turn
-    return since > ticks_of(DUTY * build[FORFEIT], build)
+    return since > ticks_of(DUTY * vehicle.forfeit, vehicle)

@@ -9,19 +9,7 @@ from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import (
-    BACKS_UP,
-    DEGREE,
-    DISC,
-    EXIT_GAP,
-    HALF_WIDTH,
-    LANE,
-    MIDDLE,
-    REACH,
-    ROUNDING,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT, STANDS
@@ -62,12 +50,12 @@ def room_in(
     well. `inside` cars are still in the disc and will be before this one.
     """
     net = drivers.net[b]
-    build = drivers.build[b]
-    edge = build[DISC] + build[REACH] + MARGIN
-    mouth = sqrt(max(edge * edge - build[MIDDLE] * build[MIDDLE], 0.0))
-    pitch = 2.0 * build[REACH] + QUEUE_GAP
+    vehicle = drivers.vehicle[b]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
+    pitch = 2.0 * vehicle.reach + QUEUE_GAP
     start = lane_start(roads, net, out)
-    crossing = roads.degree[roads.vert_off[net] + start] >= build[DEGREE]
+    crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
     last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
     last = min(last, before_obstacles(b, out, roads, obstacles, drivers))
@@ -77,7 +65,7 @@ def room_in(
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
             oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
-            there = aside < build[HALF_WIDTH] + build[ROUNDING] + OVER and along > build[DISC]
+            there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
             if j != n and there and not oncoming and labels.crosses[b, j] != start:
                 if look == 1:
                     last -= pitch if along < wall else 0.0
@@ -88,7 +76,7 @@ def room_in(
                 if slow and along < mouth + pitch:
                     return -1.0
                 if labels.bits[b, j] & STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
-                    back = build[BACKS_UP] if j == EGO and n != EGO and crossing else 0.0
+                    back = vehicle.backs_up if j == EGO and n != EGO and crossing else 0.0
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
             j = scratch.link[j]
@@ -100,13 +88,13 @@ def is_free(
     b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, scratch: Scratch
 ) -> bool:
     """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
-    build = drivers.build[b]
+    vehicle = drivers.vehicle[b]
     j = scratch.head[out >> 1]
     while j >= 0:
         along, aside = lane_coordinates(
             roads, drivers.net[b], out, float(state.x[b, j]), float(state.y[b, j])
         )
-        if j != n and aside <= 0.0 and along <= build[DISC] + build[EXIT_GAP]:
+        if j != n and aside <= 0.0 and along <= vehicle.disc + vehicle.exit_gap:
             return False
         j = scratch.link[j]
     return True
@@ -117,18 +105,18 @@ def before_obstacles(
     b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
 ) -> float:
     """Return how far along a lane a car can drive before an obstacle that can't be passed in the lane, metres."""
-    build = drivers.build[b]
+    vehicle = drivers.vehicle[b]
     free = INFINITE
     net, first, last = drivers.net[b], obstacles.off[b], obstacles.off[b + 1]
     for p in range(first, last):
         row = obstacles.part[p]
         along, aside = lane_coordinates(roads, net, lane, row[0], row[1])
-        wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
-        if not (abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]):
+        wide = vehicle.half_width + vehicle.rounding + SIDE + row[7]
+        if not (abs(aside + vehicle.middle) < wide and along + row[7] > vehicle.disc):
             continue
         begin, end = along - row[7], along + row[7]
-        if offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) == 0.0:
-            free = min(free, begin - build[REACH] - QUEUE_GAP)
+        if offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, vehicle) == 0.0:
+            free = min(free, begin - vehicle.reach - QUEUE_GAP)
     return free
 
 
@@ -140,17 +128,17 @@ def is_pressed(
 
     It, or the cars between, are close behind one another already.
     """
-    net, build, lane = drivers.net[b], drivers.build[b], drivers.ints[b, n, LANE]
+    net, vehicle, lane = drivers.net[b], drivers.vehicle[b], drivers.car[b, n].lane
     v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:
         return False
     own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
-    far = 2.0 * build[REACH] + PRESSED
+    far = 2.0 * vehicle.reach + PRESSED
     j = scratch.head[lane >> 1]
     while j >= 0:
         along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
         if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
-            far += 2.0 * build[REACH] + QUEUE_GAP
+            far += 2.0 * vehicle.reach + QUEUE_GAP
         j = scratch.link[j]
     row = roads.vert_off[net] + v
     for k in range(roads.degree[row]):
