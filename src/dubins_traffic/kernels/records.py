@@ -22,7 +22,7 @@ they read a field of it in less time than an element of an array, and of a row o
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
@@ -215,3 +215,9 @@ def table(kind: type[R], shape: int | tuple[int, ...]) -> Any:
     for name, value in cast(Any, kind).FIRST_VALUES.items():
         rows[name] = value
     return rows
+
+
+def stack(tables: Sequence[Rows[R]]) -> Any:
+    """Return a table of which each row of the first axis is one of some tables of equal lengths."""
+    rows: Any = np.stack([cast(Any, own) for own in tables])
+    return rows.view(type(tables[0]))
