@@ -85,9 +85,8 @@ class RefereeParameters:
 class JudgedCar:
     """What the referee remembers of one car; of runs the first tick, -1 where there is none."""
 
-    trial: int
     number: int
-    """Which car it is: trial, and index there."""
+    """Which car of its trial it is."""
     bits: int = 0
     lane: int = -1
     crosses: int = -1
@@ -175,7 +174,7 @@ class BreachLog(Tables):
         `goals` (G,) are the vertices of the goals, of one trial after the other (`rules.referee.terms_of`).
         """
         known: Any = table(JudgedCar, (trials, cars))
-        known["trial"], known["number"] = np.indices((trials, cars))
+        known["number"] = np.arange(cars)
         taken: Any = table(JudgedGoal, len(goals))
         taken["vertex"] = goals
         return BreachLog(

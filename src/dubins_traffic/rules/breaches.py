@@ -36,10 +36,9 @@ GOES = FIRST | CLEAR
 
 @jit_inner
 def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex: int, lane: int) -> None:
-    """Write down that a car has broken a rule, a number in `RULES`, in frame `tick`; `FoundBreach` names the rest."""
+    """Write down that a car has broken a rule, a number in `RULES`, in frame `tick`, except in which trial."""
     k: int = log.filled[0]
     found = log.row[k]
-    found.trial = car.trial
     found.rule = rule
     found.car = car.number
     found.tick = tick

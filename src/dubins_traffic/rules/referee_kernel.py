@@ -39,6 +39,7 @@ def judge_frame(tick: int, tables: RefereeTables) -> None:
 def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
     """Do as `judge_frame`, of trial b."""
     labels, log = tables.labels, tables.log
+    first = log.filled[0]
     count = _list_due(b, tick, tables.state.count[b], labels, tables.memory, log)
     arrived = tick == log.goal_due[b]
     for i in range(count):
@@ -52,6 +53,8 @@ def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
         _judge_car(b, log.look[i], tick, tables)
     if arrived:
         judge_goals(b, tick, tables)
+    for k in range(first, log.filled[0]):
+        log.row[k].trial = b
     for i in range(count):
         n = log.look[i]
         car = log.car[b, n]
