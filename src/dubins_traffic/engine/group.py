@@ -45,7 +45,7 @@ from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
-from dubins_traffic.scoring.margins_kernel import margin_table
+from dubins_traffic.scoring.margins_kernel import margin_rules
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
@@ -125,8 +125,7 @@ class Group:
         )  # fmt: skip
         kinds, index = kinds_of(problems)
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-        frames = self._world.tally.pose.shape[1]
-        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
+        self._margins = margin_rules(rules, [kind.period for kind in kinds], index)
         numbers: list[int] = index.tolist()
         self._rules = [rules[k] for k in numbers]
         self.labels: Labels = labeller.labels
