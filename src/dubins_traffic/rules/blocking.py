@@ -1,4 +1,7 @@
-"""What leaves too little of a right lane free (RULES, *stands*, *blocked*): cars and obstacles on a segment."""
+"""Cars and obstacles on a segment that leave too little of a right lane free.
+
+What stands: docs/rules.md#stands. What blocks: docs/rules.md#blocked.
+"""
 
 from __future__ import annotations
 

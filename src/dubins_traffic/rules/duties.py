@@ -1,4 +1,4 @@
-"""What e-agents owe (RULES, *phi_env*, E3 to E6), judged in one frame (compiled)."""
+"""What e-agents owe (docs/rules.md#E3 to docs/rules.md#E6), judged in one frame (compiled)."""
 
 from __future__ import annotations
 

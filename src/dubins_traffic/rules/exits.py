@@ -1,4 +1,4 @@
-"""Whether a car in a disc may leave it (RULES, *phi_env*, E4): the lanes out of it, and what takes them."""
+"""Whether a car in a disc may leave it (docs/rules.md#E4): the lanes out of it, and what takes them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""The propositions of one frame, for all cars of a batch, in the order of RULES: lane state, still, queue,
-blocked, overtaking, left.
+"""The propositions of one frame, for all cars of a batch.
+
+Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, overtaking, left.
 """
 
 from __future__ import annotations

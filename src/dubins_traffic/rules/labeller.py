@@ -39,7 +39,7 @@ SLACK = 1e-9
 
 
 class Labeller:
-    """Computes the propositions of RULES for every car of a batch, one compiled call per tick.
+    """Computes the propositions of docs/rules.md for every car of a batch, one compiled call per tick.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class Labeller:
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:
-    """Tell of each problem whether it asks for the rules and rule 3 is defined there (RULES, *Ground*)."""
+    """Tell of each problem whether it asks for the rules and rule 3 is defined there (docs/rules.md#room)."""
     known: dict[tuple[int, int], bool] = {}
     judged: list[bool] = []
     kinds: list[int] = index.tolist()

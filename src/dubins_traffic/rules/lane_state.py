@@ -1,4 +1,4 @@
-"""The lane state of one car: which lane it is on, and its progress there (RULES, *Lane state*)."""
+"""The lane state of one car: which lane it is on, and its progress there (docs/rules.md#lane-state)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The order of arrival at crossings (RULES, *Queue*): approach, stops, tickets, groups, forfeits."""
+"""The order of arrival at crossings (docs/rules.md#queue): approach, stops, tickets, groups, forfeits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The referee: which rules of RULES are broken, by whom, when, since when and where, live or from frames."""
+"""The referee: which rules of docs/rules.md are broken, by whom, when, since when and where, live or from frames."""
 
 from __future__ import annotations
 

@@ -94,10 +94,10 @@ TOP_THEN, LINGERS_FROM, WAS_LINGERING = range(30, 33)
 CALM: Final = 33
 
 GRAIN = 1e-9
-"""Metres by which limits that a judgement compares are eased for the car that would be in breach (RULES, *Ground*).
+"""Metres by which limits that a judgement compares are eased for the car that would be in breach.
 
-Added to the distance of `still`, and taken from that of `lingers`, too: cars often go exactly that far, and rounding
-must not decide.
+The tolerance of docs/rules.md#tolerance. It is added to the distance of `still`, and taken from that of `lingers`, too:
+cars often go exactly that far, and rounding must not decide.
 """
 NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
@@ -189,7 +189,7 @@ class Memory(Tables):
 
 
 def ticks(duration: float, rate: float) -> int:
-    """Return the number of ticks of a duration in seconds (RULES, *Ground*): ceil(duration * rate - 1e-9)."""
+    """Return the number of ticks of a duration in seconds (docs/rules.md#time): ceil(duration * rate - 1e-9)."""
     return math.ceil(duration * rate - 1e-9)
 
 
