@@ -148,10 +148,9 @@ def _room(b: int, world: World) -> int:
 def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
     if own[DECIDED] != 0:
         return
-    if own[OTHERS] != 0:
-        if not decide_others(b, tick, world, commands):
-            own[STATUS] = NO_SIGHT
-            return
+    if own[OTHERS] != 0 and not decide_others(b, tick, world, commands):
+        own[STATUS] = NO_SIGHT
+        return
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(
