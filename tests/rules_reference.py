@@ -1,4 +1,4 @@
-"""The propositions of RULES once more, slowly: plain Python over whole histories, to compare the kernels with."""
+"""The propositions of docs/rules.md once more, slowly: plain Python over whole histories, to compare kernels with."""
 
 from __future__ import annotations
 

@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from dubins_traffic.runs.plan import Plan, plan
     from dubins_traffic.runs.single import Result, Trial, run_trial
     from dubins_traffic.runs.sources import load, load_record
+    from dubins_traffic.scoring.judging import Judging
+    from dubins_traffic.scoring.metric import Column, Metric
     from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, score
-    from dubins_traffic.scoring.verdict import Judging, Verdict
+    from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
     from dubins_traffic.verification.verify import verify
     from dubins_traffic.viewer.plot import plot, write_plot
@@ -57,8 +59,10 @@ _PLACES = {
     "record.writer": ("RecordWriter",),
     "roads.generate": ("generate_network=generate",),
     "roads.network": ("RoadNetwork",),
+    "scoring.judging": ("Judging",),
+    "scoring.metric": ("Column", "Metric"),
     "scoring.score": ("Score", "ScoreSheet", "Scorer", "score"),
-    "scoring.verdict": ("Judging", "Verdict"),
+    "scoring.verdict": ("Verdict",),
     "verification.result": ("Difference", "Verification"),
     "verification.verify": ("verify",),
     "viewer.plot": ("plot", "write_plot"),
@@ -77,6 +81,7 @@ __all__ = [
     "Bounds",
     "CampaignResults",
     "Car",
+    "Column",
     "Command",
     "Configuration",
     "Contact",
@@ -94,6 +99,7 @@ __all__ = [
     "Instance",
     "Job",
     "Judging",
+    "Metric",
     "Observation",
     "Plan",
     "PolygonObstacle",

@@ -13,6 +13,8 @@ _ARGUMENTS: Final = {
     "--gui": "show=True",
     "--jobs 1": "workers=1",
     "--lockstep": "lockstep=True",
+    "--map-format": "map_format",
+    "--metric": "metrics",
     "--overwrite": "overwrite=True",
     "--overwrite-trial-data": "overwrite_data=True",
     "--resume": "resume=True",
@@ -93,13 +95,13 @@ class InputError(DubinsTrafficError):
         )
 
     def __str__(self) -> str:
-        return self._told(in_python)
+        return self._text(in_python)
 
     def on_command_line(self) -> str:
         """Return the message for somebody who typed a command: it names options, not the arguments of functions."""
-        return self._told(str)
+        return self._text(str)
 
-    def _told(self, say: Callable[[str], str]) -> str:
+    def _text(self, say: Callable[[str], str]) -> str:
         parts = [shown(say(part), LONGEST) for part in (self.file, self.field, self.problem) if part]
         text = ": ".join(parts)
         if self.value is not _ABSENT:

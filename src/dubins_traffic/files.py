@@ -69,6 +69,15 @@ def exists(path: str | Path) -> bool:
     return False
 
 
+def begins_with(path: str | Path, magic: bytes) -> bool:
+    """Tell whether the file at a path can be read and begins with `magic`."""
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(magic)) == magic
+    except OSError:
+        return False
+
+
 def is_stream(path: str | Path) -> bool:
     """Tell whether a path is of something that can be read once only: a pipe, a device."""
     return exists(path) and not is_file(path) and not Path(path).is_dir()

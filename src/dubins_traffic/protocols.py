@@ -19,9 +19,11 @@ __all__ = [
     "Clock",
     "Closes",
     "Controller",
+    "Draws",
     "Driver",
     "End",
     "Ending",
+    "Forks",
     "Looks",
     "Mailbox",
     "Polled",
@@ -38,11 +40,15 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a simulator can do: step many trials at once, give equal bytes for equal seeds, wait for commands."""
+    """What a simulator can do: step many trials at once, give equal bytes for equal seeds, wait for commands.
+
+    `forks`: a deep copy of it goes on from where it is, as it would itself, and shares nothing with it that changes.
+    """
 
     batched: bool
     deterministic: bool
     lockstep: bool
+    forks: bool = False
 
 
 class Simulator(Protocol):
@@ -79,7 +85,10 @@ class Scans(Protocol):
 
 
 class Driver(Protocol):
-    """Drives some of the cars of a batch (built-in e-agents; a controller made to fit)."""
+    """Drives some of the cars of a batch (built-in e-agents; a controller made to fit).
+
+    In a fork of a trial a deep copy of it goes on. One that can't be copied raises InputError when it is.
+    """
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin a batch whose first frame is `state`."""
@@ -87,6 +96,25 @@ class Driver(Protocol):
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of this driver's cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
+        ...
+
+
+@runtime_checkable
+class Draws(Protocol):
+    """A driver whose choices are random; they follow from the seed of the instance."""
+
+    def reseed(self, seed: int) -> None:
+        """Let all that is drawn from now on follow from another seed; what has been drawn stays."""
+        ...
+
+
+@runtime_checkable
+class Forks(Protocol):
+    """A sink of which a deep copy goes on in a fork of its trial; one that does not say so stays behind."""
+
+    @property
+    def forks(self) -> bool:
+        """Whether a deep copy has seen what it has seen, and shares nothing with it that changes."""
         ...
 
 

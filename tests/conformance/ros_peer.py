@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from math import floor
+from typing import Any
 
 RATE = 30.0
-SEEN = 0.3
-"""Seconds within which a session sees who has come or gone."""
+PATIENCE = 600.0
 Odometry = tuple[float, float, float]
 """Stamp, x and y."""
 
@@ -19,7 +19,8 @@ class RosPeer:
     (returns what comes next: the text of a problem, an odometry, or None after a while).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, transport: Any, car: str) -> None:
+        self.transport, self.car = transport, car
         self.begun = self.there = False
         self.answered = -1
         self.again()
@@ -34,7 +35,17 @@ class RosPeer:
         if self.there:
             self.there = False
             self.shut()
-            time.sleep(SEEN)
+            self.await_seen(False)
+
+    def await_seen(self, there: bool) -> None:
+        """Wait until the session knows that this peer is there, or gone."""
+        until = time.monotonic() + PATIENCE
+        while True:
+            self.transport.look()
+            if bool(self.transport._there.get(self.car)) is there:
+                return
+            assert time.monotonic() < until
+            time.sleep(0.01)
 
     def problem(self) -> None:
         """Wait for the announcement, and until this peer is seen to be there."""
@@ -43,11 +54,11 @@ class RosPeer:
             self.begun = isinstance(came, str) and came != ""
             self.start: tuple[float, float] | None = None
             self.answered = -1
-        until = time.monotonic() + 600
+        until = time.monotonic() + PATIENCE
         while not self.heard():
             assert time.monotonic() < until
             time.sleep(0.01)
-        time.sleep(SEEN)
+        self.await_seen(True)
 
     def frame(self) -> int | None:
         """Return the number of the next frame that has none of an earlier message, None when the trial is over."""
@@ -71,7 +82,7 @@ class RosPeer:
         self.put(speed, yaw_rate)
 
     def next(self) -> str | Odometry:
-        until = time.monotonic() + 600
+        until = time.monotonic() + PATIENCE
         while (came := self.fetch()) is None:
             assert time.monotonic() < until, "nothing comes"
         return came

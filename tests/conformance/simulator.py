@@ -9,6 +9,7 @@ Bounds on agreement are class attributes, so that a physics engine may state loo
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -129,3 +130,22 @@ class SimulatorConformance:
                 simulator.step(np.array([[[0.5, 0.01], [0.4, 0.0]]]))
             ends.append(b"".join(column.tobytes() for column in state))
         assert ends[0] == ends[1]
+
+    def test_goes_on_twice_if_it_says_so(self, simulator: Simulator) -> None:
+        if not simulator.capabilities.forks:
+            return
+        first = simulator.reset([scene([pose(0, 0), pose(1.2, 0.1, math.pi)])])
+        drive = np.array([[[0.5, 0.01], [0.4, 0.0]]])
+        for _ in range(10):
+            simulator.step(drive.copy())
+        copied, state = deepcopy((simulator, first))
+        for _ in range(5):
+            copied.step(-drive)
+        (again, same) = deepcopy((simulator, first))
+        ends = [
+            ([own.step(drive.copy()) for _ in range(60)], b"".join(column.tobytes() for column in its))
+            for own, its in ((simulator, first), (again, same))
+        ]
+        assert ends[0] == ends[1]
+        assert any(contacts for (contacts,) in ends[0][0])
+        assert state.x[0, 0] < first.x[0, 0]

@@ -77,7 +77,7 @@ class LcmPeer:
 
     def get(self) -> Any:
         while not self.inbox:
-            assert self.lcm.handle_timeout(10_000) > 0
+            assert self.lcm.handle_timeout(600_000) > 0
         return self.inbox.pop(0)
 
     def problem(self) -> None:

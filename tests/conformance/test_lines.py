@@ -22,7 +22,7 @@ from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.lines_client import drive
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.observed import observation_from_document, observation_to_document
-from tests.conformance.transport import BRIEF, UntypedConformance, answer, frames
+from tests.conformance.transport import BRIEF, PATIENT, UntypedConformance, answer, frames
 from tests.recordings import make_instance
 from tests.unit.test_bad_documents import base
 
@@ -33,7 +33,7 @@ class LinesPeer:
         self.again()
 
     def again(self) -> None:
-        self.socket = socket.create_connection(self.address, 10)
+        self.socket = socket.create_connection(self.address, PATIENT)
         self.lines = self.socket.makefile("rb")
         self.answered = -1
         self.put({"join": self.car})

@@ -43,11 +43,8 @@ def uri(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 class Ros1Peer(RosPeer):
-    def __init__(self, rospy: Any, car: str) -> None:
-        self.rospy, self.car = rospy, car
-        super().__init__()
-
     def open(self) -> None:
+        self.rospy = self.transport.rospy
         m, self.came = load(), queue.SimpleQueue[str | Odometry]()
         topics = (
             ("/ego/odom", m.Odometry, self.move),
@@ -96,14 +93,22 @@ class TestRos1(TransportConformance):
         return Ros1(self.uri, clock=True)
 
     def connect(self, transport: Ros1, car: str) -> Ros1Peer:
-        return Ros1Peer(transport.rospy, car)
+        return Ros1Peer(transport, car)
 
     @pytest.mark.parametrize("clock", [Lockstep(SOON), RealTime(2.0)], ids=["lockstep", "real time"])
     def test_a_peer_that_dies_before_anyone_has_looked_is_lost(self, clock: Any) -> None:
         self.ticks = 1200
         self.make = lambda: Unwatched(self.uri, clock=True)
+        self.connect = Unseen
         result = self.run(answer(until=5, then=lambda peer: peer.hang_up()), clock)
         assert result.ending.end is End.PEER_LOST
+
+
+class Unseen(Ros1Peer):
+    """Nobody looks for it."""
+
+    def await_seen(self, there: bool) -> None:
+        """Don't wait."""
 
 
 class Unwatched(Ros1):

@@ -26,12 +26,8 @@ def _compiled() -> None:
 class Ros2Peer(RosPeer):
     """Shares the session's DDS domain object, of which a process has one."""
 
-    def __init__(self, domain: int, car: str) -> None:
-        self.domain, self.car = domain, car
-        super().__init__()
-
     def open(self) -> None:
-        self.graph = Graph(self.domain, here=False)
+        self.graph = Graph(self.transport.domain, here=False)
         self.odometry = self.graph.reader("rt/ego/odom", m.Odometry)
         topic = "rt/dubins_traffic_maestro/probleminstance_JSON"
         self.problems = self.graph.reader(topic, m.ProblemInstanceJSON, latched=True)
@@ -64,4 +60,4 @@ class TestRos2(TransportConformance):
         return Ros2(next(DOMAINS), clock=True)
 
     def connect(self, transport: Ros2, car: str) -> Any:
-        return Ros2Peer(transport.domain, car)
+        return Ros2Peer(transport, car)

@@ -5,7 +5,8 @@ class TestMine(TransportConformance):
     def connect(self, transport, car): return MinePeer(transport, car)
 
 A peer has `problem()` (waits for the announcement), `frame()` (waits for the next frame and returns its tick, or None
-when the trial is over), `send(speed, yaw_rate, tick)`, `hang_up()`, and for `UntypedConformance` also `garbage()`.
+when the trial is over), `send(speed, yaw_rate, tick)`, `hang_up()` and `again()`, which wait until it is seen, and
+for `UntypedConformance` also `garbage()`.
 """
 
 from __future__ import annotations
@@ -123,6 +124,7 @@ class TransportConformance:
 
     def test_real_time_takes_its_time_and_records_lateness(self) -> None:
         began = time.monotonic()
+        self.patience = replace(self.patience, silence=PATIENT)
         result = self.run(answer(skip=lambda tick: tick % 5 == 2), RealTime(2.0))
         assert result.ending.end is End.DURATION
         assert time.monotonic() - began >= self.ticks / 30 / 2.0
@@ -155,6 +157,7 @@ class TransportConformance:
             peer.again()
             answer()(peer)
 
+        self.patience = replace(self.patience, absence=PATIENT)
         result = self.run(behave)
         assert result.ending.end is End.DURATION
         if self.detects_loss:

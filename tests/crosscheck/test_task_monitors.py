@@ -19,7 +19,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Referee
 from dubins_traffic.rules.valuation import Valuation
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.scoring.verdict import Judging
+from dubins_traffic.scoring.judging import Judging
 from tests.judge_reference import Judge
 from tests.judging import GRID, ROADS, after, before, case, frames_of, lanes_in, lanes_out
 from tests.rules_scripts import KITE, on_lane, wander

@@ -234,10 +234,10 @@ def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:
     }
     assert "collisions_among_others" in silent
     (note,) = re.findall(r"No chart of what is 0 or absent everywhere: (.*?)\.</p>", text)
-    named = {metric.name for metric in METRICS if metric.column in silent}
+    named = {metric.label for metric in METRICS if metric.name in silent}
     assert set(note.split("; ")) == named
     charts = re.findall(r'<img alt="([^"]*) against e-agents"', text)
-    assert set(charts) == {metric.heading for metric in METRICS if metric.column not in silent}
+    assert set(charts) == {metric.heading for metric in METRICS if metric.name not in silent}
     assert 'alt="Collisions by fault"' in text
     assert "the egos had none" not in text
 

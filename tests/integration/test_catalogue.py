@@ -55,7 +55,9 @@ def test_configurations_with_a_line_each(capsys):
     assert all(re.search(r"\d+ trials of .* s, .* goals, .*judged", line) for line in lines)
 
 
-@pytest.mark.parametrize("subject", ["agents", "configurations", "controllers", "rules", "simulators"])
+@pytest.mark.parametrize(
+    "subject", ["agents", "configurations", "controllers", "map-formats", "metrics", "rules", "simulators"]
+)
 def test_all_of_it_as_json(subject, capsys):
     found: list[dict[str, Any]] = json.loads(listed(capsys, subject, "--json"))[subject]
     names = [line.split()[0] for line in listed(capsys, subject).splitlines() if line[0] != " "]

@@ -13,7 +13,7 @@ import pytest
 
 from dubins_traffic.checkup import checkup
 from dubins_traffic.checkup.checkup import Checkup, check_controller
-from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Waited, see_off
 from dubins_traffic.cli.main import main
 from dubins_traffic.roads.network import RoadNetwork
@@ -79,7 +79,7 @@ def verdicts(found: Checkup) -> dict[str, bool]:
 
 
 def test_the_course_is_odd() -> None:
-    instances = course()
+    instances = scenarios()
     networks: list[RoadNetwork] = [instance.problem.network for instance in instances.values()]
     assert any(network.transform[2] != 0.0 for network in networks)
     assert any(min(network.degrees) == 1 and len(network.segments) > 1 for network in networks)

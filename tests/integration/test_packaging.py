@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from ruamel.yaml import YAML  # rosbags needs it too
+
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -33,3 +35,39 @@ def test_the_source_distribution_holds_tests_and_documentation() -> None:
     assert {"README.md", "CHANGELOG.md", "LICENSE", "Makefile", "constraints.txt"} <= included
     assert all((ROOT / name).exists() for name in grafted | included)
     assert ["global-exclude", "__pycache__", "*.py[cod]", ".DS_Store"] in orders
+
+
+def test_how_to_cite_it_says_what_the_package_says() -> None:
+    cited: dict[str, Any] = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["cff-version"] == "1.2.0"
+    assert cited["title"] == PROJECT["name"]
+    assert cited["version"] == PROJECT["version"]
+    assert cited["license"] == PROJECT["license"]
+    assert cited["authors"] == PROJECT["authors"]
+    assert cited["keywords"] == PROJECT["keywords"]
+    assert cited["url"] == PROJECT["urls"]["Homepage"]
+    assert PROJECT["description"].split(": ")[1] in cited["abstract"]
+    assert all(one["title"] and one["authors"] for one in cited["references"])
+
+
+def test_hooks_run_the_checks_in_the_project_s_own_environment() -> None:
+    hooks = YAML(typ="safe").load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
+    assert [one["repo"] for one in hooks] == ["local"]
+    own = {hook["id"]: hook for hook in hooks[0]["hooks"]}
+    assert all(hook["language"] == "system" for hook in own.values())
+    checks = re.findall(r"^\t\$\(BIN\)/(\S+)", _recipe("check"), re.MULTILINE)
+    assert {hook["entry"].split()[0] for hook in own.values()} == {f".venv/bin/{name}" for name in checks}
+
+
+def test_hosted_ci_runs_what_ci_runs_here() -> None:
+    flow = YAML(typ="safe").load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    runs = [step["run"] for job in flow["jobs"].values() for step in job["steps"] if "run" in step]
+    assert "bash .ci/run" in runs
+    assert "make test" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def _recipe(target: str) -> str:
+    """Return the lines of a target of the Makefile."""
+    return f"\n{(ROOT / 'Makefile').read_text(encoding='utf-8')}".partition(f"\n{target}:")[2].partition(
+        "\n\n"
+    )[0]

@@ -88,10 +88,12 @@ def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:
         "--seed",
         "1",
         "--lockstep",
+        "--deadline",
+        "60",
         "--trials",
         "2",
         "--records",
-        str(tmp_path),
+        str(tmp_path / "out"),
     )
     with running(COMMAND, *arguments, "--json") as session:
         client = Client(domain)
@@ -114,7 +116,7 @@ def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:
         client.graph.close()
     ends = [trial["end"] for trial in json.loads(out)["trials"]]
     assert ends == ["reset", "duration", "reset"]
-    assert frames(tmp_path / "trial-0000-1.mcap") == expected
+    assert frames(tmp_path / "out" / "trial-0000-1.mcap") == expected
     assert {label.split("_")[0] for label in client.seen} == {"ego", "agent0", "agent1"}
     assert scans
     assert len(scans[0].ranges) == 300
@@ -141,10 +143,12 @@ def test_fast_dds_drives_the_ego(fastdds: str, domain: int, config: str, tmp_pat
         "--seed",
         "1",
         "--lockstep",
+        "--deadline",
+        "60",
         "--trials",
         "1",
         "--records",
-        str(tmp_path),
+        str(tmp_path / "out"),
     )
     with running(COMMAND, *arguments) as session, running(fastdds, str(domain)) as driver:
         client = Client(domain)
@@ -156,8 +160,8 @@ def test_fast_dds_drives_the_ego(fastdds: str, domain: int, config: str, tmp_pat
     assert driver.returncode == 0, err
     problem, odometry = out.splitlines()
     assert json.loads(problem) == instance_to_document(instance, version=0)
-    record = dt.load_record(tmp_path / "trial-0000.mcap")
-    assert frames(tmp_path / "trial-0000.mcap") == expected
+    record = dt.load_record(tmp_path / "out" / "trial-0000.mcap")
+    assert frames(tmp_path / "out" / "trial-0000.mcap") == expected
     frame, child, *numbers = odometry.split()
     assert (frame, child) == ("ego/odom", "ego/base_footprint")
     block = record.frames
@@ -170,7 +174,7 @@ def test_fast_dds_drives_the_ego(fastdds: str, domain: int, config: str, tmp_pat
     ("bad", "end"), [(math.nan, "controller_fault"), (None, "deadline")], ids=["not finite", "silent"]
 )
 def test_a_bad_peer_ends_its_trial_by_name(bad: float | None, end: str, domain: int, config: str) -> None:
-    arguments = ("ros2", "run", config, "--seed", "1", "--lockstep", "--deadline", "0.5", "--json")
+    arguments = ("ros2", "run", config, "--seed", "1", "--lockstep", "--deadline", "3", "--json")
     with running(COMMAND, *arguments, "--trials", "1") as session:
         client = Client(domain)
         client.until(START)
@@ -187,12 +191,14 @@ def test_a_bad_peer_ends_its_trial_by_name(bad: float | None, end: str, domain: 
 def test_faulty_clients_end_their_trials_and_the_session_goes_on(
     domain: int, config: str, tmp_path: Path
 ) -> None:
+    document = json.loads(Path(config).read_text()) | {"duration_bounds": [60, 60]}
+    Path(config).write_text(json.dumps(document))
     arguments = (
         "ros2",
         "run",
         config,
         "--silence",
-        "1",
+        "4",
         "--trials",
         "5",
         "--records",

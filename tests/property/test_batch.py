@@ -367,3 +367,26 @@ def test_room_for_pairs_contacts_and_breaches_is_found_when_it_is_needed(monkeyp
     monkeypatch.setattr(group, "FRAMES", 1)
     monkeypatch.setattr(group, "WORK", 100)
     assert results() == roomy
+
+
+def test_a_frame_in_which_every_goal_is_taken_finds_room_for_its_breaches(monkeypatch) -> None:
+    """With many goals and no e-agents a frame can begin more breaches than cars alone would."""
+    from dubins_traffic.engine import group
+
+    config = configuration(
+        **{"e-agents": [], "network": {"grid": {"rows": 17, "columns": 17, "length": 4.0}}},
+        number_goals_bounds=[289, 289],
+        duration_bounds=[1, 1],
+    )
+    calls = []
+    run = group.run_trials
+
+    def counted(*given: Any) -> None:
+        calls.append(1)
+        assert len(calls) < 100, "no room is ever found"
+        run(*given)
+
+    monkeypatch.setattr(group, "run_trials", counted)
+    (own,) = ask([draw(config, SEED, 0)], Stands, "driver", 1)
+    assert own.ending.end is End.DURATION
+    assert len(own.score.goals) == 289

@@ -65,7 +65,7 @@ def test_no_car_is_nearer_than_is_known(agents) -> None:
     cars = pack_cars([instance.problem.car])
     for _ in range(60):
         group.advance(7)
-        own, tick = group.spacing, int(group.ticks[0])
+        own, tick = group.world.spacing, int(group.ticks[0])
         far = np.hypot(*(position - position.T for position in (group.state.x, group.state.y)))
         np.fill_diagonal(far, np.inf)
         drift = cars.speed_high[0] * instance.problem.period

@@ -24,7 +24,7 @@ from dubins_traffic.synthesis.game import build, estimate
 from dubins_traffic.synthesis.play import Environment, play
 from dubins_traffic.synthesis.queues import OTHER
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.story import told
+from dubins_traffic.synthesis.story import story_of
 from dubins_traffic.synthesis.strategy import Strategy
 from tests.games import ALL, board, pan, solved
 
@@ -261,7 +261,7 @@ def test_a_lean_game_has_the_same_moves_winners_and_ranks(
 
 def test_a_counterstrategy_of_a_lean_game_tells_the_same_story() -> None:
     whole, thin = solved(2, 2, 3, KEEP_MOVING), lean(2, 2, 3, KEEP_MOVING)
-    assert told(Counterstrategy(thin), 0) == told(Counterstrategy(whole), 0)
+    assert story_of(Counterstrategy(thin), 0) == story_of(Counterstrategy(whole), 0)
 
 
 def test_a_lean_game_is_not_written(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, cell_of, start_positions
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.story import told
+from dubins_traffic.synthesis.story import story_of
 from dubins_traffic.synthesis.strategy import Strategy
 from dubins_traffic.synthesis.strengthening import smallest
 from tests.games import ALL, board, pan, solved
@@ -133,7 +133,7 @@ def test_the_counterstrategy_keeps_a_goal_from_the_ego_and_pays_its_debts(
 
 def test_the_story_of_the_gatekeeper_and_the_relay() -> None:
     solution = solved(2, 2, 3, KEEP_MOVING)
-    lines = told(Counterstrategy(solution), 1_000)
+    lines = story_of(Counterstrategy(solution), 1_000)
     text = "\n".join(lines)
     assert "the ego can be kept from goal [0, 0] for ever" in lines[0]
     assert "turns this repeats every" in text
@@ -146,10 +146,10 @@ def test_the_story_of_the_gatekeeper_and_the_relay() -> None:
 
 def test_the_story_of_a_parked_car_and_of_one_that_rams() -> None:
     parked = solved(2, 2, 2, "E1,E2,E3,E4,E6")
-    text = "\n".join(told(Counterstrategy(parked), 0))
+    text = "\n".join(story_of(Counterstrategy(parked), 0))
     assert "E5 is not assumed, so it need not come to the end of the lane" in text
     rams = solved(2, 2, 2, "E1,E3,E4,E5,E6")
-    text = "\n".join(told(Counterstrategy(rams), int(np.argmax(~rams.winning))))
+    text = "\n".join(story_of(Counterstrategy(rams), int(np.argmax(~rams.winning))))
     assert "an e-agent drives into the ego: E2 is not assumed" in text
 
 
@@ -200,7 +200,7 @@ def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
 def test_the_story_names_who_excuses_a_car_at_a_bend(some: Board, excuse: str) -> None:
     counter = Counterstrategy(solve(build(some)))
     lost = np.flatnonzero(~counter.solution.winning)
-    stories = ["\n".join(told(counter, int(position))) for position in lost[:: 1 + len(lost) // 12]]
+    stories = ["\n".join(story_of(counter, int(position))) for position in lost[:: 1 + len(lost) // 12]]
     assert any(re.search(excuse, story) for story in stories), stories[0]
 
 

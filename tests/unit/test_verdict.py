@@ -25,9 +25,10 @@ from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
-from dubins_traffic.scoring.verdict import Judging, Verdict
+from dubins_traffic.scoring.verdict import Verdict
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
 from tests.recordings import blocks
@@ -398,7 +399,8 @@ def test_check_prints_the_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["check", str(judged), str(silent)]) == 0
     text = capsys.readouterr().out
     assert first["verdict"] in text
-    assert "3.stop" in text
+    assert {f"docs/rules.md#{entry['rule']}" for entry in first["violations"]} <= set(text.split())
+    assert "docs/rules.md#3.stop" in text
     assert "not judged" in text
     assert main(["check", str(tmp_path / "none.mcap")]) == 2
     assert main(["replay", str(judged), "-o", str(tmp_path / "page.html")]) == 0

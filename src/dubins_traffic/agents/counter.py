@@ -31,7 +31,7 @@ from dubins_traffic.synthesis.queues import Scene
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
-from dubins_traffic.synthesis.story import Moment, followed, moment_of, told
+from dubins_traffic.synthesis.story import Moment, followed, moment_of, story_of
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -109,6 +109,10 @@ class CounterTeam:
         found, self._reports = self._reports, []
         return found
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._drivers.seed[:] = seed
+
     def _choose(self, tick: int, cars: Sequence[Sighting]) -> None:
         """Choose the cells to which the cars go in this turn, and prepare the law for it."""
         play, position = self._play, self._play.position
@@ -117,7 +121,7 @@ class CounterTeam:
             return
         if not self._is_told:
             self._is_told = True
-            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in told(self._strategy, position)]
+            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in story_of(self._strategy, position)]
         after, _ = self._strategy.choose(position, self._most_urgent(tick, position))
         if after == self._strategy.solution.game.positions:
             return

@@ -34,11 +34,11 @@ from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE, parameters_of
-from dubins_traffic.protocols import Driver
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
+    from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import EAgent, Instance
 
 AS_FAR_AS_2016 = 3.5
@@ -104,6 +104,13 @@ class Fleet:
         """Return what the cars that play a counterstrategy have to say."""
         return () if self._counter is None else self._counter.report()
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._agents.team["seed"] = seed
+        for team in (self._lawful, self._counter):
+            if team is not None:
+                team.reseed(seed)
+
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
         if state is not self._scene.state:
             self._scene = self._scene.replace(state=state)
@@ -115,7 +122,7 @@ class Fleet:
                 done = -1 - reached
                 pairs = 4 * len(self._work.pair)
                 self._work = self._work.replace(pair=np.zeros((pairs, 2), dtype=np.int64))
-                self._scene = self._scene.replace(work=self._work)
+                self._scene = self._scene.replace(space=self._work)
 
 
 def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
@@ -152,7 +159,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     )
 
 
-def _lawful() -> Driver:
+def _lawful() -> Lawful:
     """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
     from dubins_traffic.agents.lawful import Lawful
 

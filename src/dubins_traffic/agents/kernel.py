@@ -54,7 +54,7 @@ def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
 @jit_inner
 def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
     """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
-    state, agents, work = scene.state, scene.agents, scene.work
+    state, agents, work = scene.state, scene.agents, scene.space
     if look(scene, b) > work.pair.shape[0]:
         return False
     ego = _pose(state, b, 0)
@@ -245,7 +245,7 @@ def choose(b: int, n: int, tick: int, lane: int, seen: bool, scene: Scene) -> in
     v = roads.vert_off[net] + roads.ends[roads.seg_off[net] + (lane >> 1), 1 - (lane & 1)]
     if agent.kind != LOOP and not seen:
         return random_exit(roads, v, lane, team, n, tick)
-    hops, queue = scene.work.hops, scene.work.queue
+    hops, queue = scene.space.hops, scene.space.queue
     for k in range(hops.shape[0]):
         hops[k] = FAR
     count = 0

@@ -51,6 +51,10 @@ class Lawful:
         self._drivers = pack_drivers(instances, cars, net)
         self._scratch = scratch(cars, int(np.diff(self._roads.seg_off).max()))
 
+    def reseed(self, seed: int) -> None:
+        """Let what is drawn from now on follow from another seed."""
+        self._drivers.seed[:] = seed
+
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
         decide(tick, commands, state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
@@ -164,7 +168,7 @@ def _add_stages(
     goals: list[tuple[int, int]] = []
     for b, (problem, number) in enumerate(zip(problems, numbers, strict=True)):
         own, first = fleets[number], len(stage)
-        if own.goers:
+        if own.goers or own.loops:
             stage += dict.fromkeys(problem.goal_vertices)
         goals.append((first, len(stage)))
         for n, cycle in own.loops:
@@ -174,5 +178,7 @@ def _add_stages(
     spans = np.array(goals, dtype=np.int64)
     for number, own in enumerate(fleets):
         trials = np.flatnonzero(whose == number)[:, None]
-        for k, field in enumerate(("first", "last")):
-            cars[field][trials, own.goers] = spans[trials, k]
+        bound_by_e6 = [*own.goers, *(n for n, _ in own.loops)]
+        for k, (first, own_goals) in enumerate((("first", "goal_first"), ("last", "goal_last"))):
+            cars[first][trials, own.goers] = spans[trials, k]
+            cars[own_goals][trials, bound_by_e6] = spans[trials, k]

@@ -100,7 +100,7 @@ def look(scene: Scene, b: int) -> int:
 
     Returns the number of pairs that had to be looked at; if it exceeds the room for pairs, nothing was decided.
     """
-    state, obstacles, work = scene.state, scene.obstacles, scene.work
+    state, obstacles, work = scene.state, scene.obstacles, scene.space
     team = scene.agents.team[b]
     agents = scene.agents.agent
     span = team.span

@@ -185,7 +185,7 @@ class Scene(Tables):
     roads: RoadTable
     obstacles: ObstacleTable
     agents: Agents
-    work: Workspace
+    space: Workspace
 
 
 def workspace(cars: int, pairs: int, lanes: int) -> Workspace:

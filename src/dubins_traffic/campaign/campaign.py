@@ -13,8 +13,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
 from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
+from dubins_traffic.campaign.rows import RESULT, WALL
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
@@ -23,6 +25,8 @@ from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import plain
 from dubins_traffic.record.header import bare_name
+from dubins_traffic.scoring import registry as scores
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.simulators import registry as simulators
 
 
@@ -40,6 +44,10 @@ class Campaign:
         The controllers, those given by a file with its full path.
     cells : tuple of Cell
         All combinations, configurations outermost.
+    metrics : tuple of str
+        The further metrics, those given by a file with its full path.
+    columns : tuple of Column
+        What these tell.
     file : str or None
         Where it was read.
 
@@ -52,6 +60,8 @@ class Campaign:
     model: CampaignModel
     places: tuple[str, ...]
     cells: tuple[Cell, ...]
+    metrics: tuple[str, ...] = ()
+    columns: tuple[Column, ...] = ()
     file: str | None = field(default=None, compare=False)
 
     @staticmethod
@@ -60,6 +70,7 @@ class Campaign:
         file: str | None = None,
         folder: Path | None = None,
         places: tuple[str, ...] | None = None,
+        metrics: tuple[tuple[str, ...], tuple[Column, ...]] | None = None,
     ) -> Campaign:
         """Check `document`; relative paths are looked up in `folder`, then in the current directory.
 
@@ -73,6 +84,8 @@ class Campaign:
             The folder in which the file stands.
         places : tuple of str, optional
             Where the controllers are, instead of where the document says.
+        metrics : (tuple of str, tuple of Column), optional
+            Where the further metrics are, instead of where the document says, and what they tell.
 
         Raises
         ------
@@ -88,10 +101,11 @@ class Campaign:
             _check_names([entry.name for entry in model.configurations], "configurations")
             _check_names([bare_name(spec) for spec in model.controllers], "controllers")
             found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
+            further = metrics or _metrics(model.metrics, folder)
             cells = tuple(_cells(model, configurations))
         except InputError as error:
             raise error.within(file=file) from None
-        return Campaign(_complete(model, configurations), model, found, cells, file)
+        return Campaign(_complete(model, configurations), model, found, cells, *further, file)
 
     @property
     def controllers(self) -> tuple[str, ...]:
@@ -110,12 +124,13 @@ class Campaign:
 
     def chunks(self) -> Iterator[Chunk]:
         """Make all units of work, in order; they depend on the campaign alone."""
-        return cut(self.cells, self.places, self.model.chunk, self.model.deadline)
+        return cut(self.cells, self.places, self.model.chunk, self.model.deadline, self.metrics)
 
     def chunk(self, cell: Cell, controller: int, trial: int) -> Chunk:
         """Return one trial as a chunk of its own."""
         number = cell.first + controller * cell.count + trial
-        return Chunk(number, cell.settled, cell.seed, self.places[controller], trial, 1, self.model.deadline)
+        place, deadline = self.places[controller], self.model.deadline
+        return Chunk(number, cell.settled, cell.seed, place, trial, 1, deadline, self.metrics)
 
 
 def load_campaign(path: str | os.PathLike[str]) -> Campaign:
@@ -160,11 +175,7 @@ def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -
 
 def _place(spec: str, index: int, folder: Path | None) -> str:
     """Return where a controller is, having loaded it once."""
-    path, colon, name = spec.rpartition(":")
-    if colon and path.endswith(".py"):
-        beside = (folder or Path()) / Path(path).expanduser()
-        found = beside if is_file(beside) else Path(path).expanduser()
-        spec = f"{found.resolve()}:{name}"
+    spec = outside.resolved(spec, folder)
     try:
         controllers.load(spec)
     except InputError as error:
@@ -172,6 +183,21 @@ def _place(spec: str, index: int, folder: Path | None) -> str:
             error.problem, field=f"controllers[{index}]", value=error.value, expected=error.expected
         ) from None
     return spec
+
+
+def _metrics(specs: list[str], folder: Path | None) -> tuple[tuple[str, ...], tuple[Column, ...]]:
+    """Return where metrics are and what they tell, having loaded each once."""
+    places = tuple(outside.resolved(spec, folder) for spec in specs)
+    found: list[Column] = []
+    for k, place in enumerate(places):
+        taken = [*RESULT, *WALL, *(own.name for own in found)]
+        try:
+            found += scores.columns([place], taken)
+        except InputError as error:
+            raise InputError(
+                error.problem, field=f"metrics[{k}]", value=error.value, expected=error.expected
+            ) from None
+    return places, tuple(found)
 
 
 def _check_names(names: list[str], what: str) -> None:
@@ -249,6 +275,8 @@ def _inlined(configuration: Configuration) -> dict[str, Any]:
 
 def _complete(model: CampaignModel, configurations: list[Configuration]) -> dict[str, Any]:
     document = model.model_dump(exclude={"configurations"})
+    if not model.metrics:
+        del document["metrics"]
     document["factors"] = levels(model.factors)
     document["configurations"] = [
         {"name": entry.name, "document": _inlined(configuration)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dubins_traffic.campaign.factors import Scalar
 from dubins_traffic.controllers.registry import COMPILED
@@ -54,6 +54,8 @@ class Chunk:
         What `controllers.registry.load` takes.
     deadline : float or None
         Seconds within which each `act` must answer.
+    metrics : tuple of str
+        Further metrics.
     """
 
     number: int
@@ -63,6 +65,7 @@ class Chunk:
     trial: int
     count: int
     deadline: float | None = None
+    metrics: tuple[str, ...] = ()
 
     @property
     def end(self) -> int:
@@ -72,13 +75,15 @@ class Chunk:
     def part(self, number: int, end: int) -> Chunk:
         """Return the chunk of the trials from `number` up to before `end`."""
         trial = self.trial + number - self.number
-        return Chunk(
-            number, self.configuration, self.seed, self.controller, trial, end - number, self.deadline
-        )
+        return replace(self, number=number, trial=trial, count=end - number)
 
 
 def cut(
-    cells: Sequence[Cell], places: Sequence[str], most: int | None = None, deadline: float | None = None
+    cells: Sequence[Cell],
+    places: Sequence[str],
+    most: int | None = None,
+    deadline: float | None = None,
+    metrics: tuple[str, ...] = (),
 ) -> Iterator[Chunk]:
     """Return the chunks of a campaign, in the order of its trials.
 
@@ -92,6 +97,8 @@ def cut(
         Trials in a chunk; by default by how long they take, and fewer towards the end.
     deadline : float, optional
         Seconds within which each `act` must answer.
+    metrics : tuple of str
+        Further metrics.
     """
     left = sum(cell.count * cost(cell, place) for cell in cells for place in places)
     for cell in cells:
@@ -103,7 +110,7 @@ def cut(
                 pieces = -(-rest // (most or _trials(left, each)))
                 count = min(most, rest) if most else -(-rest // pieces)
                 number = cell.first + k * cell.count + trial
-                yield Chunk(number, cell.settled, cell.seed, place, trial, count, deadline)
+                yield Chunk(number, cell.settled, cell.seed, place, trial, count, deadline, metrics)
                 trial += count
                 left -= count * each
 

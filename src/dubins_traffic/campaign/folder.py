@@ -45,7 +45,7 @@ class Folder:
             return [(0, self.campaign.total)]
         found: list[tuple[int, int]] = []
         for first, end, path in parts(self.path):
-            if table.is_part(path, end - first):
+            if table.is_part(path, end - first, self.campaign.columns):
                 found.append((first, end))
             else:
                 path.unlink()

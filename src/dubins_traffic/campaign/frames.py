@@ -25,4 +25,5 @@ def rows_of(subject: object) -> list[dict[str, Any]]:
 
 def _row(score: Score) -> dict[str, Any]:
     identity = {name: getattr(score, name) for name in ("trial", "seed", "controller", "record", "end")}
-    return {**identity, **{name: value(score) for name, (_, value) in SCORES.items()}}
+    scores = {name: value(score) for name, (_, value) in SCORES.items()}
+    return {**identity, **scores, **{own.column.name: own.value for own in score.metrics}}

@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +16,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, replace_file
 from dubins_traffic.problem.files import parse_json
+from dubins_traffic.scoring.metric import Column
 
 FORMAT = 0
 NAME = "manifest.json"
@@ -33,6 +35,11 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         Which records are kept, as on the command line.
     """
     places = zip(campaign.controllers, campaign.places, strict=True)
+    metrics = [
+        {"name": spec, "place": place, "file": _hash_of_file(place)}
+        for spec, place in zip(campaign.model.metrics, campaign.metrics, strict=True)
+    ]
+    columns = [asdict(column) for column in campaign.columns]
     return {
         "format": FORMAT,
         "name": campaign.model.name,
@@ -45,6 +52,7 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         "controllers": [
             {"name": name, "place": place, "file": _hash_of_file(place)} for name, place in places
         ],
+        **({"metrics": metrics, "columns": columns} if metrics else {}),
         "versions": {
             "dubins-traffic": version("dubins-traffic"),
             "python": platform.python_version(),
@@ -93,7 +101,11 @@ def stored_document(folder: Path) -> dict[str, Any]:
 def stored_campaign(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
     """Return the campaign of `folder`, checked anew."""
     places = tuple(entry["place"] for entry in manifest["controllers"])
-    return Campaign.from_document(stored_document(folder), str(folder / CAMPAIGN), places=places)
+    metrics = tuple(entry["place"] for entry in manifest.get("metrics", []))
+    columns = tuple(Column(**entry) for entry in manifest.get("columns", []))
+    return Campaign.from_document(
+        stored_document(folder), str(folder / CAMPAIGN), places=places, metrics=(metrics, columns)
+    )
 
 
 def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[str, Any]:
@@ -119,10 +131,11 @@ def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[st
     if found is not None:
         raise _changed(campaign.file, found[0], found[2], found[1])
     now = make(campaign, records or manifest["records"])
-    for k, (before, after) in enumerate(zip(manifest["controllers"], now["controllers"], strict=True)):
-        if before["file"] != after["file"]:
-            name = f"controllers[{k}] ({after['place']})"
-            raise _changed(campaign.file, name, after["file"] or "no file", before["file"] or "no file")
+    for what in ("controllers", "metrics"):
+        for k, (before, after) in enumerate(zip(manifest.get(what, []), now.get(what, []), strict=True)):
+            if before["file"] != after["file"]:
+                name = f"{what}[{k}] ({after['place']})"
+                raise _changed(campaign.file, name, after["file"] or "no file", before["file"] or "no file")
     if now["records"] != manifest["records"]:
         raise _changed("--records", None, now["records"], manifest["records"])
     ours = "dubins-traffic"

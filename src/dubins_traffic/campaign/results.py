@@ -38,14 +38,14 @@ class CampaignResults:
         return len(self.table)
 
     def __repr__(self) -> str:
-        return f"<CampaignResults {self.folder}: {self._told()}>"
+        return f"<CampaignResults {self.folder}: {self._trials_text()}>"
 
     def _repr_html_(self) -> str:
         shares = {name: Counter[str]() for name in self.campaign.controllers}
         columns = (self.table[name].to_pylist() for name in ("controller", "verdict", "end"))
         for controller, verdict, end in zip(*columns, strict=True):
             shares[controller][verdict or end] += 1
-        return shares_html("Campaign", f"{self.folder}: {self._told()}", shares)
+        return shares_html("Campaign", f"{self.folder}: {self._trials_text()}", shares)
 
     def asdict(self) -> dict[str, list[Any]]:
         """Return the table as a dict of columns: name to values, one a trial."""
@@ -62,7 +62,7 @@ class CampaignResults:
         pandas()
         return self.table.to_pandas()
 
-    def _told(self) -> str:
+    def _trials_text(self) -> str:
         names = ", ".join(self.campaign.controllers)
         return f"{len(self)} of {self.campaign.total} trials of {names}"
 

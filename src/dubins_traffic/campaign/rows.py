@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, assumption_of
 
@@ -127,20 +128,26 @@ def row(number: int, ending: Ending, score: Score, act_s: Mapping[str, float]) -
         "end": ending.end.value,
         "reason": ending.detail[:LONGEST_REASON] or None,
         **{name: value(score) for name, (_, value) in SCORES.items()},
+        **{own.column.name: own.value for own in score.metrics},
         "time_to_begin_s": score.time_to_begin_s,
         **{name: act_s.get(figure) for name, figure in _ACTS.items()},
     }
 
 
-def failure(number: int, end: str, reason: str) -> Row:
-    """Return the row of a trial that came to nothing, and why."""
-    rest = dict.fromkeys([*SCORES, *WALL])
+def failure(number: int, end: str, reason: str, metrics: Sequence[Column] = ()) -> Row:
+    """Return the row of a trial that came to nothing, and why; `metrics` are the columns of further metrics."""
+    rest = dict.fromkeys([*SCORES, *(own.name for own in metrics), *WALL])
     return {"number": number, "end": end, "reason": reason[:LONGEST_REASON], **rest}
 
 
-def columns(rows: Sequence[Row]) -> Columns:
-    """Return rows as columns."""
-    return {name: [one[name] for one in rows] for name in (*RESULT, *WALL)}
+def columns(rows: Sequence[Row], metrics: Sequence[Column] = ()) -> Columns:
+    """Return rows as columns, with those of further metrics."""
+    return {name: [one[name] for one in rows] for name in (*results(metrics), *WALL)}
+
+
+def results(metrics: Sequence[Column]) -> tuple[str, ...]:
+    """Return the columns of the table of results that come from running a trial, with those of further metrics."""
+    return (*RESULT, *(own.name for own in metrics))
 
 
 def arrow() -> Any:
@@ -160,20 +167,21 @@ def arrow() -> Any:
     return found
 
 
-def part_schema() -> Any:
-    """Return the Arrow schema of a part: what comes from running trials."""
+def part_schema(metrics: Sequence[Column] = ()) -> Any:
+    """Return the Arrow schema of a part: what comes from running trials, with the columns of further metrics."""
     made = arrow()
     types = {"number": "int64", "end": "string", "reason": "string"}
     types |= {name: kind for name, (kind, _) in SCORES.items()}
+    types |= {own.name: own.kind for own in metrics}
     types |= dict.fromkeys(WALL, "float64")
     names = {"bool": "bool_", "string": "string"}
     return made.schema([(name, getattr(made, names.get(kind, kind))()) for name, kind in types.items()])
 
 
-def encoded(found: Columns) -> bytes:
+def encoded(found: Columns, metrics: Sequence[Column] = ()) -> bytes:
     """Return the rows of a chunk as the bytes of its Parquet file, a part of the campaign's table."""
     made = arrow()
-    schema = part_schema()
+    schema = part_schema(metrics)
     arrays = [made.array(found[entry.name], type=entry.type) for entry in schema]
     stream = BytesIO()
     table = made.Table.from_arrays(arrays, schema=schema)

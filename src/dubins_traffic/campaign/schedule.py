@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.engines import Engine
+from dubins_traffic.scoring.registry import columns
 
 LOSSES = 2
 """A chunk that was lost so often with others beside it is run alone, trial by trial."""
@@ -55,4 +56,6 @@ def _alone(engine: Engine, trial: Chunk) -> bytes:
         part = engine.wait()[0].part
         if part is not None:
             return part
-    return rows.encoded(rows.columns([rows.failure(trial.number, rows.CRASHED, REASON)]))
+    metrics = columns(trial.metrics)
+    row = rows.failure(trial.number, rows.CRASHED, REASON, metrics)
+    return rows.encoded(rows.columns([row], metrics), metrics)

@@ -163,6 +163,9 @@ class CampaignModel(Strict):
         description="further factors: values of any field of the configuration, by its path, such as "
         '"disturbances.position_noise" or "e-agents[0].parameters.speed"',
     )
+    metrics: list[Annotated[str, Field(min_length=1)]] = Field(
+        default=[], description="further metrics: names, module:Class or path/to/file.py:Class"
+    )
     deadline: Annotated[float, Field(gt=0, le=limits.SECONDS)] | None = Field(
         default=None,
         description="wall-clock seconds within which each act must answer; such ends do not repeat exactly",

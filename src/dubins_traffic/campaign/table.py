@@ -15,6 +15,7 @@ from dubins_traffic.campaign.chunks import Cell
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS
+from dubins_traffic.scoring.metric import Column
 
 RESULTS = "results.parquet"
 WALL = "wall.parquet"
@@ -31,14 +32,15 @@ class Kind(Enum):
     WALL = "wall"
 
 
-def is_part(path: Path, count: int) -> bool:
-    """Tell whether the file at `path` is a whole part of `count` rows."""
+def is_part(path: Path, count: int, metrics: Sequence[Column] = ()) -> bool:
+    """Tell whether the file at `path` is a whole part of `count` rows, with the columns of further metrics."""
     made = rows.arrow()
     try:
         found = made.parquet.ParquetFile(path)
     except (OSError, made.ArrowInvalid):
         return False
-    return found.metadata.num_rows == count and found.schema_arrow.names == rows.part_schema().names
+    names = rows.part_schema(metrics).names
+    return found.metadata.num_rows == count and found.schema_arrow.names == names
 
 
 def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -> None:
@@ -131,13 +133,13 @@ def _load(part: Path) -> Any:
 
 def _schema(campaign: Campaign, kind: Kind) -> Any:
     made = rows.arrow()
-    part = rows.part_schema()
+    part = rows.part_schema(campaign.columns)
     if kind is Kind.WALL:
         return made.schema([part.field(name) for name in ("number", *rows.WALL)])
     identity = [("number", made.int64()), ("cell", made.int32()), ("configuration", made.string())]
     identity += [(FACTOR + name, _type(campaign, name)) for name in campaign.factors]
     identity += [("controller", made.string()), ("trial", made.int64()), ("seed", made.uint64())]
-    rest = [part.field(name) for name in rows.RESULT if name != "number"]
+    rest = [part.field(name) for name in rows.results(campaign.columns) if name != "number"]
     return made.schema([*(made.field(*one) for one in identity), *rest])
 
 
@@ -169,7 +171,7 @@ def _shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
     for name in campaign.factors:
         values = [cell.values[name] for cell in own]
         text = schema.field(FACTOR + name).type == made.string()
-        known[FACTOR + name] = [told(value) for value in values] if text else values
+        known[FACTOR + name] = [factor_text(value) for value in values] if text else values
     arrays = [
         made.array(known[entry.name], type=entry.type) if entry.name in known else part[entry.name]
         for entry in schema
@@ -177,7 +179,7 @@ def _shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
     return made.Table.from_arrays(arrays, schema=schema)
 
 
-def told(value: object) -> str:
+def factor_text(value: object) -> str:
     """Return the value of a factor as a text; switches as in JSON."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 

@@ -18,6 +18,8 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.record.wall import remove_record
 from dubins_traffic.runs.jobs import Job
+from dubins_traffic.scoring import registry as scores
+from dubins_traffic.scoring.metric import Maker
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
@@ -49,7 +51,7 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
     Raises
     ------
     InputError
-        If there is no such controller here: a fault of this machine, not of a trial.
+        If there is no such controller or metric here: a fault of this machine, not of a trial.
     KeyboardInterrupt
         If it was interrupted; nothing of the chunk counts then.
     """
@@ -57,15 +59,16 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
         records.check()
     with contextlib.suppress(controllers.ConstructionError):  # that is the fault of a trial
         controllers.load(chunk.controller)
+    makers = scores.makers(chunk.metrics)
     chunk = replace(chunk, configuration=_known(chunk.configuration))
     found: dict[int, rows.Row] = {}
     together = [k for k in range(chunk.count) if not _is_alone(chunk, k, records)]
     for first in range(0, len(together), TOGETHER):
-        found |= _together(chunk, together[first : first + TOGETHER], cancelled)
+        found |= _together(chunk, together[first : first + TOGETHER], cancelled, makers)
     for k in range(chunk.count):
         if k not in found or (records is not None and _is_recorded(records, chunk.number + k, found[k])):
             found[k] = _row(chunk, k, records, cancelled)
-    return rows.columns([found[k] for k in range(chunk.count)])
+    return rows.columns([found[k] for k in range(chunk.count)], scores.columns(makers))
 
 
 def run_part(chunk: Chunk, around: Surroundings, cancelled: Event | None = None) -> bytes:
@@ -73,7 +76,8 @@ def run_part(chunk: Chunk, around: Surroundings, cancelled: Event | None = None)
     for path in around.paths:
         if path not in sys.path:
             sys.path.append(path)
-    return rows.encoded(run_chunk(chunk, around.records, cancelled))
+    found = run_chunk(chunk, around.records, cancelled)
+    return rows.encoded(found, scores.columns(chunk.metrics))
 
 
 def _is_alone(chunk: Chunk, k: int, records: Records | None) -> bool:
@@ -94,7 +98,9 @@ def _is_recorded(records: Records, number: int, row: rows.Row) -> bool:
     return records.path(number) is not None and records.keeps(row)
 
 
-def _together(chunk: Chunk, some: Sequence[int], cancelled: Event | None) -> dict[int, rows.Row]:
+def _together(
+    chunk: Chunk, some: Sequence[int], cancelled: Event | None, metrics: Sequence[Maker]
+) -> dict[int, rows.Row]:
     """Run trials of a chunk together; return the rows of those that could be.
 
     What is wrong with the others is found out when they are run by themselves.
@@ -103,7 +109,7 @@ def _together(chunk: Chunk, some: Sequence[int], cancelled: Event | None) -> dic
     try:
         instances = list(draw_many(chunk.configuration, chunk.seed, [chunk.trial + k for k in some]))
         stop = (lambda: False) if cancelled is None else cancelled.is_set
-        for outcome in run_together(instances, chunk.controller, stop):
+        for outcome in run_together(instances, chunk.controller, stop, metrics):
             k = outcome.instance.trial - chunk.trial
             found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
     except (Exception, SystemExit):  # whose fault it is shows when each is run by itself
@@ -134,14 +140,16 @@ def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Event | None)
         record=record,
         overwrite=True,
         deadline=chunk.deadline,
+        metrics=chunk.metrics,
     )
     try:
         result = job.run(cancelled)
         found = rows.row(number, result.ending, result.score, result.wall.act_s)
     except DubinsTrafficError as error:
-        found = rows.failure(number, rows.FAILED, str(error))
+        found = rows.failure(number, rows.FAILED, str(error), scores.columns(chunk.metrics))
     except (Exception, SystemExit) as error:  # one bad trial is a row, never the end of the campaign
-        found = rows.failure(number, rows.FAILED, f"{type(error).__name__}: {error}")
+        told = f"{type(error).__name__}: {error}"
+        found = rows.failure(number, rows.FAILED, told, scores.columns(chunk.metrics))
     if records is not None and record is not None and not records.keeps(found):
         remove_record(record)
     return found

@@ -21,7 +21,7 @@ class Disc:
 
     @property
     def reach(self) -> float:
-        """Distance from the centre to the farthest point of the body, in metres (rho in RULES)."""
+        """Distance from the centre to the farthest point of the body, in metres (rho in docs/rules.md#road)."""
         return self.radius
 
     @property
@@ -43,7 +43,7 @@ class Rectangle:
 
     @property
     def reach(self) -> float:
-        """Half the diagonal, in metres (rho in RULES)."""
+        """Half the diagonal, in metres (rho in docs/rules.md#road)."""
         return 0.5 * math.sqrt(self.length * self.length + self.width * self.width)
 
 

@@ -49,7 +49,7 @@ class Command(NamedTuple):
 
 
 class Propositions(NamedTuple):
-    """The discrete state of one car at one frame (RULES, *Propositions*).
+    """The discrete state of one car at one frame (docs/rules.md#propositions).
 
     `segment` is the nearest segment; `at` the intersection whose disc holds the centre and `crosses` the one whose
     disc the body meets (-1: none); `lane` the lane state, 2 * segment + direction (-1: none); `bits` a union of

@@ -9,7 +9,7 @@ from typing import Any
 
 from dubins_traffic.checkup.over_transport import run_over
 from dubins_traffic.checkup.passes import Drive, Pass, run_here
-from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.protocols import End
 from dubins_traffic.record.wall import summary
@@ -89,7 +89,7 @@ def check_controller(controller: str, over: str | None = None) -> Checkup:
     else:
         first, second = run_over(over, controller)
     answers = [answer for drive in first.drives for answer in drive.answers_s]
-    period = min(instance.problem.period for instance in course().values())
+    period = min(instance.problem.period for instance in scenarios().values())
     findings = (
         _starts(first),
         _survives(first),
@@ -118,7 +118,7 @@ def _survives(run: Pass) -> Finding:
         for drive in run.drives
         if drive.end != End.DURATION
     ]
-    whole = len(course())
+    whole = len(scenarios())
     missing = whole - len(run.drives)
     if missing:
         failed.append(f"{missing} of {whole} trials were not run" + (f": {run.lost}" if not failed else ""))
@@ -140,7 +140,7 @@ def _finite(drives: Sequence[Drive]) -> Finding:
 
 
 def _bounded(drives: Sequence[Drive]) -> Finding:
-    instances = course()
+    instances = scenarios()
     for drive in drives:
         bounds = instances[drive.name].problem.car.bounds
         for tick, command in enumerate(drive.commands):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from threading import Event, Thread
 
 from dubins_traffic.checkup.passes import DEADLINE, ERRORS, PATIENCE, Drive, Pass, driven
-from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Waited, ended, see_off
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.protocols import End, Transport
@@ -53,7 +53,7 @@ class NotingLink(Link):
     @property
     def answers(self) -> list[float]:
         """Seconds after which each frame of the trial was answered."""
-        return list(self._answers[EGO_NAME])
+        return list(self._punctuality.answers[EGO_NAME])
 
 
 def run_over(over: str, command: str) -> tuple[Pass, Pass]:
@@ -82,7 +82,7 @@ def run_over(over: str, command: str) -> tuple[Pass, Pass]:
 
 
 def _run(link: NotingLink, maestro: Maestro, command: str, environment: Mapping[str, str]) -> Pass:
-    instances = course()
+    instances = scenarios()
     names, drives, lost = list(instances), list[Drive](), ""
     program = _start(command, environment)
     watch = _Watch(program, link.inbox)

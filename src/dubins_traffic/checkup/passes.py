@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, sleep
 
 from dubins_traffic.cars.state import Command, Observation
-from dubins_traffic.checkup.scenarios import course
+from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Place, Waited, ended, see_off
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.problem.instance import Problem
@@ -131,7 +131,7 @@ def run_here(controller: str, number: int) -> Pass:
                         child.kill()
                     status = child.wait()
             drives = [Drive(**json.loads(line)) for line in out.read_text(encoding="utf-8").splitlines()]
-            if len(drives) == len(course()):
+            if len(drives) == len(scenarios()):
                 return Pass(drives, farewell or ("" if status == 0 else f"the process {ended(status)}"))
             lost = lost or f"the process {ended(status)}"
             died = None if reached.trial != len(drives) else _died(reached, lost)
@@ -140,7 +140,7 @@ def run_here(controller: str, number: int) -> Pass:
 
 def _died(reached: Place, lost: str) -> Drive:
     """Return the trial in which the process died."""
-    name, tick = list(course())[reached.trial], reached.tick
+    name, tick = list(scenarios())[reached.trial], reached.tick
     where = "before its first answer" if tick < 0 else f"at tick {tick}"
     begin = reached.begin if tick >= 0 else None
     return Drive(name, DIED, f"{where}: {lost}", max(0, tick), begin, [], [])
@@ -151,7 +151,7 @@ def _await(child: subprocess.Popen[bytes], out: Path, reached: Place) -> str:
 
     As long as trials go on, nobody is hurried; before the first, the kernels are compiled.
     """
-    whole = len(course())
+    whole = len(scenarios())
     waited, seen = Waited(child.pid), (0, -1, -1)
     while child.poll() is None and seen[0] < whole:
         sleep(0.05)
@@ -165,7 +165,7 @@ def _await(child: subprocess.Popen[bytes], out: Path, reached: Place) -> str:
 
 
 def _main(controller: str, out: str, place: str) -> None:
-    instances = course()
+    instances = scenarios()
     rehearsal = replace(next(iter(instances.values())), duration=REHEARSAL)
     run_trial(rehearsal, controllers.load(controller))  # what is compiled on a first run is not measured
     with Place.opened(Path(place)) as reached, Path(out).open("a", encoding="utf-8") as file:

@@ -21,7 +21,7 @@ TREE = {
 ROAD = {"length": 4, "transform": [0, 0, 0], "shape": [1, 2], "segments": [[0, 0, 1, 0]]}
 TURNED = {"length": 3.5, "transform": [-4.2, 1.7, 0.6], "shape": [3, 3]}
 
-_COURSE: Mapping[str, Mapping[str, Any]] = {
+_SCENARIOS: Mapping[str, Mapping[str, Any]] = {
     "two goals and two e-agents": {"rnd": GRID, "number_goals_bounds": [2, 2], "e-agents": WANDERERS},
     "one goal": {"rnd": GRID, "number_goals_bounds": [1, 1], "e-agents": WANDERERS},
     "four goals": {"rnd": GRID, "number_goals_bounds": [4, 4], "e-agents": WANDERERS},
@@ -32,7 +32,7 @@ _COURSE: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def course() -> Mapping[str, Instance]:
+def scenarios() -> Mapping[str, Instance]:
     """Return the instances by name, always the same."""
     common: dict[str, Any] = {
         "version": 0,
@@ -42,7 +42,7 @@ def course() -> Mapping[str, Instance]:
         "e-agents": [],
     }
     made: dict[str, Instance] = {}
-    for number, (name, own) in enumerate(_COURSE.items()):
+    for number, (name, own) in enumerate(_SCENARIOS.items()):
         document = {**common, **own, "rnd": {"version": 0, **own["rnd"]}}
         document["e-agents"] = list(document["e-agents"])
         made[name] = draw(load_config(document), 1, number)

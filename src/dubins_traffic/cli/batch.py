@@ -53,6 +53,7 @@ def batch(
     overwrite: options.Overwrite = False,
     append: options.Append = False,
     shield: options.Shield = False,
+    metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
     """Run many trials together and score them: the same scores as of [b]run[/b], much sooner.
@@ -79,6 +80,7 @@ def batch(
         records=records,
         overwrite=overwrite,
         append=append,
+        metrics=metric or (),
     )
     try:
         with faults.no_silent_end(), progress(count) as tell:

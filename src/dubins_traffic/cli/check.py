@@ -93,7 +93,8 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
         sensed = "within" if excuse.sensed else "beyond"
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
         near = "each" if verdict.near else "not each"
-        console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
+        part = f"{excuse.assumption} ({excuse.clause})"
+        console.print(f"  excused by {part}: {first}, {sensed} the sensing radius", markup=False)
         console.print(f"  {near} breach of the ego follows one near it", markup=False)
     margins = [f"{rule} {value:.3f} m" for rule, value in verdict.robustness.items() if value is not None]
     if margins:
@@ -101,14 +102,15 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
 
 
 def _breaches(verdict: Verdict) -> Table:
-    """Return the breaches as a table."""
+    """Return the breaches as a table; `clause` is where the rule is stated."""
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
-    for heading in ("time", "since", "car", "rule", "x", "y"):
-        table.add_column(heading, justify="left" if heading in ("car", "rule") else "right", no_wrap=True)
+    for heading in ("time", "since", "car", "rule", "x", "y", "clause"):
+        left = heading in ("car", "rule", "clause")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=True)
     for entry in verdict.violations:
         x, y = f"{entry.where.x:.2f}", f"{entry.where.y:.2f}"
-        table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y)
+        table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y, entry.clause)
     return table

@@ -14,11 +14,11 @@ from dubins_traffic.errors import InputError
 EXAMPLES = options.examples(
     "convert town.json -o town.rnd",
     "convert town.json -o town.sdf --sdf 1.9",
+    "convert corner.grid -o town.json --map-format my_format.py:GridMap",
     "convert out/trial-0000.mcap -o trial.csv",
     "convert out/trial-0000.mcap -o trial.parquet",
     "convert out/trial-0000.mcap -o trial.bag",
 )
-CONTAINERS = (".json", ".rnd", ".txt")
 WORLD = ".sdf"
 
 
@@ -43,6 +43,14 @@ def convert(
             "--sdf", help="Version of a world for Gazebo: 1.6 for 11 and older, 1.9 for newer ones."
         ),
     ] = Sdf.CLASSIC,
+    map_format: Annotated[
+        str | None,
+        typer.Option(
+            "--map-format",
+            metavar="F",
+            help="A further map format, module:Class or path/to/file.py:Class, to read FILE or write the output.",
+        ),
+    ] = None,
 ) -> None:
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
@@ -57,6 +65,7 @@ def convert(
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
+    from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.runs.sources import load
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
@@ -70,7 +79,8 @@ def convert(
         count = [f"{len(records)} trials, {len(records)} records:"] if len(records) > 1 else []
         options.tell(*count, *map(str, records))
         return
-    found = load(file)
+    form = None if map_format is None else formats.load(map_format)
+    found = load(file, map_format=form)
     suffix = Path(output).suffix.lower()
     if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
         write_sdf(found.instance if isinstance(found, Record) else found, output, Version(sdf.value))
@@ -80,12 +90,12 @@ def convert(
     elif isinstance(found, Record):
         export(found, output)
     elif isinstance(found, RoadNetwork):
-        if suffix not in CONTAINERS:
-            expected = f"a suffix of {', '.join((*CONTAINERS, WORLD))}"
+        if formats.of_suffix(output, form) is None:
+            expected = f"a suffix of {', '.join((*formats.suffixes(form), WORLD))}"
             raise InputError(
                 "not a container of road networks", file=output, value=Path(output).suffix, expected=expected
             )
-        found.write(output)
+        found.write(output, form)
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
     options.tell(output)

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from dubins_traffic.runs.catalogue import Entry, Parameter
 
-EXAMPLES = options.examples("list agents", "list rules", "list configurations --json", "list controllers")
+EXAMPLES = options.examples(
+    "list agents", "list rules", "list configurations --json", "list controllers", "list metrics"
+)
 WIDTH = 100
 """Columns of what is listed."""
 
@@ -27,6 +29,8 @@ class Subject(StrEnum):
     AGENTS = "agents"
     CONFIGURATIONS = "configurations"
     CONTROLLERS = "controllers"
+    MAP_FORMATS = "map-formats"
+    METRICS = "metrics"
     RULES = "rules"
     SIMULATORS = "simulators"
 
@@ -45,7 +49,7 @@ def listing(
         else:
             _print_parameters(rules, "")
         return
-    entries: Sequence[Entry] = getattr(catalogue, subject.value)()
+    entries: Sequence[Entry] = getattr(catalogue, subject.value.replace("-", "_"))()
     if json:
         _print_json(subject, [entry.to_json() for entry in entries])
         return

@@ -17,20 +17,19 @@ from dubins_traffic.cli import (
     faults,
     gazebo,
     instance,
-    lcm,
-    lines,
     listing,
+    messages,
     network,
     plot,
     replay,
-    ros1,
-    ros2,
     run,
     score,
+    session,
     spec,
     synth,
     verify,
 )
+from dubins_traffic.sessions.registry import TRANSPORTS
 
 app = typer.Typer(
     name=faults.PROGRAM,
@@ -77,11 +76,12 @@ app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
-app.add_typer(ros1.app, name="ros1")
+transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items()}
+transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
+transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)
 app.add_typer(gazebo.app, name="gazebo")
-app.add_typer(lcm.app, name="lcm")
-app.add_typer(ros2.app, name="ros2")
-app.add_typer(lines.app, name="lines")
+for name, transport in transports.items():
+    app.add_typer(transport, name=name)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
 

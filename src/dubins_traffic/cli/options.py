@@ -39,6 +39,13 @@ def simulators(incomplete: str) -> Sequence[str]:
     return [name for name in names() if name.startswith(incomplete)]
 
 
+def metrics(incomplete: str) -> Sequence[str]:
+    """Complete the name of a metric."""
+    from dubins_traffic.scoring.registry import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
 Config = Annotated[
     str,
     typer.Argument(
@@ -57,6 +64,15 @@ Shield = Annotated[
     bool,
     typer.Option(
         "--shield", help="Change the ego's commands as little as needed for it to keep rules 1 to 3."
+    ),
+]
+Metrics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--metric",
+        metavar="M",
+        help="A further metric: its name, module:Class or path/to/file.py:Class; may be given several times.",
+        autocompletion=metrics,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]

@@ -81,6 +81,7 @@ def run(
         bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
     ] = False,
     shield: options.Shield = False,
+    metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
@@ -106,6 +107,7 @@ def run(
         simulator=simulator,
         show=gui,
         shield=shield,
+        metrics=metric or (),
     )
     results: list[Result] = []
     lost: WorkerLostError | None = None

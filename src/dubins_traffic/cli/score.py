@@ -8,13 +8,16 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("score out/*.mcap", "score out/trial-0000.mcap --json")
+EXAMPLES = options.examples(
+    "score out/*.mcap", "score out/trial-0000.mcap --json", "score out/*.mcap --metric time_to_collision"
+)
 
 
 def score(
     records: Annotated[
         list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
     ],
+    metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
     """Score recorded trials, with the same code as `run` does live."""
@@ -23,4 +26,5 @@ def score(
     from dubins_traffic.scoring.score import ScoreSheet
     from dubins_traffic.scoring.score import score as score_record
 
-    show(ScoreSheet(tuple(score_record(load_record(record)) for record in records)), json=json)
+    scores = (score_record(load_record(record), metric or ()) for record in records)
+    show(ScoreSheet(tuple(scores)), json=json)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import wraps
 from inspect import Parameter, Signature, signature
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -13,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
     from dubins_traffic.runs.single import Result
     from dubins_traffic.sessions.plan import Pace, SessionPlan
+    from dubins_traffic.sessions.registry import Option, TransportEntry
 
 Controller = Annotated[
     str | None,
@@ -51,13 +52,9 @@ Silence = Annotated[
     float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
 ]
 
-Clock = Annotated[
-    bool, typer.Option("--clock", help="Publish /clock, and stamp messages with simulated time.")
-]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class SessionOptions:
     """What the options say that all of these commands share."""
 
     source: options.Source
@@ -80,7 +77,7 @@ class Asked:
     shield: options.Shield = False
     json: options.Json = False
 
-    def session_plan(self, simulator: str | None = None) -> SessionPlan:
+    def session_plan(self) -> SessionPlan:
         """Return what the session shall run."""
         from dubins_traffic.sessions.plan import session_plan
 
@@ -88,7 +85,7 @@ class Asked:
             self.source, self.controller, trials=self.trials, endless=self.endless, seed=self.seed, rnd=self.rnd,
             remote=self.remote or (), data=options.trial_data(self.data, self.data_over),
             overwrite_data=self.data is None, records=self.records, overwrite=self.overwrite, append=self.append,
-            simulator=simulator, shield=self.shield,
+            shield=self.shield,
         )  # fmt: skip
         return replace(todo, say=faults.tell)
 
@@ -101,27 +98,58 @@ class Asked:
         return Pace(self.lockstep, self.factor, self.deadline, patience)
 
 
-def shared(own: Callable[..., None]) -> Callable[..., None]:
-    """Return a command with the options of `own`, but for its first parameter, and those of `Asked`, which it is given.
+def app(name: str, entry: TransportEntry) -> typer.Typer:
+    """Return the command of a transport, with its `run`."""
+    made = typer.Typer(help=entry.line, no_args_is_help=True)
+    settings = {"allow_extra_args": True} if entry.remappings else None
+    made.command("run", epilog=options.examples(*entry.examples), context_settings=settings)(
+        command(name, entry)
+    )
+    return made
 
-    The library reads options off a signature, so this makes one.
+
+def command(name: str, entry: TransportEntry) -> Callable[..., None]:
+    """Return the function that runs a session over a transport, with its own options and those of `SessionOptions`.
+
+    `own` is given these as its first argument. The library reads options off a signature, so this makes one.
     """
 
-    @wraps(own)
-    def command(**given: Any) -> None:
-        asked = Asked(**{name: given.pop(name) for name in hints})
-        own(asked, **given)
+    def run(**given: Any) -> None:
+        context: typer.Context = given.pop("context")
+        asked = SessionOptions(**{name: given.pop(name) for name in hints})
+        _check_remappings(name, context.args)
+        todo = asked.session_plan()
+        run_session(todo, entry.runner(todo, asked.pace(), **given), json=asked.json)
 
-    hints = get_type_hints(Asked, include_extras=True)
-    own_hints = get_type_hints(own, include_extras=True)
-    _, *rest = signature(own).parameters.values()
+    hints = get_type_hints(SessionOptions, include_extras=True)
     parameters = [
-        *(one.replace(kind=Parameter.KEYWORD_ONLY, annotation=own_hints[one.name]) for one in rest),
-        *(one.replace(annotation=hints[one.name]) for one in signature(Asked).parameters.values()),
+        Parameter("context", Parameter.KEYWORD_ONLY, annotation=typer.Context),
+        *map(_parameter, entry.options),
+        *(one.replace(annotation=hints[one.name]) for one in signature(SessionOptions).parameters.values()),
     ]
-    command.__signature__ = Signature(parameters)  # pyright: ignore[reportAttributeAccessIssue]
-    command.__annotations__ = {one.name: one.annotation for one in parameters}
-    return command
+    run.__doc__ = entry.about
+    run.__signature__ = Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    return run
+
+
+def _parameter(own: Option) -> Parameter:
+    """Return an option of a transport as the library wants it."""
+    kind: Any = own.kind if own.default is not None else own.kind | None
+    shown: Any = {} if own.shown is None else {"show_default": own.shown}
+    said = typer.Option(own.flag, metavar=own.metavar, min=own.low, max=own.high, help=own.help, **shown)
+    return Parameter(
+        own.parameter, Parameter.KEYWORD_ONLY, default=own.default, annotation=Annotated[kind, said]
+    )
+
+
+def _check_remappings(name: str, arguments: list[str]) -> None:
+    """Let what roslaunch adds to a command line pass: `__name:=...`, `__log:=...`."""
+    for argument in arguments:
+        if ":=" not in argument:
+            raise InputError(
+                "not an argument", file=f"{name} run", value=argument, expected="name:=value at most"
+            )
 
 
 def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> None:

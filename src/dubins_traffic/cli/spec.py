@@ -80,9 +80,9 @@ def spec(
         raise error.within(file=instance) from None
     wanted = _part(whole, assumption)
     if format is None:
-        text = _own(wanted, " &&\n" if found.problem.rules else " && ")
+        text = _in_our_syntax(wanted, " &&\n" if found.problem.rules else " && ")
     else:
-        text = _told(wanted, format, period or found.problem.period, instance)
+        text = _in_language(wanted, format, period or found.problem.period, instance)
     options.write(text if text.endswith("\n") else text + "\n", output)
 
 
@@ -110,7 +110,7 @@ def _part(whole: Specification, assumption: bool | None) -> Specification:
     return type(whole)(assumptions, guarantees, inputs, tuple(name for name in whole.outputs if name in used))
 
 
-def _own(spec: Specification, joint: str) -> str:
+def _in_our_syntax(spec: Specification, joint: str) -> str:
     """Return a specification in the syntax that we read ourselves, its conjuncts joined by `joint`."""
     from dubins_traffic.logic.printer import to_spin
 
@@ -122,7 +122,7 @@ def _own(spec: Specification, joint: str) -> str:
     return "(\n" + "\n) -> (\n".join(sides) + "\n)" if len(sides) == 2 else "".join(sides) or "true"
 
 
-def _told(spec: Specification, format: Format, period: float, source: str) -> str:
+def _in_language(spec: Specification, format: Format, period: float, source: str) -> str:
     """Return a specification in another tool's language.
 
     Raises

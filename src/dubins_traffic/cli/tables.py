@@ -14,6 +14,7 @@ from dubins_traffic.scoring.notice import assumption_notice
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from dubins_traffic.scoring import metric
     from dubins_traffic.scoring.formulas import FormulaVerdict
     from dubins_traffic.scoring.score import Score, ScoreSheet
 
@@ -187,7 +188,28 @@ def _ranked(scores: Scores) -> dict[str, list[Score]]:
 
 
 def _needed(scores: Scores) -> dict[str, Column]:
-    return {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
+    """Return the columns that some scores need: ours, then those of the metrics that were asked for."""
+    found = {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
+    names = dict.fromkeys(own.column for score in scores for own in score.metrics)
+    return {**found, **{column.short or column.label: _further(column) for column in names}}
+
+
+def _further(column: metric.Column) -> Column:
+    """Return what is shown of a further metric's column."""
+
+    def cell(score: Score) -> str:
+        found = {own.column: own.value for own in score.metrics}.get(column)
+        if found is None:
+            return "-"
+        if isinstance(found, bool):
+            return yes(found)
+        if isinstance(found, str):
+            return shown(found)
+        if column.unit == "share":
+            return f"{found:.1%}"
+        return f"{found:.4g} {column.unit}".rstrip()
+
+    return Column(cell)
 
 
 def _fitting(columns: dict[str, Column], sheet: ScoreSheet, room: int) -> dict[str, Column]:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import re
-import sys
-import zlib
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from types import ModuleType
-from typing import Any, cast
+from typing import cast
 
+from dubins_traffic import outside
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers import blame
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import is_file
+from dubins_traffic.outside import ConstructionError, Seam
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Controller
 
@@ -39,12 +35,14 @@ SHIELDED = "+shield"
 """What ends the name of a controller that drives under the shield (`controllers.shield`); behind it there may be a
 colon and when the ego may overtake, as in ``lanes+shield:never``."""
 _SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
-_OPTION = "--controller"
+_SEAM = Seam(
+    "--controller",
+    "controller",
+    ("start", "act"),
+    "start(problem) and act(observation) -> (speed, yaw rate)",
+    blame.told,
+)
 _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
-
-
-class ConstructionError(InputError):
-    """The class of a user's controller raised when it was to be made; the cause is what it raised."""
 
 
 class Unmade:
@@ -116,34 +114,9 @@ def load(spec: str) -> Controller:
         return cast(
             Controller, importlib.import_module("dubins_traffic.controllers.synthesized").player(spec)
         )
-    place, colon, name = spec.rpartition(":")
-    if not (colon and place and name.isidentifier()):
-        raise _refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))
-    module = _load_file(place, spec) if place.endswith(".py") else _load_module(place, spec)
-    maker = getattr(module, name, None)
-    if maker is None:
-        raise _refuse(f"no class {name} in {place}", spec, _offer(module))
-    if not callable(maker):
-        raise _refuse(f"{name} in {place} is not a class", spec, "a class without arguments")
-    try:
-        made = maker()
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise ConstructionError(
-            f"{name} raised {blame.told(error)} on construction",
-            file=_OPTION,
-            value=spec,
-            expected="a class without arguments",
-        ) from error
-    for method in ("start", "act"):
-        if not callable(getattr(made, method, None)):
-            raise _refuse(
-                f"{name} is not a controller: it lacks the method {method}",
-                spec,
-                "start(problem) and act(observation) -> (speed, yaw rate)",
-            )
-    return cast(Controller, made)
+    if not outside.is_place(spec):
+        raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))
+    return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))
 
 
 def is_shielded(spec: str) -> bool:
@@ -169,67 +142,3 @@ def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
     more = {} if given is None else {"overtakes": given}
     shield = importlib.import_module("dubins_traffic.controllers.shield").Shield
     return cast(Controller, shield(controller, **more))
-
-
-def _load_file(place: str, spec: str) -> ModuleType:
-    path = Path(place).expanduser()
-    if not is_file(path):
-        raise _refuse(f"no such file: {place}", spec, "path/to/file.py:Class")
-    path = path.resolve()
-    label = f"_controller_{path.stem}_{zlib.crc32(str(path).encode()):x}"
-    found = importlib.util.spec_from_file_location(label, path)
-    if found is None or found.loader is None:
-        raise _refuse(f"not a Python file: {place}", spec, "path/to/file.py:Class")
-    module = importlib.util.module_from_spec(found)
-    sys.modules[label] = module
-    _look_in(str(path.parent))
-    try:
-        found.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        del sys.modules[label]
-        raise _refuse(
-            f"{place} raised {blame.told(error)} while it was loaded", spec, "a file that loads"
-        ) from error
-    return module
-
-
-def _load_module(place: str, spec: str) -> ModuleType:
-    _look_in(str(Path.cwd()))
-    importlib.invalidate_caches()
-    try:
-        return importlib.import_module(place)
-    except ModuleNotFoundError as error:
-        if error.name is not None and (place == error.name or place.startswith(error.name + ".")):
-            raise _refuse(
-                f"no module {place}", spec, "module:Class that can be imported from here"
-            ) from error
-        raise _refuse(
-            f"{place} raised {blame.told(error)} while it was loaded", spec, "a module that loads"
-        ) from error
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise _refuse(
-            f"{place} raised {blame.told(error)} while it was loaded", spec, "a module that loads"
-        ) from error
-
-
-def _look_in(folder: str) -> None:
-    if folder not in sys.path:
-        sys.path.append(folder)
-
-
-def _offer(module: ModuleType) -> str:
-    members: dict[str, Any] = vars(module)
-    found = sorted(
-        name
-        for name, value in members.items()
-        if isinstance(value, type) and callable(getattr(value, "act", None))
-    )
-    return f"one of {', '.join(found)}" if found else "a class with the methods start and act"
-
-
-def _refuse(problem: str, spec: str, expected: str) -> InputError:
-    return InputError(problem, file=_OPTION, value=spec, expected=expected)

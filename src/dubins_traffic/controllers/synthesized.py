@@ -48,7 +48,7 @@ STRATEGY_RESUMED: Final = "strategy_resumed"
 
 
 @dataclass
-class _Course:
+class _Pursuit:
     """What the ego seeks, and what it is told.
 
     `ways` (M, L) are the metres from each lane to the goal of each stage, at that goal already to the next; `goals` are
@@ -85,13 +85,13 @@ class Synthesized(Rules):
     def __init__(self, strategy: Strategy | None = None) -> None:
         super().__init__()
         self._strategy = strategy
-        self._course: _Course | None = None
+        self._pursuit: _Pursuit | None = None
         self._shield_filter = ShieldFilter(overtakes="law")
 
     def start(self, problem: Problem) -> None:
         """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
         super().start(problem)
-        self._course = None
+        self._pursuit = None
         drivers = self._drivers
         if drivers is None or not problem.e_agents:
             return
@@ -103,7 +103,7 @@ class Synthesized(Rules):
         self._patience = (rules.forfeit_time - HURRY) * problem.rate
         arena = strategy.board.arena
         vertices: list[int] = drivers.stage.tolist()
-        self._course = _Course(
+        self._pursuit = _Pursuit(
             strategy,
             RoadPlay(strategy.board, _sight(problem), ("ego", *problem.e_agents)),
             _ways(drivers, [arena.network.arms(v) for v in vertices]),
@@ -119,89 +119,89 @@ class Synthesized(Rules):
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
-        course = self._course
-        if course is None:
+        pursuit = self._pursuit
+        if pursuit is None:
             return super().act(observation)
-        self._follow(course, observation)
+        self._follow(pursuit, observation)
         command = super().act(observation)
-        if not course.wins:
-            return self._guarded(course, observation, command)
-        return self._waiting(course, observation, command)
+        if not pursuit.wins:
+            return self._guarded(pursuit, observation, command)
+        return self._waiting(pursuit, observation, command)
 
     @property
     def play(self) -> RoadPlay | None:
         """The play that is followed; None where there is no game, without goals or other cars."""
-        return None if self._course is None else self._course.play
+        return None if self._pursuit is None else self._pursuit.play
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what the play has come upon since the last call."""
-        if self._course is None or not self._course.reports:
+        if self._pursuit is None or not self._pursuit.reports:
             return ()
-        found, self._course.reports = self._course.reports, []
+        found, self._pursuit.reports = self._pursuit.reports, []
         return found
 
-    def _follow(self, course: _Course, seen: Observation) -> None:
+    def _follow(self, pursuit: _Pursuit, seen: Observation) -> None:
         """Bring the play up to date, and ask the strategy if anything has changed."""
         cars = [Sighting(EGO, seen.pose, seen.propositions)]
         cars += [Sighting(car.index, car.pose, car.propositions) for car in seen.others]
-        changed = course.play.follow(seen.tick, cars)
-        if course.stage == NO_STAGE:
+        changed = pursuit.play.follow(seen.tick, cars)
+        if pursuit.stage == NO_STAGE:
             lane, segment = seen.propositions.lane, seen.propositions.segment
-            course.stage = nearest_stage(course.ways, 0, len(course.ways), lane, segment)
-        elif seen.propositions.at == course.vertices[course.stage]:
-            course.stage = (course.stage + 1) % len(course.goals)
+            pursuit.stage = nearest_stage(pursuit.ways, 0, len(pursuit.ways), lane, segment)
+        elif seen.propositions.at == pursuit.vertices[pursuit.stage]:
+            pursuit.stage = (pursuit.stage + 1) % len(pursuit.goals)
         elif not changed:
             return
-        course.reports += course.play.noted
-        course.play.noted.clear()
-        self._ask(course, seen)
+        pursuit.reports += pursuit.play.noted
+        pursuit.play.noted.clear()
+        self._ask(pursuit, seen)
 
-    def _ask(self, course: _Course, seen: Observation) -> None:
+    def _ask(self, pursuit: _Pursuit, seen: Observation) -> None:
         """Ask the strategy, and let the law take the way that it likes best."""
         drivers = self._drivers
         assert drivers is not None
-        stages = len(course.goals)
-        goal, following = course.goals[course.stage], course.goals[(course.stage + 1) % stages]
-        position = course.play.position
+        stages = len(pursuit.goals)
+        goal, following = pursuit.goals[pursuit.stage], pursuit.goals[(pursuit.stage + 1) % stages]
+        position = pursuit.play.position
         if position is not None:
-            self._note_wins(course, course.strategy.wins(position))
-        drivers.distance[0] = course.ways[course.stage]
-        course.advice = None
+            self._note_wins(pursuit, pursuit.strategy.wins(position))
+        drivers.distance[0] = pursuit.ways[pursuit.stage]
+        pursuit.advice = None
         if seen.propositions.crosses >= 0:
             return
-        course.advice = advise(course.strategy, course.play, goal, following)
-        if course.advice is None or not course.advice.exits:
+        pursuit.advice = advise(pursuit.strategy, pursuit.play, goal, following)
+        if pursuit.advice is None or not pursuit.advice.exits:
             return
         lane = seen.propositions.lane
-        node = course.strategy.board.arena.nodes[course.advice.node]
-        for place, out in enumerate(_liked(course.advice.exits, node.exits, drivers.distance[0])):
+        node = pursuit.strategy.board.arena.nodes[pursuit.advice.node]
+        for place, out in enumerate(_liked(pursuit.advice.exits, node.exits, drivers.distance[0])):
             back = BACK if out == lane ^ 1 and len(node.exits) > 1 else 0.0
             drivers.distance[0, out] = SECOND_BEST * place - back
             if place == 0 and drivers.car[0, EGO].lane == lane:
                 drivers.car[0, EGO].next_lane = out
 
     @staticmethod
-    def _note_wins(course: _Course, wins: bool) -> None:
-        if wins != course.wins:
-            course.wins = wins
-            course.reports.append((STRATEGY_RESUMED if wins else STRATEGY_LEFT, ""))
+    def _note_wins(pursuit: _Pursuit, wins: bool) -> None:
+        if wins != pursuit.wins:
+            pursuit.wins = wins
+            pursuit.reports.append((STRATEGY_RESUMED if wins else STRATEGY_LEFT, ""))
 
-    def _guarded(self, course: _Course, seen: Observation, command: Command) -> Command:
+    def _guarded(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
         """Return what the shield makes of a command."""
         given = self._shield_filter.filter(seen, command)
         found = self._shield_filter.intervention
         if found is not None:
-            course.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
+            pursuit.reports.append((SHIELD, told(found.asked, found.given, found.reason)))
         return given
 
-    def _waiting(self, course: _Course, seen: Observation, command: Command) -> Command:
+    def _waiting(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
         """Return the command of an ego that waits before the disc ahead, if it is told to and keeps its place."""
-        drivers, advice = self._drivers, course.advice
+        drivers, advice = self._drivers, pursuit.advice
         if advice is None or advice.enter or seen.propositions.crosses >= 0 or drivers is None:
             return command
         if drivers.car[0, EGO].turn > self._patience:
             return command
-        x, y = self._points[course.strategy.board.arena.nodes[advice.node].vertex]
+        x, y = self._points[pursuit.strategy.board.arena.nodes[advice.node].vertex]
         room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)
         if command.speed * self._period <= room:
             return command
@@ -227,7 +227,7 @@ def _sight(problem: Problem) -> Sight:
 
 
 def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
-    """Return `_Course.ways`."""
+    """Return `_Pursuit.ways`."""
     found = drivers.distance.copy()
     for stage, lanes in enumerate(arms):
         found[stage, list(lanes)] = drivers.distance[(stage + 1) % len(arms), list(lanes)]

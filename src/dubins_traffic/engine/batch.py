@@ -18,15 +18,17 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.batch_records import chosen, folder_of
 from dubins_traffic.engine.controlled import Maker, ask, grouped
 from dubins_traffic.engine.group import Group, Outcome
+from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
-from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
 from dubins_traffic.runs.record_folder import claim
 from dubins_traffic.runs.record_folder import name as record_name
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring import registry as scores
+from dubins_traffic.scoring.metric import Maker as MetricMaker
+from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.viewer.notebook import Sheeted
 
@@ -68,6 +70,7 @@ def run_batch(
     overwrite: bool = False,
     append: bool = False,
     progress: Progress | None = None,
+    metrics: Sequence[MetricSpec] = (),
 ) -> Batch:
     """Run trials of a configuration, `batch` at a time.
 
@@ -103,6 +106,9 @@ def run_batch(
         Whether they stay, and are not made again; they must be of the same controller and instances.
     progress : callable, optional
         Told how many trials have ended, each time.
+    metrics : sequence of str or callable
+        Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md). They
+        are shown every frame, so that no trial runs for several ticks without Python.
 
     Raises
     ------
@@ -112,7 +118,7 @@ def run_batch(
     found: list[Outcome] = []
     for outcome in run_each(
         configuration, controller, trials=trials, first=first, seed=seed, batch=batch, threads=threads, keep=keep,
-        records=records, overwrite=overwrite, append=append,
+        records=records, overwrite=overwrite, append=append, metrics=metrics,
     ):  # fmt: skip
         found.append(outcome)
         if progress is not None:
@@ -138,6 +144,7 @@ def run_each(
     records: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     append: bool = False,
+    metrics: Sequence[MetricSpec] = (),
 ) -> Iterator[Outcome]:
     """Run trials as `run_batch` does, and yield what came of each as it ends; nothing is kept of it here.
 
@@ -157,7 +164,8 @@ def run_each(
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = chosen(keep, count), folder_of(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
-    each = outcomes(instances, controller, batch=batch, threads=threads)
+    own_metrics = scores.makers(metrics)
+    each = outcomes(instances, controller, batch=batch, threads=threads, metrics=own_metrics)
     if folder is None:
         yield from each
         return
@@ -171,7 +179,7 @@ def run_each(
             elif record.name in there:
                 yield replace(outcome, score=replace(outcome.score, record=str(record)))
             else:
-                yield _recorded(outcome, controller, record)
+                yield _recorded(outcome, controller, record, own_metrics)
 
 
 def called(controller: str | Maker) -> str:
@@ -180,7 +188,12 @@ def called(controller: str | Maker) -> str:
 
 
 def outcomes(
-    instances: Iterable[Instance], controller: str | Maker = COMPILED, *, batch: int = 64, threads: int = 1
+    instances: Iterable[Instance],
+    controller: str | Maker = COMPILED,
+    *,
+    batch: int = 64,
+    threads: int = 1,
+    metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
     """Run trials of instances, `batch` at a time, and yield what came of each as it ends.
 
@@ -192,7 +205,9 @@ def outcomes(
     make()
     source = iter(instances)
     if controller != COMPILED:
-        yield from _apart(source, make, name, lambda rest: ask(rest, make, name, batch))
+        yield from _apart(
+            source, make, name, metrics, lambda rest: ask(rest, make, name, batch, metrics=metrics)
+        )
         return
     cancelled = Event()
     waiting: deque[Future[list[Outcome]]] = deque()
@@ -201,7 +216,7 @@ def outcomes(
         try:
             while True:
                 for taken in islice(groups, UNDER_WAY * threads - len(waiting)):
-                    waiting.append(pool.submit(_compiled_or_alone, taken, cancelled))
+                    waiting.append(pool.submit(_compiled_or_alone, taken, cancelled, metrics))
                 if not waiting:
                     return
                 yield from waiting.popleft().result()
@@ -226,7 +241,10 @@ def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[li
 
 
 def run_together(
-    instances: Sequence[Instance], controller: str, cancelled: Callable[[], bool]
+    instances: Sequence[Instance],
+    controller: str,
+    cancelled: Callable[[], bool],
+    metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
     """Run the trials of those instances that can be stepped together, and yield what came of each.
 
@@ -235,66 +253,60 @@ def run_together(
     KeyboardInterrupt
         When `cancelled`, which is asked every now and then.
     """
-    fit = _fitness()
-    able = [own for own in instances if _can_share(own) and (controller != COMPILED or fit(own))]
+    fit = fitness()
+    able = [own for own in instances if can_share(own) and (controller != COMPILED or fit(own))]
     if controller == COMPILED:
-        yield from _compiled(able, cancelled)
+        yield from _compiled(able, cancelled, metrics)
     else:
-        yield from ask(able, partial(controllers.load, controller), controller, ASKED, cancelled)
+        yield from ask(able, partial(controllers.load, controller), controller, ASKED, cancelled, metrics)
     if cancelled():
         raise KeyboardInterrupt
 
 
-def _compiled_or_alone(instances: Sequence[Instance], cancelled: Event) -> list[Outcome]:
+def _compiled_or_alone(
+    instances: Sequence[Instance], cancelled: Event, metrics: Sequence[MetricMaker]
+) -> list[Outcome]:
     """Run the trials of instances whose egos keep the rules."""
-    fit = _fitness()
-    able = [_can_share(instance) and fit(instance) for instance in instances]
+    fit = fitness()
+    able = [can_share(instance) and fit(instance) for instance in instances]
     alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
     together = [own for own, shares in zip(instances, able, strict=True) if shares]
     return [
-        *(_alone(own, _maker(COMPILED), COMPILED) for own in alone),
-        *_compiled(together, cancelled.is_set),
+        *(_alone(own, _maker(COMPILED), COMPILED, metrics) for own in alone),
+        *_compiled(together, cancelled.is_set, metrics),
     ]
 
 
-def _compiled(instances: Sequence[Instance], cancelled: Callable[[], bool]) -> Iterator[Outcome]:
-    for own in grouped([instance for instance in instances if _undisturbed(instance)]):
-        group = Group(own, keeps_rules=True)
+def _compiled(
+    instances: Sequence[Instance], cancelled: Callable[[], bool], metrics: Sequence[MetricMaker]
+) -> Iterator[Outcome]:
+    for own in grouped([instance for instance in instances if undisturbed(instance)]):
+        group = Group(own, keeps_rules=True, metrics=metrics)
         group.finish(cancelled)
         if not cancelled():
             yield from group.outcomes(range(len(own)), COMPILED)
-    asked = [instance for instance in instances if not _undisturbed(instance)]
+    asked = [instance for instance in instances if not undisturbed(instance)]
     if asked:
-        yield from ask(asked, partial(controllers.load, COMPILED), COMPILED, len(asked), cancelled)
-
-
-def _fitness() -> Callable[[Instance], bool]:
-    """Return a function that does as `_is_fit`, and looks at trials that are alike in this once."""
-    known: dict[tuple[float, ...], bool] = {}
-
-    def fit(instance: Instance) -> bool:
-        problem = instance.problem
-        own = problem.network, problem.rules, problem.car, instance.e_agents
-        key = *map(id, own), problem.intersection_radius
-        if key not in known:
-            known[key] = _is_fit(instance)
-        return known[key]
-
-    return fit
+        make = partial(controllers.load, COMPILED)
+        yield from ask(asked, make, COMPILED, len(asked), cancelled, metrics)
 
 
 def _apart(
-    source: Iterator[Instance], make: Maker, name: str, run: Callable[[Iterator[Instance]], Iterator[Outcome]]
+    source: Iterator[Instance],
+    make: Maker,
+    name: str,
+    metrics: Sequence[MetricMaker],
+    run: Callable[[Iterator[Instance]], Iterator[Outcome]],
 ) -> Iterator[Outcome]:
     """Run the trials that can't be stepped with others, and hand on the rest."""
     done: list[Outcome] = []
 
     def rest() -> Iterator[Instance]:
         for instance in source:
-            if _can_share(instance):
+            if can_share(instance):
                 yield instance
             else:
-                done.append(_alone(instance, make, name))
+                done.append(_alone(instance, make, name, metrics))
 
     for outcome in run(rest()):
         while done:
@@ -303,37 +315,18 @@ def _apart(
     yield from done
 
 
-def _can_share(instance: Instance) -> bool:
-    apart = any(agent.kind in (COUNTER, REMOTE) for agent in instance.e_agents)
-    return instance.simulator == "embedded" and not instance.problem.formulas and not apart
-
-
-def _is_fit(instance: Instance) -> bool:
-    """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
-    lawful = any(agent.kind in KEEP_RULES for agent in instance.e_agents)
-    try:
-        check_fit(instance.problem, owes=False)
-        if lawful:
-            check_fit(instance.problem, owes=True)
-    except InputError:
-        return False
-    return True
-
-
-def _undisturbed(instance: Instance) -> bool:
-    own = instance.disturbances
-    noise = own.position_noise > 0.0 or own.heading_noise > 0.0
-    return not noise and own.command_delay == 0 and own.command_loss == 0.0
-
-
-def _alone(instance: Instance, make: Maker, name: str) -> Outcome:
-    result = run_trial(instance, controllers.made(make), name=name)
+def _alone(instance: Instance, make: Maker, name: str, metrics: Sequence[MetricMaker]) -> Outcome:
+    result = run_trial(instance, controllers.made(make), name=name, metrics=metrics)
     return Outcome(instance, result.ending, result.score)
 
 
-def _recorded(outcome: Outcome, controller: str | Maker, record: Path) -> Outcome:
+def _recorded(
+    outcome: Outcome, controller: str | Maker, record: Path, metrics: Sequence[MetricMaker]
+) -> Outcome:
     """Run a trial once more for its record."""
     instance = outcome.instance
     driver = controllers.made(_maker(controller))
-    result = run_trial(instance, driver, record=record, overwrite=record.exists(), name=called(controller))
+    result = run_trial(
+        instance, driver, record=record, overwrite=record.exists(), name=called(controller), metrics=metrics
+    )
     return replace(outcome, ending=result.ending, score=result.score)

@@ -9,21 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
-from dubins_traffic.agents.tables import Agents, Scene
-from dubins_traffic.agents.tables import Workspace as AgentSpace
+from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import FULL, MOVED, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
 from dubins_traffic.cars.partners import Workspace
 from dubins_traffic.cars.rows import Rows
-from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.cars.state import EGO, Labels
+from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.breach_log import MOST, BreachLog, RefereeParameters, RefereeTables
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
@@ -59,15 +57,12 @@ class Progress(Tables):
     place: Floats
 
 
-class World(Tables):
+class World(Scene):
     """All tables of a batch."""
 
-    state: State
     cars: CarTable
-    obstacles: ObstacleTable
     rows: Rows
     work: Workspace
-    roads: RoadTable
     beside: ObstacleLanes
     rules: TableOf[TrialRules]
     terms: TableOf[RefereeParameters]
@@ -76,8 +71,6 @@ class World(Tables):
     breach_log: BreachLog
     drivers: Drivers
     scratch: Scratch
-    agents: Agents
-    space: AgentSpace
     tally: Tally
     progress: Progress
     spacing: Spacing
@@ -159,11 +152,9 @@ def _room(b: int, world: World) -> int:
 def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
     if own[DECIDED] != 0:
         return
-    if own[OTHERS] != 0:
-        scene = Scene(world.state, world.roads, world.obstacles, world.agents, world.space)
-        if not decide_others(b, tick, scene, commands):
-            own[STATUS] = NO_SIGHT
-            return
+    if own[OTHERS] != 0 and not decide_others(b, tick, world, commands):
+        own[STATUS] = NO_SIGHT
+        return
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy, deepcopy
 from dataclasses import replace
+from functools import partial
 from itertools import islice
-from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +16,16 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.controllers import blame
 from dubins_traffic.controllers.registry import made
 from dubins_traffic.engine.group import Group, Outcome
-from dubins_traffic.errors import ControllerError, InputError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.protocols import Controller, End, Reports
+from dubins_traffic.protocols import Controller, End
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
+from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.trial.disturbance import CommandLine
-from dubins_traffic.trial.endings import checked_command
-from dubins_traffic.trial.run import close, told
+from dubins_traffic.trial.seat import Seat, fault
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -73,80 +74,111 @@ class BatchController(Controller, Protocol):
 Maker = Callable[[], Controller]
 
 
-class _Seats:
-    """The egos of one group of trials."""
+class Controlled:
+    """The trials of one group and the controllers that drive their egos.
 
-    def __init__(self, instances: Sequence[Instance], make: Maker, shared: BatchController | None) -> None:
-        self.group = Group(instances, keeps_rules=False)
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial.
+    make : callable
+        Makes the controller of a trial.
+    shared : BatchController, optional
+        Drives the egos of all trials instead.
+
+    Attributes
+    ----------
+    group : Group
+        The trials.
+    """
+
+    def __init__(
+        self,
+        instances: Sequence[Instance],
+        make: Maker,
+        shared: BatchController | None,
+        metrics: Sequence[MetricMaker],
+    ) -> None:
+        self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
         self._senses = [Senses(instance) for instance in instances] if shared is None else []
-        self._views = [self._of_trial(b) for b in range(len(instances))]
-        self._drivers: list[Controller] = []
-        self._answer: object = None
-        self._begin: dict[int, float | None] = {}
-        self._latencies: list[list[float]] = [[] for _ in instances]
-        self._told = np.zeros(len(instances), dtype=bool)
-        self._reports: list[Callable[[], Sequence[tuple[str, str]]] | None] = []
+        self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
         self._interventions = [0] * len(instances)
+        self._told = np.zeros(len(instances), dtype=bool)
         self._trials = np.array([instance.trial for instance in instances])
+        self._look()
         if shared is not None:
-            problems = [instance.problem for instance in instances]
-            self._try(None, lambda: shared.start_batch(self._trials.tolist(), problems))
-            return
-        for b, instance in enumerate(instances):
-            self._seat(b, make, instance.problem)
+            try:
+                shared.start_batch(self._trials.tolist(), [instance.problem for instance in instances])
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                blame.show(error)
+                self.fail(error)
+        for b, (seat, instance) in enumerate(zip(self._seats, instances, strict=False)):
+            try:
+                seat.start(instance.problem)
+            except ControllerError as error:
+                self._end(b, error)
 
-    def _seat(self, b: int, make: Maker, problem: Problem) -> None:
-        """Make the controller of trial b and tell it the problem; what that raises is its fault."""
-        driver = made(make)
-        self._drivers.append(driver)
-        self._reports.append(driver.report if isinstance(driver, Reports) else None)
-        started = perf_counter()
-        if self._try(b, lambda: driver.start(problem)):
-            self._begin[b] = perf_counter() - started
+    def _look(self) -> None:
+        """Note what each ego is shown, and who hears what its controller reports."""
+        trials = range(len(self.group.instances))
+        self._views = [self._of_trial(b) for b in trials]
+        self._notes = [partial(self._hear, b) for b in trials]
+
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Controlled:
+        """Return forks of some trials, as `Group.fork` does; each goes on with a deep copy of its controller.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If one of the trials has ended, or one controller drives all.
+        """
+        if not self._seats:
+            raise DubinsTrafficError(
+                "a controller of whole batches can't go on twice: it knows trials by number"
+            )
+        twin = copy(self)
+        twin.group = self.group.fork(trials, seeds)
+        own: list[Any] = []
+        for b, instance in zip(trials, twin.group.instances, strict=True):
+            memo: dict[int, Any] = {id(self.group.instances[b]): instance}
+            own.append(deepcopy((self._lines[b], self._senses[b], self._seats[b]), memo))
+        twin._lines, twin._senses, twin._seats = map(list, zip(*own, strict=True))
+        twin._interventions = [self._interventions[b] for b in trials]
+        twin._told = np.zeros(len(trials), dtype=bool)
+        twin._trials = self._trials[list(trials)]
+        twin._look()
+        return twin
 
     def ask_each(self) -> None:
         """Let each ego's own controller choose its command."""
         group = self.group
         active: list[int] = group.active.tolist()
         for b in active:
-            tick = int(group.ticks[b])
-            seen = self._senses[b].observe(tick, *self._views[b])
-            driver = self._drivers[b]
-            started = perf_counter()
-            if not self._try(b, lambda driver=driver, seen=seen: driver.act(seen)):
-                continue
-            elapsed = perf_counter() - started
-            if not self._listen(b):
-                continue
-            self._latencies[b].append(elapsed)
-            if self._answer is None:
-                group.end(b, End.GAVE_UP, f"the controller gave up at tick {tick}")
-                continue
-            self.take(b, tick, self._answer)
-
-    def _listen(self, b: int) -> bool:
-        """Count how often a shield has stepped in; tell whether the trial goes on."""
-        report = self._reports[b]
-        if report is None:
-            return True
-        answer = self._answer
-        heard = self._try(b, lambda: told(report()))
-        if heard:
-            pairs = cast("Sequence[tuple[str, str]]", self._answer)
-            self._interventions[b] += sum(kind == SHIELD for kind, _ in pairs)
-        self._answer = answer
-        return heard
+            seen = self._senses[b].observe(int(group.ticks[b]), *self._views[b])
+            try:
+                command = self._seats[b].act(seen, self._notes[b])
+            except ControllerError as error:
+                self._end(b, error)
+            else:
+                self.take(b, seen.tick, command)
 
     def take(self, b: int, tick: int, command: object) -> None:
         """Let a command take effect, or end the trial if it is none."""
         try:
-            asked = checked_command(command, tick)
+            self.group.commands[b, EGO] = self._lines[b].take(tick, command)
         except ControllerError as error:
-            self.group.end(b, End.CONTROLLER_FAULT, error.detail)
-            return
-        line = self._lines[b]
-        self.group.commands[b, EGO] = asked if line.clear else line.carry(tick, asked)
+            self._end(b, error)
+
+    def _end(self, b: int, error: ControllerError) -> None:
+        self.group.end(b, End(error.reason), error.detail)
+
+    def _hear(self, b: int, kind: str, detail: str) -> None:
+        """Count how often a shield has stepped in, and tell the metrics of what a controller reports."""
+        self._interventions[b] += kind == SHIELD
+        self.group.note(b, kind, detail)
 
     def view(self, places: int) -> BatchView:
         """Return what a vectorised controller is shown of these trials, with `places` for cars."""
@@ -171,7 +203,7 @@ class _Seats:
     def fail(self, error: BaseException) -> None:
         """End all trials as a fault of their controller."""
         for b in self.group.active.tolist():
-            self.group.end(b, End.CONTROLLER_FAULT, blame.told(error, int(self.group.ticks[b])))
+            self._end(b, fault(error, int(self.group.ticks[b])))
 
     def step(self, controller: str) -> Iterator[Outcome]:
         """Take all trials to their next frame; yield what came of those that have ended."""
@@ -182,11 +214,14 @@ class _Seats:
         for b in ended:
             self._told[b] = True
             ending = self.group.endings[b]
-            if self._drivers and ending is not None:
-                self.group.endings[b] = close(self._drivers[b], ending)
-        for b, outcome in zip(ended, self.group.outcomes(ended, controller, self._begin), strict=True):
+            if self._seats and ending is not None:
+                self.group.endings[b] = self._seats[b].end(ending)
+        begin = {b: seat.begin for b, seat in enumerate(self._seats)}
+        for b, outcome in zip(ended, self.group.outcomes(ended, controller, begin), strict=True):
             score = replace(outcome.score, interventions=self._interventions[b])
-            yield replace(outcome, score=score, act_s=summary(self._latencies[b]))
+            yield replace(
+                outcome, score=score, act_s=summary(self._seats[b].latencies if self._seats else ())
+            )
 
     def _of_trial(self, b: int) -> tuple[State, Labels]:
         """Return the state and labels of trial b alone; they follow those of the group."""
@@ -195,22 +230,6 @@ class _Seats:
         whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
         return State(*reals, count=group.state.count[b : b + 1]), Labels(*whole)
 
-    def _try(self, b: int | None, call: Callable[[], object]) -> bool:
-        """Call a controller; what it raises is its fault and ends its trial, or all if it is that of all."""
-        try:
-            self._answer = call()
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            blame.show(error)
-            if b is None:
-                self.fail(error)
-            else:
-                detail = blame.told(error, int(self.group.ticks[b]))
-                self.group.end(b, End.CONTROLLER_FAULT, detail)
-            return False
-        return True
-
 
 def ask(
     instances: Iterable[Instance],
@@ -218,6 +237,7 @@ def ask(
     controller: str,
     batch: int,
     cancelled: Callable[[], bool] = lambda: False,
+    metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
     """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
 
@@ -233,11 +253,13 @@ def ask(
         Its name.
     batch
         How many trials run at a time.
+    metrics
+        What makes further metrics for a trial.
     """
     made = make()
     shared = made if isinstance(made, BatchController) else None
     waiting = iter(instances)
-    seats: list[_Seats] = []
+    seats: list[Controlled] = []
     while True:
         if cancelled():
             raise KeyboardInterrupt
@@ -246,7 +268,7 @@ def ask(
         for own in grouped(taken):
             if shared is not None:
                 _check_clear(own)
-            seats.append(_Seats(own, make, shared))
+            seats.append(Controlled(own, make, shared, metrics))
         if not seats:
             return
         if shared is None:
@@ -268,7 +290,7 @@ def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
     return list(groups.values())
 
 
-def _ask_all(seats: Sequence[_Seats], controller: BatchController) -> None:
+def _ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
     """Let one controller choose the commands of all egos."""
     seats = [own for own in seats if len(own.group.active)]
     if not seats:

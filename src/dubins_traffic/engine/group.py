@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +12,9 @@ import numpy as np
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
 from dubins_traffic.agents.lawful import pack_drivers
 from dubins_traffic.agents.tables import workspace as agent_workspace
-from dubins_traffic.cars.near import Spacing, spacing
+from dubins_traffic.cars.near import spacing
 from dubins_traffic.cars.rows import TOGETHER
-from dubins_traffic.cars.state import EGO, Contact, Labels, State
+from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
     COLLIDED,
     COURSE,
@@ -31,6 +32,9 @@ from dubins_traffic.engine.batch_kernel import (
     World,
     run_trials,
 )
+from dubins_traffic.engine.feed import Feed
+from dubins_traffic.engine.fork import world_of
+from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.tables import ROUND, scratch
@@ -46,6 +50,7 @@ from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
 from dubins_traffic.scoring.margins_kernel import margin_rules
+from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
@@ -56,7 +61,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 FRAMES = 16
-"""For how many frames in which all goes wrong there is room in the breach_log."""
+"""For how many frames of any trial in which all goes wrong there is room in the breach_log."""
 WORK = 500_000
 """Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
 
@@ -83,6 +88,8 @@ class Group:
         One a trial; with the embedded simulator, without formulas of the user's and without remote cars.
     keeps_rules : bool
         Whether the controller `rules` drives the egos, compiled; else `commands` says what they do.
+    metrics : sequence of callable
+        What makes further metrics; they are shown every frame, so the trials are taken tick by tick.
 
     Attributes
     ----------
@@ -94,7 +101,9 @@ class Group:
         How each trial has ended, None while it runs.
     """
 
-    def __init__(self, instances: Sequence[Instance], *, keeps_rules: bool) -> None:
+    def __init__(
+        self, instances: Sequence[Instance], *, keeps_rules: bool, metrics: Sequence[Maker] = ()
+    ) -> None:
         self.instances = tuple(instances)
         self._rate = instances[0].problem.rate
         problems = [instance.problem for instance in instances]
@@ -108,7 +117,8 @@ class Group:
         cars, obstacles, rows, work = simulator.tables
         terms, goals = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, goals)
-        breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * (MOST * places + 8)))
+        most = MOST * places + int((terms["goals_end"] - terms["goals_begin"]).max())
+        breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * most))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         apart = spacing(trials, places, rows.far - cars.reach)
@@ -117,17 +127,14 @@ class Group:
             self.state, roads, beside, rules, terms, labeller.labels, labeller.memory, breach_log, apart
         )
         self._world = World(
-            self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
-            labeller.memory, breach_log, pack_drivers(instances, places, net, rounds), scratch(places, segments),
-            pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
-            new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
-            apart, labelling, judging,
+            state=self.state, cars=cars, obstacles=obstacles, rows=rows, work=work, roads=roads, beside=beside,
+            rules=rules, terms=terms, labels=labeller.labels, memory=labeller.memory, breach_log=breach_log,
+            drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments),
+            agents=pack_agents(instances, places, net), space=agent_workspace(places, PAIRS, 2 * segments),
+            tally=new_tally(instances, net, places), progress=self._progress(len(work.contact), len(breach_log.row)),
+            spacing=apart, labelling=labelling, judging=judging,
         )  # fmt: skip
-        kinds, index = kinds_of(problems)
-        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-        self._margins = margin_rules(rules, [kind.period for kind in kinds], index)
-        numbers: list[int] = index.tolist()
-        self._rules = [rules[k] for k in numbers]
+        self._note_rules()
         self.labels: Labels = labeller.labels
         self.commands: Floats = np.zeros((trials, places, 2))
         self.endings: list[Ending | None] = [None] * trials
@@ -135,8 +142,55 @@ class Group:
         self._contacts: list[list[Contact]] = [[] for _ in instances]
         self._breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
+        self._feed = Feed(instances, places, metrics) if metrics else None
         self._run(self.active, 1)
         self._aim()
+
+    def _note_rules(self) -> None:
+        """Note the parameters of the rules, and what the margins follow from."""
+        kinds, index = kinds_of([instance.problem for instance in self.instances])
+        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+        self._margins = margin_rules(rules, [kind.period for kind in kinds], index)
+        numbers: list[int] = index.tolist()
+        self._rules = [rules[k] for k in numbers]
+
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Group:
+        """Return a group of forks of some trials, each of which goes on from its present frame by itself.
+
+        Parameters
+        ----------
+        trials : sequence of int
+            Numbers of trials of this group that have not ended. A trial may be named several times.
+        seeds : sequence of int, optional
+            From which each fork draws from here on; by default as its trial does, and then what comes of a fork equals
+            what comes of its trial, bit for bit.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If one of the trials has ended.
+        """
+        ended = [b for b in trials if not self._going[b]]
+        if ended:
+            raise DubinsTrafficError(f"trial {ended[0]} of the group has ended: nothing goes on")
+        taken = np.array(trials, dtype=np.int64)
+        seed = None if seeds is None else np.array(seeds, dtype=np.uint64)
+        twin = copy(self)
+        twin.instances = tuple(
+            self.instances[b] if seeds is None else replace(self.instances[b], seed=seeds[k])
+            for k, b in enumerate(trials)
+        )
+        twin._world = world_of(self._world, taken, seed, 1.0 / self._rate)
+        twin.state, twin.labels = twin._world.state, twin._world.labels
+        twin.commands = self.commands[taken]
+        twin.endings = [None] * len(trials)
+        twin._going = np.ones(len(trials), dtype=bool)
+        twin._contacts = [list(self._contacts[b]) for b in trials]
+        twin._breaches = [list(self._breaches[b]) for b in trials]
+        twin._seen = [set(self._seen[b]) for b in trials]
+        twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
+        twin._note_rules()
+        return twin
 
     @property
     def ticks(self) -> Ints:
@@ -144,9 +198,9 @@ class Group:
         return self._world.progress.ints[:, TICK]
 
     @property
-    def spacing(self) -> Spacing:
-        """How far apart the cars are known to be."""
-        return self._world.spacing
+    def world(self) -> World:
+        """All tables of the group."""
+        return self._world
 
     @property
     def active(self) -> Ints:
@@ -167,7 +221,14 @@ class Group:
     def end(self, b: int, end: End, detail: str = "") -> None:
         """End trial b for a reason of its driver's."""
         self.endings[b] = Ending(end, int(self.ticks[b]), detail)
+        if end is not End.DURATION:
+            self.note(b, end.value, detail)
         self._going[b] = False
+
+    def note(self, b: int, kind: str, detail: str) -> None:
+        """Tell the metrics of trial b of an event of the ego's, at its present tick."""
+        if self._feed is not None:
+            self._feed.note(b, Event(int(self.ticks[b]), kind, EGO, detail))
 
     def outcomes(
         self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
@@ -188,6 +249,8 @@ class Group:
                 self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
                 self._rules[b], name, begin.get(b),
             )  # fmt: skip
+            if self._feed is not None:
+                score = replace(score, metrics=self._feed.result(b, ending, self._contacts[b]))
             found.append(Outcome(self.instances[b], ending, score))
         return found
 
@@ -214,6 +277,18 @@ class Group:
             own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
+        """Take trials up to `most` ticks farther, with the metrics that are shown every frame tick by tick."""
+        if self._feed is None:
+            self._carry(active, most)
+            return
+        for _ in range(most):
+            active = active[self._going[active]]
+            before = self.ticks[active].copy()
+            self._carry(active, 1)
+            moved = active[self.ticks[active] > before]
+            self._feed.push(moved, self.state, self.labels, self.commands, self._contacts)
+
+    def _carry(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most
         while len(active):
             left = int((goal - self.ticks[active]).max())

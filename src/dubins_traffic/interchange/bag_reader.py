@@ -15,6 +15,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Pose, State
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import begins_with
 from dubins_traffic.interchange.bags import INSTANCE, NOTES, PROBLEM, STATES, typestore
 from dubins_traffic.problem.document import instance_from_document
 from dubins_traffic.problem.files import parse_json
@@ -89,11 +90,7 @@ class _Bag:
 
 def is_bag(path: Path | str) -> bool:
     """Tell whether the file at `path` is a ROS 1 bag."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    return begins_with(path, MAGIC)
 
 
 def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = False) -> list[Path]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Pose, State
 from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.files import begins_with
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending, Sink
@@ -60,11 +61,7 @@ class _Log:
 
 def is_log(path: Path | str) -> bool:
     """Tell whether the file at `path` is a log of lcm-logger."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    return begins_with(path, MAGIC)
 
 
 def log_to_records(path: Path | str, output: Path | str, *, overwrite: bool = False) -> list[Path]:

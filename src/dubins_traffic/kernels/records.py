@@ -29,6 +29,8 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic.kernels.arrays import Ints
+
 R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 
@@ -48,8 +50,10 @@ class Rows(Protocol[R_co]):
     def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
     @overload
     def __getitem__(self, place: int | tuple[int, ...]) -> R_co: ...
-    def __getitem__(self, place: str | int | tuple[int, ...]) -> Any:
-        """Return the row at a place with a number for each axis, or a field of all rows as an array."""
+    @overload
+    def __getitem__(self, place: Ints) -> Rows[R_co]: ...
+    def __getitem__(self, place: str | int | tuple[int, ...] | Ints) -> Any:
+        """Return the row at a place with a number for each axis, a field of all rows as an array, or some rows."""
         ...
 
     def __setitem__(self, place: str | int | tuple[int, ...], value: Any) -> None:

@@ -35,7 +35,8 @@ class Tables:
     """Names of the arrays, in order."""
 
     def __init_subclass__(cls) -> None:
-        cls.field_names = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
+        own = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
+        cls.field_names = (*cls.field_names, *own)
 
     def __init__(self, *values: Any, **named: Any) -> None:
         fields = self.field_names

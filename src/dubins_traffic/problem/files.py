@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import decoded, is_stream, read_bytes, write_text
+from dubins_traffic.roads.formats.registry import is_map
 
 STANDARD_INPUT = "-"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -159,19 +160,10 @@ _CONFIGURATION_ONLY = frozenset({"number_trials", "duration_bounds", "number_goa
 
 
 def detect_text(text: str, file: str | None = None) -> Kind:
-    """Tell what a text is: a road network in the plain-text container, else as `detect`."""
-    if is_text_network(text):
+    """Tell what a text is: a road network in a map format that is no JSON, else as `detect`."""
+    if is_map(text):
         return Kind.NETWORK
     return detect(parse_json(text, file), file)
-
-
-def is_text_network(text: str) -> bool:
-    """Tell whether `text` is the plain-text container of a road network: ``key: value`` lines."""
-    for line in text.splitlines():
-        bare = line.split("#", 1)[0].strip()
-        if bare:
-            return bare[0] not in '{["' and ":" in bare
-    return False
 
 
 def _object(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:

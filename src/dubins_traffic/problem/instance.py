@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
@@ -59,8 +59,8 @@ class Problem(Pictured):
     """What a controller is told before a trial.
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
-    `rules` holds the parameters of RULES by name, empty where the rules are not to be judged; `formulas` the texts of
-    what is judged beside the task, by name.
+    `rules` holds the parameters of docs/rules.md by name, empty where the rules are not to be judged; `formulas` the
+    texts of what is judged beside the task, by name.
     """
 
     network: RoadNetwork
@@ -74,6 +74,10 @@ class Problem(Pictured):
     e_agents: tuple[str, ...]
     rules: Mapping[str, Any]
     formulas: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Return this very problem, which never changes."""
+        return self
 
     def __repr__(self) -> str:
         return f"<Problem: {self.summary}>"
@@ -118,6 +122,10 @@ class Instance(Pictured):
     end_on_collision: bool = False
     simulator: str = "embedded"
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Return this very instance, which never changes."""
+        return self
 
     def __repr__(self) -> str:
         return f"<Instance: {self.title}, {self.duration:g} s; {self.problem.summary}>"

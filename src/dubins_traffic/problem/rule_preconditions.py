@@ -1,4 +1,4 @@
-"""What a problem must give before rules 2 and 3 are defined on it (RULES, *Ground*)."""
+"""What a problem must give before rules 2 and 3 are defined on it (docs/rules.md#room)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def check_demands(
             "the rules are not defined here: sees too little",
             field="sensing_radius",
             value=sensing_radius,
-            expected=f"at least {sight:.6g} m, or rules: false",
+            expected=f"at least {sight:.6g} m, or rules: false (docs/rules.md#room)",
         )
     faults = clearance_faults(network, radius, reach, car.w, rules["segment_slack"])
     if faults:
@@ -55,6 +55,6 @@ def check_demands(
             f"the rules are not defined here: {first.problem}{more}",
             field=first.field,
             value=first.value,
-            expected=f"{first.expected}, or rules: false",
+            expected=f"{first.expected}, or rules: false (docs/rules.md#room)",
         )
         raise error.within(field=None if first.field == "intersection_radius" else "rnd")

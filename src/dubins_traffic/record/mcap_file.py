@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from itertools import accumulate
 from typing import BinaryIO, NamedTuple
 
@@ -52,6 +53,12 @@ class McapFile:
         self._chunks: list[ChunkIndex] = []
         self._counts: dict[int, int] = {}
         self._write(MCAP0_MAGIC, _packed([Header(profile="", library=library)]))
+
+    def fork(self, stream: BinaryIO) -> McapFile:
+        """Return the same file as far as it goes, whose copy in `stream` goes on by itself."""
+        twin = copy(self)
+        twin._stream, twin._chunks, twin._counts = stream, list(self._chunks), dict(self._counts)
+        return twin
 
     def register(self, topic: str, encoding: str, schema: tuple[str, str, bytes]) -> int:
         """Return a channel for messages of one kind, to be called before the first chunk.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from typing import BinaryIO
 
@@ -45,6 +47,12 @@ class RecordEncoder:
             form = (name, "ros1msg", definition.encode())
             self._channel[topic] = self._mcap.register(topic, "ros1", form)
         self._chunk({schema.HEADER: [Message(0, 0, self._head)]})
+
+    def fork(self, stream: BinaryIO) -> RecordEncoder:
+        """Return an encoder of the same record, whose copy in `stream` goes on by itself."""
+        twin = copy(self)
+        twin._stream, twin._mcap = stream, self._mcap.fork(stream)
+        return twin
 
     def frames(self, frames: Frames) -> None:
         """Write a block of frames as one chunk and flush it."""
@@ -103,6 +111,25 @@ class RecordWriter:
         self._encoder = RecordEncoder(self._file, head)
         with self._written():
             self._encoder.begin(instance)
+
+    def fork(self, path: Path | str, *, overwrite: bool = False) -> RecordWriter:
+        """Return a writer of the same record at another `path`, as far as it goes; it goes on by itself.
+
+        Raises
+        ------
+        InputError
+            If the file exists and may not be replaced, can't be made, or this record can't be read any more.
+        """
+        twin = RecordWriter(path, controller=self._controller, overwrite=overwrite)
+        with self._written():
+            before = self.path.open("rb")
+        with before:
+            file = twin._file = twin._open()
+            with twin._written():
+                shutil.copyfileobj(before, file)
+                file.flush()
+        twin._encoder = self._encoder.fork(file)
+        return twin
 
     def frames(self, frames: Frames) -> None:
         """Write a block of frames as one chunk and flush it to the file."""

@@ -1,4 +1,4 @@
-"""Room to judge rules 2 and 3: how far apart segments, intersections and arms must be (RULES, *Ground*)."""
+"""Room to judge rules 2 and 3: how far apart segments, intersections and arms must be (docs/rules.md#room)."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Tight(NamedTuple):
 
 
 def clearances(radius: float, reach: float, w: float, slack: float = SEGMENT_SLACK) -> Clearances:
-    """Return what RULES demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`.
+    """Return what docs/rules.md#room demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`.
 
     The roads of two arms that are 2 asin(2w / (R + rho)) apart or less overlap beyond the disc: a car would get from
     one to the other beside the all-way stop.

@@ -24,7 +24,7 @@ OUTLINES = (4.0, 2.0, 1.0, 0.5)
 Site = tuple[int, int]
 
 
-def weave(
+def draw_from_grid(
     draws: Draws, count: int, roads: int, least: Clearances
 ) -> tuple[list[Site], list[tuple[int, int]]]:
     """Return `count` lattice points and `roads` roads between them, as pairs of their numbers.

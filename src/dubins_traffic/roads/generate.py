@@ -9,7 +9,7 @@ from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.clearance import LEAST_RADIUS, ROUNDING, SEGMENT_SLACK, Clearances, clearances
 from dubins_traffic.roads.formats.rnd import extent
-from dubins_traffic.roads.from_grid import most_segments, spanning, weave
+from dubins_traffic.roads.from_grid import draw_from_grid, most_segments, spanning
 from dubins_traffic.roads.incremental import Sketch
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -66,7 +66,7 @@ def random_network(
     slack: float = SEGMENT_SLACK,
     rigid_motion: bool = False,
 ) -> RoadNetwork:
-    """Return a random planar, connected network that keeps the clearances of RULES, *Ground*.
+    """Return a random planar, connected network that keeps the clearances of docs/rules.md#room.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _draw(draws: Draws, count: int, roads: int, least: Clearances, minimum_angle
                     return sketch.points, sketch.roads
             largest = max(largest, len(sketch.roads))
     if grid:
-        return weave(draws, count, roads, least)
+        return draw_from_grid(draws, count, roads, least)
     problem = f"can't be placed at angles of at least {180.0 * minimum_angle / pi:.6g} degrees"
     raise InputError(
         problem, field="segments", value=roads, expected=f"at most {largest}, the most that were placed"

@@ -17,8 +17,12 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.checks import check
+from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
+from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.formats.rnd import Segment
+from dubins_traffic.roads.formats.rnd_json import write_json
+from dubins_traffic.roads.formats.rnd_text import write_lines
 from dubins_traffic.roads.routes import Routes, arms, shortest
 from dubins_traffic.roads.surface import Surface
 
@@ -91,6 +95,10 @@ class RoadNetwork(Pictured):
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
         return f"{found} on a {rows} x {columns} lattice"
 
+    def __deepcopy__(self, memo: object) -> RoadNetwork:
+        """Return this very network, which never changes."""
+        return self
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind, when pickled, what can be worked out again."""
         return {own.name: getattr(self, own.name) for own in fields(self)}
@@ -116,14 +124,17 @@ class RoadNetwork(Pictured):
             raise error.within(file=file) from None
 
     @classmethod
-    def from_text(cls, text: str, file: str | None = None) -> RoadNetwork:
-        """Return the network of an RND text in either container, JSON or plain text."""
-        return cls.from_document(rnd.parse(text, file), file)
+    def from_text(
+        cls, text: str, file: str | None = None, map_format: MapFormat | None = None
+    ) -> RoadNetwork:
+        """Return the network in a text, RND or any registered format by its content; `map_format` is that to use."""
+        form = map_format or formats.of_text(text)
+        return cls.from_document(formats.document(form, text, file), file)
 
     @classmethod
-    def read(cls, path: str | Path) -> RoadNetwork:
-        """Return the network in an RND file, JSON or plain text by its content; ``-`` is standard input."""
-        return cls.from_text(files.read_text(path), str(path))
+    def read(cls, path: str | Path, map_format: MapFormat | None = None) -> RoadNetwork:
+        """Return the network in a file, as `from_text`; ``-`` is standard input."""
+        return cls.from_text(files.read_text(path), str(path), map_format)
 
     def to_document(self) -> dict[str, Any]:
         """Return the RND document, version 0: segments written out, whole numbers as integers."""
@@ -138,16 +149,19 @@ class RoadNetwork(Pictured):
 
     def to_json(self) -> str:
         """Return the RND document as JSON text."""
-        return rnd.write_json(self.to_document())
+        return write_json(self.to_document())
 
     def to_text(self) -> str:
         """Return the RND document as plain text."""
-        return rnd.write_lines(self.to_document())
+        return write_lines(self.to_document())
 
-    def write(self, path: str | Path) -> None:
-        """Write an RND file, whole or not at all: JSON if its name ends in ``.json``, else plain text."""
-        json = Path(path).suffix.lower() == ".json"
-        files.write_text(path, self.to_json() if json else self.to_text())
+    def write(self, path: str | Path, map_format: MapFormat | None = None) -> None:
+        """Write a file, whole or not at all, in the format of its suffix; of one that is none's, plain text of RND.
+
+        `map_format` is asked before the registered ones.
+        """
+        form = formats.of_suffix(path, map_format)
+        files.write_text(path, self.to_text() if form is None else form.write(self.to_document()))
 
     @property
     def size(self) -> tuple[int, int]:

@@ -166,8 +166,8 @@ def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
 def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     """Return the round of free flow through `goals`: of a single one to the nearest other intersection and back.
 
-    Only another disc makes the next visit of a goal one (RULES, rule 1), and turning round in a disc is free. Through
-    several goals it is what `find_round` finds.
+    Only another disc makes the next visit of a goal one (docs/rules.md#visit), and turning round in a disc is free.
+    Through several goals it is what `find_round` finds.
     """
     distinct = tuple(dict.fromkeys(goals))
     if len(distinct) != 1:

@@ -1,4 +1,4 @@
-"""The breaches of E1 that an e-agent is allowed (RULES, *Exceptions*)."""
+"""The breaches of E1 that an e-agent is allowed (docs/rules.md#exceptions)."""
 
 from __future__ import annotations
 

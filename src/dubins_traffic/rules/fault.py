@@ -1,4 +1,4 @@
-"""Who is at fault in a collision (RULES, *Propositions*, at_fault)."""
+"""Who is at fault in a collision (docs/rules.md#at-fault)."""
 
 from __future__ import annotations
 

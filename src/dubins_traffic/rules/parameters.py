@@ -1,4 +1,4 @@
-"""The parameters of the rules of the road, with their defaults (RULES.md, values in <>)."""
+"""The parameters of the rules of the road, with their defaults (docs/rules.md, values in <>)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The flags in `Labels.bits`: the propositions of RULES that are true or false of one car at one frame.
+"""The flags in `Labels.bits`: the propositions of docs/rules.md that are true or false of one car at one frame.
 
 The flags of the queue refer to the crossing at the end of the lane of the car's lane state.
 """

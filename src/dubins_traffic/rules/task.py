@@ -1,6 +1,6 @@
-"""The task of a problem as formulas over named propositions (RULES, *phi_sys* and *phi_env*).
+"""The task of a problem as formulas over named propositions (docs/rules.md#phi_sys, docs/rules.md#phi_env).
 
-i stands for the name of a car, x and y for a lattice point. All mean what RULES says, at one frame:
+i stands for the name of a car, x and y for a lattice point. All mean what docs/rules.md says, at one frame:
 
 ====================================  =============================================================================
 ``i_t_x_y``                           at: the centre is in the disc, as the labels of 2016 say it
@@ -8,8 +8,8 @@ i stands for the name of a car, x and y for a lattice point. All mean what RULES
                                       another one
 ``free_x_y``                          no e-agent is at the goal
 ``collision_i``                       i has touched a car or an obstacle since the frame before
-``on_road_i`` ``left_i``              as in RULES
-``overtaking_i`` ``at_fault_i``       as in RULES
+``on_road_i`` ``left_i``              docs/rules.md#on-road, docs/rules.md#left
+``overtaking_i`` ``at_fault_i``       docs/rules.md#overtaking, docs/rules.md#at-fault
 ``enter_i_x_y`` ``clear_i_x_y``       i enters the crossing; no other car is in it
 ``stopped_i_x_y``                     i has stopped at the crossing
 ``ahead_i_x_y``                       i has stopped there, and somebody is before it in the order
@@ -22,8 +22,8 @@ i stands for the name of a car, x and y for a lattice point. All mean what RULES
 ====================================  =============================================================================
 
 Durations are the parameters of the problem. E6 is stated without its horizon, which only says how finite trials are
-judged, and without its pause: where the ego itself holds a goal closed for ever, the formula assumes more than RULES.
-A problem without rules has the task of 2016: every goal again and again.
+judged, and without its pause: where the ego itself holds a goal closed for ever, the formula assumes more than
+docs/rules.md#E6. A problem without rules has the task of 2016: every goal again and again.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
         always(negation(prop(f"collision_{ego}"))),
         always(implies(yesterday(on_road), on_road)),
         *visits,
-        *_conduct(ego, crossings, rules),
+        *_rules_2_and_3(ego, crossings, rules),
     ]
     assumptions = [formula for name in others for formula in _assumed(name, crossings, rules)]
     if rules.assume_e6:
@@ -116,7 +116,7 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
     return _specification(assumptions, guarantees, ego)
 
 
-def _conduct(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
+def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
     """Return rules 2 and 3 for a car."""
     left = prop(f"left_{name}")
     found = [
@@ -139,7 +139,7 @@ def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> li
     if rules.assume_e1 and rules.exceptions:
         found.append(always(negation(prop(f"excess_{name}"))))
     elif rules.assume_e1:
-        found += _conduct(name, crossings, rules)
+        found += _rules_2_and_3(name, crossings, rules)
     if rules.assume_e2:
         found.append(always(negation(prop(f"at_fault_{name}"))))
     if rules.assume_e3:

@@ -207,7 +207,7 @@ class Valuation:
 
 
 class _Visits:
-    """Finds the frames in which a car's visits of an intersection begin, block by block (RULES, rule 1).
+    """Finds the frames in which a car's visits of an intersection begin, block by block (docs/rules.md#visit).
 
     Parameters
     ----------

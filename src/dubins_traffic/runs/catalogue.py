@@ -17,7 +17,10 @@ from dubins_traffic.agents.registry import names as agent_names
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
+from dubins_traffic.roads.formats.registry import names as format_names
 from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.scoring.registry import columns
+from dubins_traffic.scoring.registry import names as metric_names
 from dubins_traffic.simulators.registry import names as simulator_names
 
 KEEP_E1: Final = KEEP_RULES | {COUNTER}
@@ -122,6 +125,20 @@ def controllers() -> tuple[Entry, ...]:
 def simulators() -> tuple[Entry, ...]:
     """Return the simulators."""
     return tuple(Entry(name, line) for name, line in simulator_names().items())
+
+
+def metrics() -> tuple[Entry, ...]:
+    """Return the metrics of this and other packages that are told where they are asked for, with what they tell."""
+    found: list[Entry] = []
+    for name, line in metric_names().items():
+        told = (f"{own.name}: {own.meaning or own.heading}" for own in columns([name]))
+        found.append(Entry(name, line, (), tuple(told)))
+    return tuple(found)
+
+
+def map_formats() -> tuple[Entry, ...]:
+    """Return the map formats of this and other packages."""
+    return tuple(Entry(name, line) for name, line in format_names().items())
 
 
 def _unit(name: str) -> str:

@@ -52,6 +52,7 @@ class Job:
     overwrite: bool = False
     deadline: float | None = None
     show: bool = False
+    metrics: tuple[str, ...] = ()
 
     def run(self, cancelled: Event | None = None) -> Result:
         """Run the job here; `cancelled` interrupts it after at most one simulated second."""
@@ -70,6 +71,7 @@ class Job:
             simulator=simulators.load(instance.simulator, show=self.show),
             sketch=False,
             name=self.controller,
+            metrics=self.metrics,
         )
 
     @property
@@ -148,10 +150,10 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
     finally:
         crew.close()
     if dead:
-        raise WorkerLostError(_told(dead, len(waiting) + len(suspects)))
+        raise WorkerLostError(_lost_jobs_text(dead, len(waiting) + len(suspects)))
 
 
-def _told(dead: Sequence[Job], left: int) -> str:
+def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
     """Return what is said of jobs that ended their processes, and of how many were not tried again for that."""
     named = ", ".join(job.called for job in dead[:MOST_NAMED])
     more = f" and {len(dead) - MOST_NAMED} more" if len(dead) > MOST_NAMED else ""

@@ -20,6 +20,7 @@ from dubins_traffic.runs.jobs import Job
 from dubins_traffic.runs.record_folder import check_choice, check_folder, claim, name
 from dubins_traffic.runs.single import Result
 from dubins_traffic.runs.sources import load
+from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.simulators import registry as simulators
 
@@ -72,6 +73,7 @@ def plan(
     simulator: str | None = None,
     show: bool = False,
     shield: bool = False,
+    metrics: Sequence[str] = (),
 ) -> Plan:
     """Return what is to be run, checked as far as can be before anything runs.
 
@@ -106,6 +108,8 @@ def plan(
         Whether the simulator shows the trials in a window of its own, at the pace of the clock.
     shield : bool
         Whether the controller drives under the shield (`controllers.shield`).
+    metrics : sequence of str
+        Further metrics: names, ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises
     ------
@@ -117,6 +121,7 @@ def plan(
         controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
     controller = controllers.shielded(controller) if shield else controller
     controllers.load(controller)
+    scores.columns(metrics)
     _check_deadline(deadline)
     check_choice(records, data, overwrite=overwrite, append=append)
     if isinstance(found, RoadNetwork):
@@ -141,7 +146,7 @@ def plan(
         )
     target = None if data is None else check_data_file(Path(data), overwrite_data)
     several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
-    whole = [replace(job, deadline=deadline, show=show) for job, _ in several]
+    whole = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job, _ in several]
     if records is None:
         return Plan(tuple(whole), configuration, target)
     folder = check_folder(records)

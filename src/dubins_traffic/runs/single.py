@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.display import Tabulated
 from dubins_traffic.errors import InputError
+from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
 from dubins_traffic.transports.drivers import LocalController, RemoteAgents, RemoteController
@@ -76,6 +78,77 @@ class Trial(BareTrial):
             watchers=() if link is None else (link,),
         )
 
+    def fork(
+        self, seed: int | None = None, *, record: Path | str | None = None, overwrite: bool = False
+    ) -> Self:
+        """Return a trial that goes on from the present frame by itself.
+
+        Driven alike it goes on to the bit as this one does, whichever of the two is stepped first. It has no
+        controller: drive it by `step`, or hand it one with `run`.
+
+        Parameters
+        ----------
+        seed : int, optional
+            From which all follows that is drawn from here on, the noise of the present observation too; what e-agents
+            have chosen before stays. By default that of the instance. A fork with another seed notes that as an event,
+            and its instance has that seed.
+        record : Path or str, optional
+            Where to write the record of the fork, from the first frame on; this trial must have a record, and
+            the seed be the same. By default a fork has none.
+        overwrite : bool
+            Whether an existing record may be replaced.
+
+        Returns
+        -------
+        Trial
+            Its `sinks` are copies of those of this trial that can go on twice (`protocols.Forks`): a `Scorer` can, and
+            what writes files does not.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If the trial has ended.
+        InputError
+            If something of the trial can't go on twice: another simulator, e-agents elsewhere; or its record can't.
+
+        Examples
+        --------
+        >>> import dubins_traffic as dt
+        >>> trial = dt.Trial(dt.draw(dt.load_config("demo"), seed=1, trial=0))
+        >>> fork = trial.fork()
+        >>> trial.step((0.5, 0.0)) == fork.step((0.5, 0.0))
+        True
+        """
+        if seed is not None:
+            check_numbers(seed, self.instance.trial)
+        writer = None if record is None else self._writer(seed)
+        twin = super().fork(seed)
+        if writer is not None and record is not None:
+            twin._buffer.add(writer.fork(record, overwrite=overwrite))
+        return twin
+
+    def run(self, controller: str | Controller, deadline: float | None = None) -> Ending:
+        """Let a controller drive from the present frame to the end; it is started first.
+
+        The parameters are those of `run_trial`. What the controller does wrong ends the trial and is not raised.
+        """
+        driver = controllers.load(controller) if isinstance(controller, str) else controller
+        ending, _ = run(self, driver, deadline)
+        return ending
+
+    def _writer(self, seed: int | None) -> RecordWriter:
+        """Return what writes the record of this trial; InputError if that of a fork can't be one."""
+        writers = [sink for sink in self.sinks if isinstance(sink, RecordWriter)]
+        if not writers:
+            raise InputError(
+                "this trial has no record to go on with", field="record", expected="a trial with one"
+            )
+        if seed not in (None, self.instance.seed):
+            raise InputError(
+                "a record follows from one seed", field="seed", value=seed, expected="none, with record"
+            )
+        return writers[0]
+
 
 def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
     remote = [agent for agent in instance.e_agents if agent.kind == REMOTE]
@@ -130,6 +203,7 @@ def run_trial(
     simulator: Simulator | None = None,
     sketch: bool = True,
     name: str | None = None,
+    metrics: Sequence[MetricSpec] = (),
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -156,15 +230,17 @@ def run_trial(
         Whether the result keeps a sketch of the ways of the cars, for pictures: some kilobytes for each car.
     name : str, optional
         What record and score call the controller; by default the name by which it was given, or that of its class.
+    metrics : sequence of str or callable
+        Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md).
 
     Raises
     ------
     InputError
-        If the controller can't be loaded or the record can't be written.
+        If the controller or a metric can't be loaded, or the record can't be written.
     """
     called, driver = _driver(controller, link)
     name = called if name is None else name
-    scorer, paths = Scorer(), Paths()
+    scorer, paths = Scorer(metrics), Paths()
     writer = None
     if record is not None:
         writer = RecordWriter(record, controller=name, overwrite=overwrite)

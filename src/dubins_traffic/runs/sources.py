@@ -16,18 +16,23 @@ from dubins_traffic.problem.files import (
     Kind,
     detect,
     is_record,
-    is_text_network,
     parse_json,
     source_of,
 )
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import reader
 from dubins_traffic.record.reader import Record
+from dubins_traffic.roads.formats import registry as formats
+from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.network import RoadNetwork
 
 
 def load(
-    source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None = None, seed: int = 0
+    source: str | os.PathLike[str],
+    *,
+    rnd: str | os.PathLike[str] | None = None,
+    seed: int = 0,
+    map_format: str | MapFormat | None = None,
 ) -> RoadNetwork | Configuration | Instance | Record:
     """Return what is at `source`, told by its content.
 
@@ -39,6 +44,9 @@ def load(
         A road network description that overrides that of a configuration.
     seed : int
         For what an instance does not give and is therefore drawn.
+    map_format : str or MapFormat, optional
+        A map format that is asked before the registered ones: ``module:Class``, ``path/to/file.py:Class``, or the
+        format itself (docs/extending/map-format.md).
 
     Raises
     ------
@@ -46,7 +54,8 @@ def load(
         If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything but
         a configuration.
     """
-    found = _load(source, rnd, seed)
+    form = formats.load(map_format) if isinstance(map_format, str) else map_format
+    found = _load(source, rnd, seed, form)
     if rnd is not None and not isinstance(found, Configuration):
         raise InputError(
             "a road network can replace that of a configuration only",
@@ -72,7 +81,10 @@ def load_record(source: str | os.PathLike[str]) -> Record:
 
 
 def _load(
-    source: str | os.PathLike[str], rnd: str | os.PathLike[str] | None, seed: int
+    source: str | os.PathLike[str],
+    rnd: str | os.PathLike[str] | None,
+    seed: int,
+    map_format: MapFormat | None,
 ) -> RoadNetwork | Configuration | Instance | Record:
     name = os.fspath(source)
     if _holds_record(source):
@@ -84,10 +96,17 @@ def _load(
         found = source_of(data, name)
     else:
         found = find_source(source)
-    if is_text_network(found.text):
+    if map_format is not None and formats.sniffs(map_format, found.text):
+        return RoadNetwork.from_text(found.text, found.name, map_format)
+    if formats.is_map(found.text):
         return RoadNetwork.from_text(found.text, found.name)
     document = parse_json(found.text, found.name)
-    kind = detect(document, found.name)
+    try:
+        kind = detect(document, found.name)
+    except InputError:
+        if (other := formats.of_other_package(found.text)) is None:
+            raise
+        return RoadNetwork.from_text(found.text, found.name, other)
     match kind:
         case Kind.NETWORK:
             return RoadNetwork.from_document(document, found.name)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,3 +38,53 @@ def joined(blocks: Sequence[Frames]) -> Frames:
     contacts = tuple(contact for block in blocks for contact in block.contacts)
     events = tuple(event for block in blocks for event in block.events)
     return Frames(first.first, first.rate, **arrays, contacts=contacts, events=events)
+
+
+class Seconds:
+    """Cuts the frames of a trial, however they come, into blocks of ``int(rate)`` frames, with what happened in them.
+
+    A block is ready when a frame after it has come, since events of its last frame come no later. Its arrays are its
+    own, in C order, and can't be written to.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._size = max(1, int(rate))
+        self._waiting: list[Frames] = []
+        self._count = 0
+
+    def take(self, frames: Frames) -> Iterator[Frames]:
+        """Take the next frames; yield the blocks that are ready."""
+        self._waiting.append(frames)
+        self._count += len(frames)
+        if self._count <= self._size:
+            return
+        whole = joined(self._waiting)
+        begin = 0
+        while self._count > self._size:
+            yield cut(whole, begin, begin + self._size)
+            begin += self._size
+            self._count -= self._size
+        self._waiting = [cut(whole, begin, len(whole))]
+
+    def rest(self) -> Frames | None:
+        """Return what is left, None if that is nothing."""
+        waiting, self._waiting, self._count = self._waiting, [], 0
+        if not waiting:
+            return None
+        whole = joined(waiting)
+        return cut(whole, 0, len(whole)) if len(whole) or whole.events else None
+
+
+def cut(frames: Frames, begin: int, end: int) -> Frames:
+    """Return the frames from place `begin` up to before `end` of a block, with their contacts and events.
+
+    What happened before the block's first frame stands with the first ones, what happened after its last with the last.
+    """
+    low = -math.inf if begin == 0 else frames.first + begin
+    high = math.inf if end >= len(frames) else frames.first + end
+    arrays: dict[str, Any] = {name: np.array(getattr(frames, name)[begin:end], order="C") for name in _ARRAYS}
+    for array in arrays.values():
+        array.flags.writeable = False
+    contacts = tuple(own for own in frames.contacts if low <= own.tick < high)
+    events = tuple(own for own in frames.events if low <= own.tick < high)
+    return Frames(frames.first + begin, frames.rate, **arrays, contacts=contacts, events=events)

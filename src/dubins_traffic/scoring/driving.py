@@ -22,11 +22,11 @@ class Driven:
     distance_m : float
         Sum of the distances between the centres at consecutive frames.
     standing_share : float
-        Share of the ticks in which the centre moved at less than the still speed of RULES, 0.05 m/s.
+        Share of the ticks in which the centre moved at less than the still speed of docs/rules.md#time, 0.05 m/s.
     off_road_s, off_road_share : float
-        Ticks that end in a frame at which the ego is not on the road (RULES, `on_road`).
+        Ticks that end in a frame at which the ego is not on the road (docs/rules.md#on-road).
     lane_departures : int
-        Frames at which the ego's body begins to reach over the centre line (RULES, `left` rises) and any other car
+        Frames at which the ego's body begins to reach over the centre line (docs/rules.md#left rises) and any other car
         moved, at the still speed or faster, in the tick that ends there. Frame 0 ends no tick.
     """
 

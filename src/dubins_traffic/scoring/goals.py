@@ -77,7 +77,7 @@ class Visits:
 
 
 class Visiting:
-    """Visits: entries of the ego's centre into a goal's disc, a start inside included (RULES, rule 1).
+    """Visits: entries of the ego's centre into a goal's disc, a start inside included (docs/rules.md#visit).
 
     Between two visits of a goal its centre has been in the disc of another intersection. A round is complete when every
     goal has been visited since the last round; without goals there are none.

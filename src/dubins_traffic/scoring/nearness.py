@@ -1,4 +1,4 @@
-"""Whether those who broke the assumption were near the ego, each time that it broke a rule."""
+"""Whether those who broke the assumption were near the ego, each time that it broke a rule (docs/rules.md#near)."""
 
 from __future__ import annotations
 

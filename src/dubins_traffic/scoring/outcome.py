@@ -74,8 +74,8 @@ class BatchScores:
         tables = MarginTables(margins, roads, cars, np.zeros(tally.pose.shape[1]))
         nets = np.ascontiguousarray(tally.ints[:, NET])
         find_margins(trials, frames, tally.pose, tally.mark, nets, tables, found)
-        self._row = {b: k for k, b in enumerate(trials.tolist())}
         numbers: list[int] = trials.tolist()
+        self._row = {b: k for k, b in enumerate(numbers)}
         margin = [found[b] for b in numbers]
         self._margins = [(own.road, own.line, own.back) for own in margin]
         self._ints: list[list[int]] = tally.ints[trials].tolist()

@@ -16,6 +16,7 @@ from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.sink import SHIELD, Ending
 from dubins_traffic.record.wall import Wall
+from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
@@ -24,8 +25,11 @@ from dubins_traffic.scoring.duration import counted_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.judging import Judging
+from dubins_traffic.scoring.metric import Measured, MetricSpec
+from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.verdict import Judging, Verdict
+from dubins_traffic.scoring.verdict import Verdict
 
 _BLOCK = 512
 
@@ -68,6 +72,8 @@ class Score(Tabulated):
         The score of ICRA 2016 (`dubins_traffic.scoring.icra2016`); None where it is not defined.
     interventions : int
         In how many ticks a shield has stepped in (docs/shield.md).
+    metrics : tuple of Measured
+        What further metrics tell, those that were asked for (docs/extending/metric.md).
     """
 
     trial: int
@@ -90,6 +96,7 @@ class Score(Tabulated):
     paper_score: float
     icra2016: float | None
     interventions: int = 0
+    metrics: tuple[Measured, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Score: trial {self.trial} of seed {self.seed}, {self.summary}>"
@@ -118,6 +125,8 @@ class Score(Tabulated):
                 document[name] = [formula.to_json() for formula in self.formulas]
             elif name == "goals":
                 document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
+            elif name == "metrics":
+                document |= {name: {own.column.name: own.value for own in value}} if value else {}
             elif name == "driven":
                 document |= asdict(self.driven)
             elif name == "verdict":
@@ -130,10 +139,19 @@ class Score(Tabulated):
 class Scorer:
     """A sink that holds all metrics of one trial.
 
-    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut.
+    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut. A copy of
+    it goes on in a fork of its trial.
+
+    Parameters
+    ----------
+    metrics : sequence of str or callable
+        Further metrics, as `scoring.registry.load` takes them.
     """
 
-    def __init__(self) -> None:
+    forks = True
+
+    def __init__(self, metrics: Sequence[MetricSpec] = ()) -> None:
+        self._own = OwnMetrics(registry.makers(metrics)) if metrics else None
         self._icra2016 = Icra2016()
         self._collisions = Collisions()
         self._visiting = Visiting()
@@ -149,6 +167,7 @@ class Scorer:
             self._clearance,
             self._judging,
             self._formulas,
+            *([] if self._own is None else [self._own]),
         )
 
     def begin(self, instance: Instance) -> None:
@@ -217,6 +236,7 @@ class Scorer:
             paper_score=paper_score(self._instance, collisions, visits.rounds, driven.off_road_s),
             icra2016=self._icra2016.result(),
             interventions=self._interventions,
+            metrics=() if self._own is None else self._own.result(),
         )
 
     def _show(self) -> None:
@@ -289,9 +309,12 @@ def is_clean(verdict: Verdict | None, collisions: Sequence[Collision]) -> bool:
     return not collisions if verdict is None else verdict.clean
 
 
-def score(record: Record) -> Score:
-    """Score a record: the same numbers as a `Scorer` that saw the trial; also of one that was cut off."""
-    scorer = Scorer()
+def score(record: Record, metrics: Sequence[MetricSpec] = ()) -> Score:
+    """Score a record: the same numbers as a `Scorer` that saw the trial; also of one that was cut off.
+
+    `metrics` are further metrics, as for `Scorer`.
+    """
+    scorer = Scorer(metrics)
     scorer.begin(record.instance)
     scorer.frames(record.frames)
     if record.ending is not None:

@@ -1,27 +1,22 @@
-"""The verdict on a trial: whether the ego kept the rules of the road, or others broke them before it did."""
+"""The verdict (docs/rules.md#verdicts): whether the ego kept the rules of the road, or others broke them before."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.rule_preconditions import check_demands
-from dubins_traffic.record.sink import Ending
+from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
-from dubins_traffic.scoring.collisions import Collision, Collisions
-from dubins_traffic.scoring.duration import ran_whole
+from dubins_traffic.scoring.collisions import Collision
 from dubins_traffic.scoring.formulas import Status
-from dubins_traffic.scoring.goals import Visiting, Visits
-from dubins_traffic.scoring.margins import Margins
+from dubins_traffic.scoring.goals import Visits
 from dubins_traffic.scoring.nearness import is_near
 
 if TYPE_CHECKING:
@@ -40,7 +35,7 @@ _SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
 
 class Ruling(StrEnum):
-    """What is said of a trial (RULES, *Verdicts*)."""
+    """What is said of a trial (docs/rules.md#verdicts)."""
 
     SATISFIED = "satisfied"
     VIOLATED = "violated"
@@ -78,6 +73,11 @@ class Violation:
     since: float
     where: Place
 
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states the rule, as ``docs/rules.md#3.stop``."""
+        return clause(self.rule)
+
     def to_json(self) -> dict[str, Any]:
         """Return the breach as a JSON object: rule, car, time, since, where."""
         return {
@@ -100,6 +100,11 @@ class Excuse:
     assumption: str
     violation: Violation
     sensed: bool
+
+    @property
+    def clause(self) -> str:
+        """The clause of docs/rules.md that states this part of the assumption, as ``docs/rules.md#E3``."""
+        return clause(self.assumption)
 
     def to_json(self) -> dict[str, Any]:
         """Return the excuse as a JSON object."""
@@ -177,90 +182,6 @@ class Verdict:
             "robustness": dict(self.robustness),
             "edition": EDITION,
         }
-
-
-class Judging:
-    """A sink that judges a trial whose problem carries rules.
-
-    Labels and faults are found again from the poses, so that a trial is judged by this code whoever recorded it.
-    """
-
-    def begin(self, instance: Instance) -> None:
-        """Start without a breach.
-
-        Raises
-        ------
-        InputError
-            If the problem asks for the rules and they are not defined on it; names the place.
-        """
-        problem = instance.problem
-        self._instance = instance
-        self._referee = None
-        if not problem.rules:
-            return
-        self._rules = RuleParameters.from_mapping(problem.rules)
-        check_demands(
-            problem.network,
-            problem.intersection_radius,
-            problem.car,
-            problem.sensing_radius,
-            self._rules.to_mapping(),
-        )
-        from dubins_traffic.rules.referee import Referee  # compiles; only where there is something to judge
-
-        self._referee = Referee([instance])
-        self._breaches: list[Breach] = []
-        self._sensed = [np.zeros((0, len(instance.names)), dtype=bool)]
-        self._visiting = Visiting()
-        self._visiting.begin(instance)
-        self._collisions = Collisions()
-        self._collisions.begin(instance)
-        self._margins = Margins()
-        self._margins.begin(instance)
-        self._ending: Ending | None = None
-        self._last = -1
-
-    def frames(self, frames: Frames) -> None:
-        """Judge a block of frames."""
-        if self._referee is None:
-            return
-        breaches, contacts = self._referee.judge(frames)
-        self._breaches += breaches
-        self._collisions.frames(replace(frames, contacts=contacts))
-        self._visiting.frames(frames)
-        self._margins.frames(frames)
-        if len(frames):
-            dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
-            radius = self._instance.problem.sensing_radius
-            self._sensed.append(dx * dx + dy * dy <= radius * radius)
-            self._last = frames.first + len(frames) - 1
-
-    def end(self, ending: Ending) -> None:
-        """Keep the named end, since only a trial that ran its whole duration can be satisfied."""
-        self._ending = ending
-
-    def result(self) -> Verdict | None:
-        """Return the verdict up to the last frame, None if the problem carries no rules."""
-        if self._referee is None:
-            return None
-        return reach_verdict(
-            self._instance,
-            self._rules,
-            self._breaches,
-            self._collisions.result(),
-            self._visiting.result(),
-            self._visiting.now,
-            self._was_sensed,
-            lambda car, tick: self._was_sensed(car, tick, tick),
-            self._referee.running[0],
-            self._margins.result(),
-            whole=ran_whole(self._instance, self._ending, self._last),
-        )
-
-    def _was_sensed(self, car: int, first: int, last: int) -> bool:
-        if len(self._sensed) > 1:
-            self._sensed = [np.concatenate(self._sensed)]
-        return bool(self._sensed[0][first : last + 1, car].any())
 
 
 def reach_verdict(
@@ -376,7 +297,7 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3 (docs/rules.md#E1)."""
     return rule[:2] if rule.startswith("E") else "E1"
 
 

@@ -37,6 +37,4 @@ def run_over_lcm(
     """
     maestro = Maestro() if wait else None
     transport = Lcm(url, maestro)
-    session_plan = session_plan.claim(transport.name)
-    session_plan.rehearse()
-    yield from session_plan.run(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")
+    yield from session_plan.over(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

@@ -31,8 +31,6 @@ def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> I
         If an instance can't be drawn.
     """
     transport = Lines(port)
-    session_plan = session_plan.claim(transport.name)
-    session_plan.rehearse()
-    yield from session_plan.run(
-        transport, pace, None, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
+    yield from session_plan.over(
+        transport, pace, at=lambda: f"JSON lines at {transport.address[0]}:{transport.address[1]}"
     )

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -27,7 +26,7 @@ from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.runs.plan import check_data_file, check_simulator
+from dubins_traffic.runs.plan import check_data_file
 from dubins_traffic.runs.record_folder import Earlier, check_choice, check_folder, claim
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.runs.sources import load
@@ -177,6 +176,30 @@ class SessionPlan:
             return self.supply(0).duration
         return float(settings.duration_bounds[0] if settings.duration is None else settings.duration)
 
+    def over(
+        self,
+        transport: Transport,
+        pace: Pace,
+        maestro: Maestro | None = None,
+        at: Callable[[], str] | None = None,
+    ) -> Iterator[Result]:
+        """Do all that a session is over a transport that needs nothing else: claim the folder, compile, run.
+
+        Parameters
+        ----------
+        transport : Transport
+            Not yet open; closed at the end.
+        pace : Pace
+            How drivers are waited for.
+        maestro : Maestro, optional
+            Whose leave every trial awaits; without one a trial begins when the one before is over.
+        at : callable, optional
+            Returns a line for people that says where the transport is, once it is open.
+        """
+        claimed = self.claim(transport.name)
+        claimed.rehearse()
+        yield from claimed.run(transport, pace, maestro, at=at)
+
     def rehearse(self) -> None:
         """Compile all that trials need, before anyone waits for them."""
         self.say("compiling what trials need; the first time on a machine takes minutes")
@@ -206,7 +229,6 @@ def session_plan(
     records: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     append: bool = False,
-    simulator: str | None = None,
     shield: bool = False,
 ) -> SessionPlan:
     """Return what a session shall run, checked as far as can be before anything is opened.
@@ -235,8 +257,6 @@ def session_plan(
         Whether records that the folder holds are removed before.
     append : bool
         Whether they stay, and their trials are not run again; they must be of the same driver and instances.
-    simulator : str, optional
-        What moves the cars, whatever the source says.
     shield : bool
         Whether the ego, wherever it is driven, drives under the shield (`controllers.shield`).
 
@@ -258,9 +278,6 @@ def session_plan(
             "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
         )
     supply = _supply(found, seed or 0)
-    if simulator is not None:
-        check_simulator("--simulator", simulator)
-        supply = partial(moved_by, supply, simulator)
     hand_over(supply(0), remote)
     configuration = found if isinstance(found, Configuration) else None
     if data is not None and configuration is None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
 from dubins_traffic.transports.foreign import ForeignMaestro
@@ -27,11 +28,12 @@ def run_over_ros1(
     session_plan: SessionPlan,
     pace: Pace,
     *,
-    master: int | None = None,
-    clock: bool = False,
-    world: bool = False,
-    poses: str | None = None,
+    master: bool = False,
+    port: int = 11311,
     elsewhere: bool = False,
+    clock: bool = False,
+    simulator: str | None = None,
+    poses: str | None = None,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
@@ -41,16 +43,18 @@ def run_over_ros1(
         What is run.
     pace : Pace
         How drivers are waited for.
-    master : int, optional
-        Port of a master to start on the loopback interface, 0 for any; None: join the one of ``ROS_MASTER_URI``.
-    clock : bool
-        Whether `/clock` is published.
-    world : bool
-        Whether the cars are not simulated here but somewhere in the graph, in real time.
-    poses : str, optional
-        Of such a world: the topic of each car's pose, ``{}`` in place of its name.
+    master : bool
+        Whether a master is started on the loopback interface; else the one of ``ROS_MASTER_URI`` is joined.
+    port : int
+        Of that master, 0 for any.
     elsewhere : bool
         Whether another process is the maestro, such as that of 2016: it tells problems, and starts and ends trials.
+    clock : bool
+        Whether `/clock` is published.
+    simulator : str, optional
+        What moves the cars, whatever the source says; ``ros1-world``: they are somewhere in the graph, in real time.
+    poses : str, optional
+        Of such a world: the topic of each car's pose, ``{}`` in place of its name.
 
     Raises
     ------
@@ -61,6 +65,9 @@ def run_over_ros1(
     InputError
         If an instance can't be drawn.
     """
+    world = simulator == WORLD
+    if poses is not None and not world:
+        raise InputError("is of another world", file="--poses", value=poses, expected=f"--simulator {WORLD}")
     if world and (pace.lockstep or clock or pace.factor != 1.0):
         expected = "neither --lockstep nor --clock nor --factor"
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
@@ -73,14 +80,19 @@ def run_over_ros1(
     ego = session_plan.controller is None
     maestro = Maestro() if ego and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
-    if world:
-        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, WORLD))
+    simulated = session_plan
+    if simulator is not None:
+        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, simulator))
+    if not world:
+        if simulator is not None:
+            check_simulator("--simulator", simulator)
+        simulated = session_plan
     session_plan = session_plan.claim(Ros1.name)
-    session_plan.rehearse()
+    simulated.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
-        if master is not None:
-            started = Master(master)
+        if master:
+            started = Master(port)
             stack.callback(started.close)
             os.environ["ROS_IP"] = "127.0.0.1"
             uri = started.uri

@@ -36,7 +36,7 @@ def run_over_ros2(
     pace: Pace,
     *,
     domain: int | None = None,
-    here: bool = True,
+    wide: bool = False,
     clock: bool = False,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
@@ -49,8 +49,8 @@ def run_over_ros2(
         How drivers are waited for.
     domain : int, optional
         Number of the DDS domain; by default that of ``ROS_DOMAIN_ID``, else 0.
-    here : bool
-        Whether nothing leaves this machine.
+    wide : bool
+        Whether messages may leave this machine.
     clock : bool
         Whether `/clock` is published, and messages are stamped with simulated time.
 
@@ -64,8 +64,6 @@ def run_over_ros2(
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
     maestro = Maestro() if session_plan.controller is None else None
-    transport = make_transport(domain, maestro, here=here, clock=clock)
-    session_plan = session_plan.claim(transport.name)
-    session_plan.rehearse()
-    where = f"DDS domain {transport.domain}{', within this machine' if here else ''}"
-    yield from session_plan.run(transport, pace, maestro, at=lambda: where)
+    transport = make_transport(domain, maestro, here=not wide, clock=clock)
+    where = f"DDS domain {transport.domain}{'' if wide else ', within this machine'}"
+    yield from session_plan.over(transport, pace, maestro, at=lambda: where)

@@ -31,7 +31,7 @@ class Embedded:
     The order of events is that of `docs/semantics.md`; the method is in `kernels.boxes` and `cars.motion`.
     """
 
-    capabilities = Capabilities(batched=True, deterministic=True, lockstep=True)
+    capabilities = Capabilities(batched=True, deterministic=True, lockstep=True, forks=True)
 
     def reset(self, instances: Sequence[Instance], grain: int = 1) -> State:
         """Place the cars of a batch of instances, which share one control rate.

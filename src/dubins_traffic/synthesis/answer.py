@@ -18,7 +18,7 @@ from dubins_traffic.synthesis.game import Progress, build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of, start_positions
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
-from dubins_traffic.synthesis.story import told
+from dubins_traffic.synthesis.story import story_of
 from dubins_traffic.synthesis.strengthening import smallest
 
 VACUOUSLY: Final = "vacuously"
@@ -140,7 +140,7 @@ class Answer:
         better = smallest(board, enough, limit=self.limit, progress=progress)
         names = " or ".join(str(assumption) for assumption in better)
         return [
-            *told(counter, start),
+            *story_of(counter, start),
             f"The ego would win if this were assumed: {names}."
             if names
             else "The ego would not win even if all of E1 to E6 were assumed.",

@@ -1,4 +1,4 @@
-"""What the game assumes of the e-agents: E1 to E6, each kept, left out, weakened or made stricter."""
+"""What the game assumes of the e-agents, E1 to E6 (docs/rules.md#phi_env): each kept, left out, weakened, stricter."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dubins_traffic.errors import InputError
 
 
 class Order(StrEnum):
-    """How an intersection is entered (E1)."""
+    """How an intersection is entered (docs/rules.md#E1)."""
 
     KEPT = "kept"
     """In the order of arrival, by all."""
@@ -22,7 +22,7 @@ class Order(StrEnum):
 
 
 class Forfeits(StrEnum):
-    """How often an e-agent that waits may give up its place for a new one (E3)."""
+    """How often an e-agent that waits may give up its place for a new one (docs/rules.md#E3)."""
 
     NEVER = "never"
     ONCE = "once"
@@ -32,7 +32,7 @@ class Forfeits(StrEnum):
 
 
 class Leaving(StrEnum):
-    """When an e-agent must leave a disc (E4)."""
+    """When an e-agent must leave a disc (docs/rules.md#E4)."""
 
     OWED = "owed"
     """When an exit is free; in a bend not while the ego meets the disc, and whatever other e-agents do that meet it."""
@@ -42,7 +42,7 @@ class Leaving(StrEnum):
 
 
 class Arriving(StrEnum):
-    """When an e-agent must go on in its lane (E5)."""
+    """When an e-agent must go on in its lane (docs/rules.md#E5)."""
 
     OWED = "owed"
     """Up to the line of a crossing; into a bend or dead end that is clear and that the ego does not meet, if a way out

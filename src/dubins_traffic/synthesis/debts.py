@@ -1,4 +1,7 @@
-"""What the environment owes in a position, compiled: E3 to E6 as the game of cells has them (`docs/theory.md`)."""
+"""What the environment owes in a position, compiled: E3 to E6 as the game of cells has them.
+
+The clauses are docs/rules.md#E3 to docs/rules.md#E6; docs/theory.md says what the game makes of them.
+"""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class Ranks:
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Ranked:
     """The ranks of a goal, and whether being friendly has cost any position."""
 
     ranks: Ranks
@@ -210,16 +210,16 @@ class _Solver:
         forced(self._graph, won, ready, kept)
         return [target & kept for target in targets]
 
-    def _searched(self, targets: list[Flags], friendly: bool) -> list[_Way]:
+    def _searched(self, targets: list[Flags], friendly: bool) -> list[_Ranked]:
         """Return the ways to all goals: side by side, or for the sake of memory one after the other."""
         if not self._game.lean:
             return self._side_by_side(targets, friendly, "solve")
-        found: list[_Way] = []
+        found: list[_Ranked] = []
         for k, target in enumerate(targets):
             found += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
         return found
 
-    def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Way]:
+    def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Ranked]:
         """Return the ways to these targets; interrupted by Ctrl-C."""
         game = self._game
         searches = [Search.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
@@ -239,7 +239,7 @@ class _Solver:
                 for search in searches:
                     search.control[STOPPED] = 1
                 raise
-        return [_way(search) for search in searches]
+        return [_ranked(search) for search in searches]
 
     def _tell(self, searches: list[Search], what: str) -> None:
         if self._progress:
@@ -247,11 +247,11 @@ class _Solver:
             self._progress(what, ranked / (len(searches) * self._game.positions))
 
 
-def _way(search: Search) -> _Way:
+def _ranked(search: Search) -> _Ranked:
     """Return what a search has found; its room may go."""
     used = int(search.control[NEXT_RANK])
     ranks = Ranks(search.rank, search.start[:used].copy(), search.debt[:used].copy())
-    return _Way(ranks, bool(search.control[UNFRIENDLY]))
+    return _Ranked(ranks, bool(search.control[UNFRIENDLY]))
 
 
 def _within(ranks: Ranks, won: Flags) -> Ranks:

@@ -35,7 +35,7 @@ class Moment:
     rammed: bool = False
 
 
-def told(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:
+def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:
     """Return, line by line, how the environment keeps the ego from a goal.
 
     Parameters

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from dubins_traffic.cars.state import Command, Labels, Observation, State
-from dubins_traffic.errors import PeerError
+from dubins_traffic.errors import InputError, PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Closes, Controller, End, Reports
@@ -61,6 +61,15 @@ class RemoteAgents:
 
     def __init__(self, link: Link) -> None:
         self._link = link
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Refuse: a program elsewhere drives in one trial at a time."""
+        raise InputError(
+            "a program elsewhere can't go on in two trials",
+            field="e-agents",
+            value=[name for _, name in self._cars],
+            expected="e-agents of types of ours, to fork a trial",
+        )
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:  # noqa: ARG002  # nothing to begin with
         """Note which cars these are; a link drives one trial at a time."""

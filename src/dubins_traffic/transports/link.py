@@ -12,9 +12,9 @@ from dubins_traffic.errors import PeerError
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Clock, End, Ending, Looks, Polled, Streams, Transport, View
-from dubins_traffic.record.wall import summary
 from dubins_traffic.transports.inbox import Inbox, Slot
 from dubins_traffic.transports.patience import Patience
+from dubins_traffic.transports.punctuality import Punctuality
 from dubins_traffic.transports.shown import between, kept, onward
 
 if TYPE_CHECKING:
@@ -73,10 +73,7 @@ class Link:
         self._announced = 0.0
         self._begun: float | None = None
         self._sent = 0.0
-        self._late = dict.fromkeys(self._remote, 0)
-        self._answers: dict[str, list[float]] = {car: [] for car in self._remote}
-        self._behind: list[float] = []
-        self._slipped = 0.0
+        self._punctuality = Punctuality(self._remote)
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
@@ -126,7 +123,7 @@ class Link:
             back = monotonic() + self._patience.absence + IDLE
             answered = self._wait(lambda: self._answers_frame(slot, tick), back, car)
         if answered and slot.arrived is not None:
-            self._answers[car].append(max(0.0, slot.arrived - self._sent))
+            self._punctuality.answers[car].append(max(0.0, slot.arrived - self._sent))
             if self._repeated:
                 self._settle()
         elif self.clock.lockstep:
@@ -134,7 +131,7 @@ class Link:
                 End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
             )
         else:
-            self._late[car] += 1
+            self._punctuality.late[car] += 1
             self._check_silence(slot, tick)
         with self.inbox.condition:
             return slot.speed, slot.yaw_rate
@@ -170,22 +167,11 @@ class Link:
 
     def report(self) -> Mapping[str, Any]:
         """Return how punctual the trial was, for the sidecar of its record (docs/records.md)."""
-        drivers = {
-            car: {
-                "commands": slot.commands,
-                "late": self._late[car],
-                "reconnections": slot.reconnections,
-                "peers": slot.peers,
-                "answer_s": summary(self._answers[car]),
-            }
-            for car, slot in ((car, self.inbox.slot(car)) for car in self._remote)
-        }
         return {
             "name": self.transport.name,
             "clock": "lockstep" if self.clock.lockstep else "real time",
-            "drivers": drivers,
-            "frame_lateness_s": summary(self._behind),
-            "slipped_s": self._slipped,
+            "drivers": self._punctuality.drivers({car: self.inbox.slot(car) for car in self._remote}),
+            **self._punctuality.frames(),
             "unknown_commands": self.inbox.unknown,
         }
 
@@ -324,9 +310,7 @@ class Link:
         if self.clock.lockstep:
             return
         behind = monotonic() - due
-        self._behind.append(behind)
-        if behind > self.clock.due(1) - self.clock.due(0):
-            self._slipped += behind
+        if self._punctuality.slip(behind, self.clock.due(1) - self.clock.due(0)):
             self.clock.shift(behind)
 
     def _send(self) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.protocols import Ending, Sink
+from dubins_traffic.protocols import Ending, Forks, Sink
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -63,6 +63,20 @@ class FrameBuffer:
         for sink in self._sinks:
             sink.begin(instance)
         self._renew()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the sinks that stay behind."""
+        carried = tuple(sink for sink in self._sinks if isinstance(sink, Forks) and sink.forks)
+        return {**vars(self), "_sinks": carried}
+
+    @property
+    def sinks(self) -> tuple[Sink, ...]:
+        """Who gets the frames."""
+        return self._sinks
+
+    def add(self, sink: Sink) -> None:
+        """Hand the blocks from that in hand on to one more sink, which has been handed all before."""
+        self._sinks = (*self._sinks, sink)
 
     def push(
         self,

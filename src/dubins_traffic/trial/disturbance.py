@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.random import uniform
+from dubins_traffic.trial.endings import checked_command
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -26,15 +27,28 @@ class CommandLine:
     def __init__(self, instance: Instance) -> None:
         disturbances = instance.disturbances
         self._loss = disturbances.command_loss
-        self._seed = np.uint64(instance.seed)
-        self._trial = instance.trial
+        self._instance = instance
         self._under_way = deque([(0.0, 0.0)] * disturbances.command_delay)
         self._latest = (0.0, 0.0)
-        self.clear = self._loss == 0.0 and not self._under_way
+        self._clear = self._loss == 0.0 and not self._under_way
 
-    def carry(self, tick: int, command: tuple[float, float]) -> tuple[float, float]:
-        """Return the command in force in this tick."""
-        if self._loss == 0.0 or uniform(self._seed, self._trial, EGO, tick, LOSS_DRAW) >= self._loss:
+    def take(self, tick: int, command: object) -> tuple[float, float]:
+        """Return the command in force in this tick, now that a controller has asked for `command`.
+
+        Raises
+        ------
+        ControllerError
+            If that is not two finite numbers: a controller fault.
+        """
+        asked = checked_command(command, tick)
+        return asked if self._clear else self._carry(tick, asked)
+
+    def _carry(self, tick: int, command: tuple[float, float]) -> tuple[float, float]:
+        if self._loss == 0.0 or self._draw(tick) >= self._loss:
             self._latest = command
         self._under_way.append(self._latest)
         return self._under_way.popleft()
+
+    def _draw(self, tick: int) -> float:
+        seed = np.uint64(self._instance.seed)
+        return uniform(seed, self._instance.trial, EGO, tick, LOSS_DRAW)

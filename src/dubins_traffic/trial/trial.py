@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from copy import deepcopy
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
-from dubins_traffic.errors import ControllerError, DubinsTrafficError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.protocols import Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
+from dubins_traffic.protocols import Draws, Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
-from dubins_traffic.trial.endings import agent_fault, checked_command, collision_detail
+from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.interrupts import WHOLE
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+
+
+FORKED: Final = "fork"
+"""Kind of the event in a fork that goes on from another seed."""
 
 
 class Trial:
@@ -83,6 +89,11 @@ class Trial:
         return self._tick
 
     @property
+    def sinks(self) -> Sequence[Sink]:
+        """Who is handed the frames of this trial; of a fork, those that have come along."""
+        return self._buffer.sinks
+
+    @property
     def observation(self) -> Observation:
         """What the ego knows in the present frame."""
         return self._observe()
@@ -105,12 +116,10 @@ class Trial:
         if self.ending is not None:
             raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): make a new one")
         try:
-            speed, yaw = checked_command(command, self._tick)
+            speed, yaw = self._line.take(self._tick, command)
         except ControllerError as error:
             self.end(End.CONTROLLER_FAULT, error.detail)
             raise
-        if not self._line.clear:
-            speed, yaw = self._line.carry(self._tick, (speed, yaw))
         commands = self._commands
         for agent in self._agents:
             agent.decide(self._tick, self._state, self._labels, commands)
@@ -132,6 +141,49 @@ class Trial:
         for watcher in self._watchers:
             watcher.watch(self._tick, self._state, self._labels, self._observe)
         return contacts
+
+    def fork(self, seed: int | None = None) -> Self:
+        """Return a trial that goes on from the present frame by itself; see `runs.single.Trial.fork`.
+
+        Parameters
+        ----------
+        seed : int, optional
+            From which all follows that is drawn from here on; by default from that of the instance.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If the trial has ended.
+        InputError
+            If its simulator or one of its drivers can't go on twice.
+        """
+        if self.ending is not None:
+            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): nothing goes on")
+        if not self._simulator.capabilities.forks:
+            raise InputError(
+                "a trial on this simulator can't go on twice",
+                field="simulator",
+                value=self.instance.simulator,
+                expected="embedded, or another one that can",
+            )
+        again = seed is not None and seed != self.instance.seed
+        instance = replace(self.instance, seed=seed) if again else self.instance
+        memo: dict[int, Any] = {id(self.instance): instance}
+        own = {**vars(self), "instance": instance, "_watchers": ()}
+        twin = object.__new__(type(self))
+        vars(twin).update(deepcopy(own, memo))
+        if again:
+            twin._reseed()
+        return twin
+
+    def _reseed(self) -> None:
+        """Let what is drawn from the present frame on follow from the instance's seed, which is another than before."""
+        seed = self.instance.seed
+        self._observation = None
+        for agent in self._agents:
+            if isinstance(agent, Draws):
+                agent.reseed(seed)
+        self._buffer.note(Event(self._tick, FORKED, NONE, f"from here on all is drawn from seed {seed}"))
 
     def note(self, kind: str, detail: str = "") -> None:
         """Put an event of the ego, at the present tick, into the record."""

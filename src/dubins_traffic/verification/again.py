@@ -38,13 +38,13 @@ def trial_difference(record: Record) -> Difference | None:
     witness = _Witness(record)
     world = Embedded() if record.instance.simulator == OURS else Shown(frames)
     trial = Trial(record.instance, simulator=world, agents=drivers(record), sinks=[witness])
-    told = _told_by_ego(record)
-    for tick, command in enumerate(_asked(record.instance, frames)):
-        _note(trial, told.get(tick, ()))
+    reported = _controller_events(record)
+    for tick, command in enumerate(_commands_of_ego(record.instance, frames)):
+        _report(trial, reported.get(tick, ()))
         trial.advance(command)
         if trial.ending is not None or witness.difference is not None:
             break
-    return _concluded(record, trial, witness, told)
+    return _concluded(record, trial, witness, reported)
 
 
 def drivers(record: Record) -> Sequence[Driver]:
@@ -55,7 +55,7 @@ def drivers(record: Record) -> Sequence[Driver]:
     return [*local, Replayed(record.frames, remote)] if remote else local
 
 
-def _asked(instance: Instance, frames: Frames) -> Sequence[tuple[float, float]]:
+def _commands_of_ego(instance: Instance, frames: Frames) -> Sequence[tuple[float, float]]:
     """Return what the ego asked for in each tick, as far as the record tells it: delayed commands come later.
 
     A command that was delayed beyond the end, or lost, has left no trace; in its place stands what makes none.
@@ -66,30 +66,30 @@ def _asked(instance: Instance, frames: Frames) -> Sequence[tuple[float, float]]:
     return [(speed, yaw_rate) for speed, yaw_rate in rows]
 
 
-def _told_by_ego(record: Record) -> dict[int, list[Event]]:
+def _controller_events(record: Record) -> dict[int, list[Event]]:
     """Return the events of the ego's controller by their ticks; the event of the trial's end is not one."""
     events = list(record.frames.events)
     ending = record.ending
     if ending is not None and events and events[-1] == _event_of(ending):
         events.pop()
-    told: dict[int, list[Event]] = {}
+    reported: dict[int, list[Event]] = {}
     for event in events:
         if event.car == EGO:
-            told.setdefault(event.tick, []).append(event)
-    return told
+            reported.setdefault(event.tick, []).append(event)
+    return reported
 
 
 def _event_of(ending: Ending) -> Event:
     return Event(ending.ticks, ending.end.value, EGO, ending.detail)
 
 
-def _note(trial: Trial, events: Sequence[Event]) -> None:
+def _report(trial: Trial, events: Sequence[Event]) -> None:
     for event in events:
         trial.note(event.kind, event.detail)
 
 
 def _concluded(
-    record: Record, trial: Trial, witness: _Witness, told: dict[int, list[Event]]
+    record: Record, trial: Trial, witness: _Witness, reported: dict[int, list[Event]]
 ) -> Difference | None:
     """Let the trial end as the record says, if that may be, and return what differs."""
     last = len(record.frames) - 1
@@ -101,7 +101,7 @@ def _concluded(
     if witness.difference is not None:
         return witness.difference
     if trial.ending is None:
-        _note(trial, told.get(last, ()))
+        _report(trial, reported.get(last, ()))
         wrong = _end(record, trial, witness)
         if wrong is not None:
             return wrong

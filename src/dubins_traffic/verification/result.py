@@ -22,7 +22,7 @@ class Difference:
     def __str__(self) -> str:
         place = "" if self.car is None else f" of {self.car}"
         place += "" if self.tick is None else f" at tick {self.tick}"
-        return f"{self.what}{place}: recorded {_told(self.recorded)}, expected {_told(self.expected)}"
+        return f"{self.what}{place}: recorded {_as_text(self.recorded)}, expected {_as_text(self.expected)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the difference as a JSON object."""
@@ -101,10 +101,10 @@ OURS = "embedded"
 """The simulator whose trials are simulated again."""
 
 
-def _told(value: Any) -> str:
+def _as_text(value: Any) -> str:
     text = "nothing" if value is None else value if isinstance(value, str) else repr(value)
     return text if len(text) <= 300 else f"{text[:297]}..."
 
 
 def _plain(value: Any) -> Any:
-    return value if value is None or isinstance(value, bool | int | float | str) else _told(value)
+    return value if value is None or isinstance(value, bool | int | float | str) else _as_text(value)

@@ -21,6 +21,8 @@ CARS = 60
 class Paths:
     """A sink that keeps every so manieth position of the first cars, and the last pose of all."""
 
+    forks = True
+
     def __init__(self) -> None:
         self._step = 1
         self._points: list[Floats] = []

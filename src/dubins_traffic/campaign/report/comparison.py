@@ -13,10 +13,11 @@ import numpy as np
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.report.metrics import FAULTS, METRICS, WALL_METRICS, Metric
+from dubins_traffic.campaign.report.metrics import FAULTS, METRICS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.formulas import Status
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
 
 CONFIGURATION = "configuration"
@@ -59,7 +60,7 @@ class Difference:
 
     first: str
     second: str
-    metric: Metric
+    metric: Column
     estimate: Estimate
     larger: int
     smaller: int
@@ -72,7 +73,7 @@ class Level:
     factor: str
     value: str
     controller: str
-    metric: Metric
+    metric: Column
     estimate: Estimate
 
 
@@ -92,8 +93,8 @@ class Comparison:
     total: int
     broken: int
     judged: int
-    metrics: Sequence[Metric]
-    undefined: Sequence[Metric]
+    metrics: Sequence[Column]
+    undefined: Sequence[Column]
     standings: Sequence[Standing]
     differences: Sequence[Difference]
     levels: Sequence[Level]
@@ -112,13 +113,14 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
     wall : pyarrow.Table, optional
         The wall-clock figures of the same trials.
     """
-    values = {metric.column: _floats(results[metric.column]) for metric in METRICS}
+    metrics = (*METRICS, *(own for own in campaign.columns if own.kind != "string"))
+    values = {metric.name: _floats(results[metric.name]) for metric in metrics}
     if wall is not None:
-        values |= {metric.column: _floats(wall[metric.column]) for metric in WALL_METRICS}
+        values |= {metric.name: _floats(wall[metric.name]) for metric in WALL_METRICS}
     known = [
         metric
-        for metric in (*METRICS, *WALL_METRICS)
-        if metric.column in values and _is_told(metric, values[metric.column])
+        for metric in (*metrics, *WALL_METRICS)
+        if metric.name in values and _is_told(metric, values[metric.name])
     ]
     names: Any = np.array(results["controller"].to_pylist(), dtype=object)
     ranked = _ranked(campaign, names, _floats(results["counted_rounds"]))
@@ -133,7 +135,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         int((fallen > 0).sum()),
         int((~np.isnan(fallen)).sum()),
         known,
-        [metric for metric in METRICS if metric.bounded and metric not in known],
+        [metric for metric in metrics if metric.bounded and metric not in known],
         [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
         list(_differences(campaign, results, chosen, known, values)),
         list(_levels(results, factors, chosen, known, values)),
@@ -156,13 +158,13 @@ def _factors(campaign: Campaign) -> dict[str, list[str]]:
     """Return what varied, with its values as texts, in their order; the configuration is one of them."""
     found = {CONFIGURATION: list(dict.fromkeys(cell.configuration for cell in campaign.cells))}
     for name in campaign.factors:
-        found[name] = list(dict.fromkeys(table.told(cell.values[name]) for cell in campaign.cells))
+        found[name] = list(dict.fromkeys(table.factor_text(cell.values[name]) for cell in campaign.cells))
     varied = {name: values for name, values in found.items() if len(values) > 1}
     return varied or {CONFIGURATION: found[CONFIGURATION]}
 
 
 def _standing(
-    controller: str, own: Any, metrics: Sequence[Metric], values: Mapping[str, Floats], chosen: Any
+    controller: str, own: Any, metrics: Sequence[Column], values: Mapping[str, Floats], chosen: Any
 ) -> Standing:
     ends: list[str] = own["end"].to_pylist()
     verdicts: list[str | None] = own["verdict"].to_pylist()
@@ -176,7 +178,7 @@ def _standing(
         controller,
         len(own),
         judged,
-        {metric.column: estimate(values[metric.column][chosen]) for metric in metrics},
+        {metric.name: estimate(values[metric.name][chosen]) for metric in metrics},
         happened("clean"),
         share(int((_floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
@@ -202,7 +204,7 @@ def _formulas(column: Sequence[str | None]) -> dict[str, dict[str, Share]]:
     }
 
 
-def _is_told(metric: Metric, values: Floats) -> bool:
+def _is_told(metric: Column, values: Floats) -> bool:
     known = values[~np.isnan(values)]
     return len(known) > 0 and (not metric.rare or bool((known > 0).any()))
 
@@ -211,7 +213,7 @@ def _differences(
     campaign: Campaign,
     results: Any,
     chosen: Mapping[str, Any],
-    metrics: Sequence[Metric],
+    metrics: Sequence[Column],
     values: Mapping[str, Floats],
 ) -> Iterator[Difference]:
     """Return the paired differences of all pairs of controllers in all metrics."""
@@ -221,7 +223,7 @@ def _differences(
         one, other = np.flatnonzero(chosen[first]), np.flatnonzero(chosen[second])
         _, left, right = np.intersect1d(pair[one], pair[other], return_indices=True)
         for metric in metrics:
-            column = values[metric.column]
+            column = values[metric.name]
             differences = column[one[left]] - column[other[right]]
             larger, smaller = int((differences > 0).sum()), int((differences < 0).sum())
             yield Difference(first, second, metric, estimate(differences), larger, smaller)
@@ -231,17 +233,17 @@ def _levels(
     results: Any,
     factors: Mapping[str, Sequence[str]],
     chosen: Mapping[str, Any],
-    metrics: Sequence[Metric],
+    metrics: Sequence[Column],
     values: Mapping[str, Floats],
 ) -> Iterator[Level]:
     for factor, levels in factors.items():
         name = factor if factor == CONFIGURATION else table.FACTOR + factor
-        told: Any = np.array([table.told(value) for value in results[name].to_pylist()], dtype=object)
+        texts: Any = np.array([table.factor_text(value) for value in results[name].to_pylist()], dtype=object)
         for level in levels:
-            here = told == level
+            here = texts == level
             for controller, own in chosen.items():
                 for metric in metrics:
-                    found = estimate(values[metric.column][here & own], median=False)
+                    found = estimate(values[metric.name][here & own], median=False)
                     yield Level(factor, level, controller, metric, found)
 
 

@@ -13,16 +13,16 @@ ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "m
 SHARE = ("count", "of", "share", "low", "high")
 
 
-def sheets(comparison: Comparison) -> dict[str, str]:
+def csv_files(comparison: Comparison) -> dict[str, str]:
     """Return the files by name; floats read back to the same bits, 95 % intervals as low and high."""
     return {
-        "controllers.csv": _sheet(("controller", "metric", *ESTIMATE), _controllers(comparison)),
-        "shares.csv": _sheet(("controller", "of_what", "which", *SHARE), _shares(comparison)),
-        "differences.csv": _sheet(
+        "controllers.csv": _csv_text(("controller", "metric", *ESTIMATE), _controllers(comparison)),
+        "shares.csv": _csv_text(("controller", "of_what", "which", *SHARE), _shares(comparison)),
+        "differences.csv": _csv_text(
             ("first", "second", "metric", *ESTIMATE, "first_larger", "first_smaller"),
             _differences(comparison),
         ),
-        "factors.csv": _sheet(
+        "factors.csv": _csv_text(
             ("factor", "value", "controller", "metric", *ESTIMATE[:4]), _factors(comparison)
         ),
     }
@@ -31,7 +31,7 @@ def sheets(comparison: Comparison) -> dict[str, str]:
 def _controllers(comparison: Comparison) -> Iterator[Sequence[object]]:
     for standing in comparison.standings:
         for metric in comparison.metrics:
-            yield standing.controller, metric.column, *_estimate(standing.estimates[metric.column])
+            yield standing.controller, metric.name, *_estimate(standing.estimates[metric.name])
 
 
 def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
@@ -53,13 +53,13 @@ def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
 def _differences(comparison: Comparison) -> Iterator[Sequence[object]]:
     for one in comparison.differences:
         estimate = _estimate(one.estimate)
-        yield one.first, one.second, one.metric.column, *estimate, one.larger, one.smaller
+        yield one.first, one.second, one.metric.name, *estimate, one.larger, one.smaller
 
 
 def _factors(comparison: Comparison) -> Iterator[Sequence[object]]:
     for level in comparison.levels:
         estimate = _estimate(level.estimate)[:4]
-        yield level.factor, level.value, level.controller, level.metric.column, *estimate
+        yield level.factor, level.value, level.controller, level.metric.name, *estimate
 
 
 def _estimate(estimate: Estimate) -> tuple[object, ...]:
@@ -75,7 +75,7 @@ def _ends(interval: Interval | None) -> tuple[object, object]:
     return interval or (None, None)
 
 
-def _sheet(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
+def _csv_text(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(headings)

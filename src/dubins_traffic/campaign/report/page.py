@@ -11,10 +11,13 @@ from typing import Any
 
 from dubins_traffic.campaign.report import plots
 from dubins_traffic.campaign.report.comparison import Comparison, Difference, Standing
-from dubins_traffic.campaign.report.metrics import Metric, shown, words
+from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
+from dubins_traffic.rules.clauses import clause
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.notice import assumption_notice
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
 
 MINUS = "\N{MINUS SIGN}"
 HOW = (
@@ -146,10 +149,10 @@ def _metrics(comparison: Comparison) -> str:
     body: list[list[str]] = []
     for metric in comparison.metrics:
         for k, standing in enumerate(comparison.standings):
-            estimate = standing.estimates[metric.column]
+            estimate = standing.estimates[metric.name]
             first = f'<th rowspan="{many}" scope="rowgroup">{_heading(metric)}</th>' if k == 0 else ""
             body.append([first, _name(standing, k), *_estimate(estimate), _count(estimate.count)])
-    undefined = ", ".join(metric.name for metric in comparison.undefined)
+    undefined = ", ".join(metric.label for metric in comparison.undefined)
     note = f"<p>Not defined for these trials: {_text(undefined)}.</p>" if undefined else ""
     return _table(head, body, "grouped") + note + f"<p>{HOW}</p>"
 
@@ -187,7 +190,7 @@ def _plots(comparison: Comparison, factor: str) -> str:
         for metric in comparison.metrics
         if metric not in silent
     )
-    names = "; ".join(metric.name for metric in silent)
+    names = "; ".join(metric.label for metric in silent)
     note = f"<p>No chart of what is 0 or absent everywhere: {_text(names)}.</p>" if silent else ""
     return f'<div class="figures">{"".join(images)}</div>{note}'
 
@@ -228,7 +231,9 @@ def _shares(comparison: Comparison) -> str:
             [_name(standing, k), *(_share(group.get(name)) for name in names)]
             for k, (standing, group) in enumerate(zip(standings, groups, strict=True))
         ]
-        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}")
+        cited = ", ".join(clause(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS))
+        note = f"<p>Clauses: {cited}</p>" if cited else ""
+        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}{note}")
     return "".join(parts)
 
 
@@ -279,12 +284,12 @@ def _name(standing: Standing, index: int) -> str:
     return f'<th class="name"><span class="dot c{index}"></span>{_text(standing.controller)}</th>'
 
 
-def _heading(metric: Metric) -> str:
+def _heading(metric: Column) -> str:
     unit = f' <span class="unit">{_text(metric.unit)}</span>' if metric.unit else ""
     arrow = {1: "↑", -1: "↓", 0: ""}[metric.better]
     title = {1: "more is better", -1: "less is better", 0: ""}[metric.better]
     mark = f' <span class="better" title="{title}">{arrow}</span>' if arrow else ""
-    return f"{_text(metric.name)}{unit}{mark}"
+    return f"{_text(metric.label)}{unit}{mark}"
 
 
 def _estimate(estimate: Estimate, *, signed: bool = False) -> list[str]:

@@ -10,8 +10,9 @@ from itertools import pairwise
 from typing import Any
 
 from dubins_traffic.campaign.report.comparison import Comparison, Level
-from dubins_traffic.campaign.report.metrics import Metric, words
+from dubins_traffic.campaign.report.metrics import words
 from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import METADATA
 from dubins_traffic.viewer.plot import STYLE
@@ -63,7 +64,7 @@ _STYLE: Mapping[str, Any] = {
 }
 
 
-def against(comparison: Comparison, factor: str, metric: Metric) -> str:
+def against(comparison: Comparison, factor: str, metric: Column) -> str:
     """Return the plot of a metric's mean against a factor, with 95 % intervals, a line a controller: SVG."""
     levels = [level for level in comparison.levels if level.factor == factor and level.metric is metric]
     values = list(comparison.factors[factor])
@@ -109,7 +110,7 @@ def formula(comparison: Comparison, name: str) -> str:
     return _bars(rows, FORMULA, f"{name}: share of the trials", percent=True)
 
 
-def says_nothing(comparison: Comparison, factor: str, metric: Metric) -> bool:
+def says_nothing(comparison: Comparison, factor: str, metric: Column) -> bool:
     """Tell whether the plot of a metric against a factor would show nothing: it is 0 or absent everywhere."""
     own = (level for level in comparison.levels if level.factor == factor and level.metric is metric)
     return not any(level.estimate.mean for level in own)

@@ -46,7 +46,7 @@ def _metrics(comparison: Comparison) -> Table:
     _columns(table, ("metric", "controller"), ("mean", "95 %", "median", "95 %"))
     for metric in comparison.metrics:
         for k, standing in enumerate(comparison.standings):
-            one = standing.estimates[metric.column]
+            one = standing.estimates[metric.name]
             mean = (shown(one.mean), _interval(one.mean_interval))
             median = (shown(one.median), _interval(one.median_interval))
             table.add_row(metric.heading if k == 0 else "", standing.controller, *mean, *median)

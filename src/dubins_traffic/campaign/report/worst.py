@@ -20,6 +20,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
 from dubins_traffic.record.sink import FAULTS, End
 from dubins_traffic.runs.jobs import Job
+from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.score import score
 from dubins_traffic.viewer.replay import write_replay
 
@@ -146,7 +147,7 @@ def _bad(campaign: Campaign, row: Mapping[str, Any], folder: Path) -> Bad:
         again = replay(campaign, row, folder / name)
     except DubinsTrafficError as error:
         return Bad(row, why(row), None, str(error))
-    return Bad(row, why(row), name, "" if same(row, again) else OTHER_WAY)
+    return Bad(row, why(row), name, "" if same(row, again, campaign.columns) else OTHER_WAY)
 
 
 def replay_name(number: int) -> str:
@@ -154,9 +155,9 @@ def replay_name(number: int) -> str:
     return f"{FOLDER}/trial-{number:09d}.html"
 
 
-def same(row: Mapping[str, Any], again: Mapping[str, Any]) -> bool:
-    """Tell whether a trial that was run again went as it did."""
-    return all(row[column] == again[column] for column in rows.RESULT)
+def same(row: Mapping[str, Any], again: Mapping[str, Any], metrics: Sequence[Column] = ()) -> bool:
+    """Tell whether a trial that was run again went as it did, by the columns of further metrics, too."""
+    return all(row[column] == again[column] for column in rows.results(metrics))
 
 
 def _chunk(campaign: Campaign, number: int) -> Chunk:
@@ -176,6 +177,7 @@ def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
             configuration=chunk.configuration,
             record=record,
             deadline=chunk.deadline,
+            metrics=chunk.metrics,
         )
         result = job.run()
         found = reader.read(record)

@@ -12,7 +12,7 @@ from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.report.csv_tables import sheets
+from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
@@ -75,7 +75,7 @@ def write_report(
     _make(target)
     ranked = comparison.controllers
     bad = find_worst(campaign, results, ranked, worst, target, progress or _silent) if worst else {}
-    for name, text in sheets(comparison).items():
+    for name, text in csv_files(comparison).items():
         write_text(target / name, text)
     write_text(target / PAGE, page(comparison, known, bad))
     return Written(comparison, bad, target / PAGE)

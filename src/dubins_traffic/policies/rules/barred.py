@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
 from dubins_traffic.policies.rules.passing import BACK, BERTH, NARROWS, SLIP, TURNING, stop_line
-from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
+from dubins_traffic.policies.rules.seeing import OBSTACLE_GAP, QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Drivers, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import on_way, way_between
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
 from dubins_traffic.roads.table import RoadTable
 
-LATE = 0.85
-"""An obstacle farther from the intersection than this, in units of R, can be passed on the right by who comes out of
-the disc."""
+LATE, LAST = 0.85, 0.82
+"""From where on, in units of R, a car that comes out of a disc can pass an obstacle behind it within the lane: so that
+it need not come close to it, and at all."""
 
 
 @jit
@@ -28,16 +28,13 @@ def is_barred(
     length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
     wide = vehicle.half_width + vehicle.rounding
     done = 0.0
+    early = LATE * vehicle.disc + vehicle.reach + QUEUE_GAP
     for _ in range(last - first):
-        begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, vehicle)
+        begin, end, offset = next_bar(roads, net, lane, done, early, obstacles, first, last, vehicle)
         if begin >= length:
             return False
         done = end + 1e-6
-        own = begin - vehicle.reach - QUEUE_GAP
-        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, vehicle) != 0.0
-        if within and own >= LATE * vehicle.disc:
-            continue
-        if own < vehicle.disc + vehicle.reach + EDGE:
+        if begin < nearest_bar(vehicle):
             return True
         own = begin - vehicle.reach - SLIP
         back = end + SLIP + 2.0 * vehicle.half_length + BACK
@@ -54,6 +51,47 @@ def is_barred(
             if own - far < along < back + far and left + vehicle.middle > 0.0 and beside:
                 return True
     return False
+
+
+@jit_inline
+def nearest_bar(vehicle: Vehicle) -> float:
+    """Return from where on an obstacle in a lane leaves room before it for a car that comes out of the disc, metres."""
+    return vehicle.disc + 2.0 * vehicle.reach + EDGE + QUEUE_GAP
+
+
+@jit
+def has_place(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+    """Tell whether a car can leave the disc at the beginning of a lane for all obstacles, though it gets no farther."""
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    first, last = obstacles.off[b], obstacles.off[b + 1]
+    early = LAST * vehicle.disc + vehicle.reach + OBSTACLE_GAP
+    begin, _, _ = next_bar(roads, net, lane, 0.0, early, obstacles, first, last, vehicle)
+    return begin >= min(nearest_bar(vehicle), roads.seg[roads.seg_off[net] + (lane >> 1), 4])
+
+
+@jit
+def next_bar(
+    roads: RoadTable,
+    net: int,
+    lane: int,
+    done: float,
+    early: float,
+    obstacles: ObstacleTable,
+    first: int,
+    last: int,
+    vehicle: Vehicle,
+) -> tuple[float, float, float]:
+    """Return what `next_narrow` does, of the next obstacles that can't be passed within the lane.
+
+    None can that begins before `early`, metres along the lane.
+    """
+    begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, vehicle)
+    while begin != INFINITE:
+        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, vehicle) != 0.0
+        if begin < early or not within:
+            break
+        begin, end, offset = next_narrow(roads, net, lane, end + 1e-6, obstacles, first, last, vehicle)
+    return begin, end, offset
 
 
 @jit
@@ -128,6 +166,15 @@ def is_shut(
     net, vehicle = drivers.net[b], drivers.vehicle[b]
     if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], vehicle):
         return True
+    return stands_in_disc(b, lane, out, roads, obstacles, drivers)
+
+
+@jit
+def stands_in_disc(
+    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> bool:
+    """Tell whether an obstacle is in the way through the disc from a lane to the lane `out`."""
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
     way = way_between(roads, net, lane, out, vehicle.middle, vehicle.disc)
     wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.policies.rules.barred import has_place, stands_in_disc
 from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
-from dubins_traffic.policies.rules.room import has_room, room_in
+from dubins_traffic.policies.rules.room import has_room, is_free, is_open, room_in
 from dubins_traffic.policies.rules.tables import Drivers, Scratch
 from dubins_traffic.policies.rules.turn_arcs import BEFORE
 from dubins_traffic.roads.lookup import INFINITE, lane_end
@@ -15,6 +16,9 @@ from dubins_traffic.roads.table import RoadTable
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
 asked, and on its way to another exit it might leave the disc outside its lane."""
+LATE = 1.0
+"""Who has been in a crossing for so long, seconds, keeps to its exit while this is open, though there may be no room
+behind what drives there: on the way to another it might not leave the disc in time."""
 
 
 @jit
@@ -74,13 +78,78 @@ def take_widest(
 
 
 @jit
+def leads_out(
+    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
+) -> bool:
+    """Tell whether obstacles leave a car that comes by a lane the way out of the disc to `out`."""
+    through = not stands_in_disc(b, lane, out, roads, obstacles, drivers)
+    return through and has_place(b, out, roads, obstacles, drivers)
+
+
+@jit
+def take_last_resort(
+    b: int, n: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
+    scratch: Scratch,
+) -> bool:  # fmt: skip
+    """Choose an exit for a car that finds room in none of those it wants; tell whether there is any.
+
+    First come those that are open and lack but the room into which the ego might back up, then those in which there is
+    room before an obstacle that bars the way, then all that are open. `scratch.cost` has what they count.
+    """
+    net = drivers.net[b]
+    car = drivers.car[b, n]
+    v = lane_end(roads, net, car.lane)
+    row = roads.vert_off[net] + v
+    ample = barred = opened = 0
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        room = room_in(b, n, out, 0, state, labels, roads, obstacles, drivers, scratch)
+        if scratch.cost[k] < BARRED:
+            if is_open(b, n, out, state, labels, roads, drivers, scratch):
+                opened |= 1 << k
+                ample |= 1 << k if room >= -drivers.vehicle[b].backs_up else 0
+        elif room >= 0.0 and leads_out(b, car.lane, out, roads, obstacles, drivers):
+            barred |= 1 << k
+    allowed = ample if ample != 0 else (barred if barred != 0 else opened)
+    best = cheapest(v, roads.vert_off[net], allowed, roads, scratch)
+    if best >= 0:
+        car.next_lane = best
+    return best >= 0
+
+
+@jit
+def take_way_on(
+    b: int,
+    n: int,
+    state: State,
+    roads: RoadTable,
+    obstacles: ObstacleTable,
+    drivers: Drivers,
+    scratch: Scratch,
+) -> None:
+    """Choose an exit that is free as E4 says, whatever bars the way beyond, for who would turn round in a bend."""
+    net = drivers.net[b]
+    car = drivers.car[b, n]
+    row = roads.vert_off[net] + lane_end(roads, net, car.lane)
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        on = out != car.lane ^ 1 and leads_out(b, car.lane, out, roads, obstacles, drivers)
+        if on and is_free(b, n, out, state, roads, drivers, scratch):
+            car.next_lane = out
+
+
+@jit
 def turn_elsewhere(
     b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
     drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Choose another exit for a car that is held up in a disc."""
-    if take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, scratch):
-        drivers.car[b, n].waited = 0
+    car = drivers.car[b, n]
+    found = take_another(b, n, tick, INFINITE, state, labels, roads, obstacles, drivers, scratch)
+    if not found and not is_open(b, n, car.next_lane, state, labels, roads, drivers, scratch):
+        found = take_last_resort(b, n, state, labels, roads, obstacles, drivers, scratch)
+    if found:
+        car.waited = 0
 
 
 @jit
@@ -88,14 +157,22 @@ def find_way_out(
     b: int, n: int, tick: int, part: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
     drivers: Drivers, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while."""
+    """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while.
+
+    Who has been in a crossing for a while does so only if its own exit is taken.
+    """
     car = drivers.car[b, n]
     vehicle = drivers.vehicle[b]
     crossing = drivers.way[b, n].crossing != 0
     if not crossing and (part == BEFORE or car.waited <= ticks_of(STUCK, vehicle)):
         return
-    if crossing and tick % 4 != 0:
-        return
-    if crossing and has_room(b, n, car.next_lane, 0, state, labels, roads, obstacles, drivers, scratch):
-        return
+    if crossing:
+        car.within += 1
+        if tick % 4 != 0 or has_room(
+            b, n, car.next_lane, 0, state, labels, roads, obstacles, drivers, scratch
+        ):
+            return
+        late = car.within > ticks_of(LATE, vehicle)
+        if late and is_open(b, n, car.next_lane, state, labels, roads, drivers, scratch):
+            return
     turn_elsewhere(b, n, tick, state, labels, roads, obstacles, drivers, scratch)

@@ -29,9 +29,10 @@ from dubins_traffic.routing.lane_graph import FAR, aim_for, place_of, spread
 DRAW = 20
 """First of the draws of the law: exits take four, moods five, places one."""
 BACK = 30.0
-"""What turning round at a crossing counts, metres (for a nemesis STEP); in a bend, where others may come, it is a
-last resort."""
+"""What turning round at a crossing counts, metres (for a nemesis STEP)."""
 UNREACHABLE = 1e6
+BACK_IN_BEND = 2e6
+"""What turning round in a bend counts, metres: more than any way on that is not barred."""
 BARRED = 1e7
 """What a lane counts in which an obstacle can't be passed, metres."""
 STEP = 3.0
@@ -53,6 +54,7 @@ def take_lane(
     car.lane = lane
     car.turn = 0
     car.kept_out = 0
+    car.within = 0
     car.aside = 0.0
     if car.kind == LOOP:
         following = car.place + 1 if car.place + 1 < car.last else car.first
@@ -129,7 +131,7 @@ def price_exits(
             cost += STEP * scratch.hops[out] if scratch.hops[out] != FAR else UNREACHABLE
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == NEMESIS else BACK
-            cost += at_crossing if roads.degree[row] > 2 else UNREACHABLE
+            cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
         if obstacles.off[b] != obstacles.off[b + 1] and (
             is_shut(b, lane, int(out), roads, obstacles, drivers)
             or leads_nowhere(b, int(out), roads, obstacles, drivers)

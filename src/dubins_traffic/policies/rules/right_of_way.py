@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.policies.rules.choice import take_another, take_widest
+from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
 from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
@@ -43,6 +43,9 @@ there is room nowhere: else it breaks E3."""
 PATIENT = 0.5
 """An e-agent that has stood for this share of the time that E5 allows before a bend or dead end enters as soon as an
 exit is free, though those in it may stop."""
+HUSH = 0.2
+"""For this share of every half of the time in which each goal has to be free once (E6) e-agents enter a bend that is
+a goal one after another."""
 LINGER = 0.8
 """For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
 TRAIL = 3.5
@@ -77,7 +80,7 @@ def yield_at_line(
         free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
         free = free or car.violations & ROLLING != 0
     else:
-        free = may_enter_bend(b, n, v, way, near, state, labels, roads, obstacles, drivers, scratch)
+        free = may_enter_bend(b, n, tick, v, way, near, state, labels, roads, obstacles, drivers, scratch)
     if bits & LEFT != 0 and car.violations & LEFT_SIDE == 0:
         free = False
     return speed if free else max(0.0, line) / vehicle.period
@@ -85,35 +88,54 @@ def yield_at_line(
 
 @jit
 def may_enter_bend(
-    b: int, n: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
+    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
     obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
 ) -> bool:  # fmt: skip
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
-    An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone.
+    An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone; who has waited for that
+    for long takes the way on.
     """
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
     turns = turns_round(car)
+    hushed = is_hushed(tick, v, car, vehicle, drivers)
     inside = 0
     held = False
     for k in range(near):
         j = scratch.near[k]
         if labels.crosses[b, j] == v:
             inside += 1 if turns else shares_way(b, j, way, degree, state, vehicle)
-            held = held or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
+            held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
         elif turns and degree > 1:
             held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
+    long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
         free = has_room(b, n, car.next_lane, inside, state, labels, roads, obstacles, drivers, scratch)
-        long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
         if long and inside == 0:
             free = free or is_free(b, n, car.next_lane, state, roads, drivers, scratch)
+    if long and not free and turns and degree == 2:
+        take_way_on(b, n, state, roads, obstacles, drivers, scratch)
     car.kept_out = 0 if free else car.kept_out + 1
     return free
+
+
+@jit_inline
+def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers) -> bool:
+    """Tell whether now is a time at which a car that minds goals enters the bend v only if nobody is in it.
+
+    Without such times cars that follow one another through a bend without end would never leave it free.
+    """
+    half = ticks_of(0.5 * vehicle.goal_time, vehicle)
+    if half <= 0 or tick % half < (1.0 - HUSH) * half:
+        return False
+    found = False
+    for k in range(car.goal_first, car.goal_last):
+        found = found or drivers.stage[k] == v
+    return found
 
 
 @jit_inline
@@ -210,6 +232,8 @@ def may_go(
         return False
     budget = BUDGET * car.owed * vehicle.period if car.kind == ROUND else INFINITE
     if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
+        return True
+    if due and take_last_resort(b, n, state, labels, roads, obstacles, drivers, scratch):
         return True
     if due:
         take_widest(b, n, state, labels, roads, obstacles, drivers, scratch)

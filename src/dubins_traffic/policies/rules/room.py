@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import Drivers, Scratch
-from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_start
+from dubins_traffic.policies.rules.tables import Drivers, Scratch, Vehicle
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT, STANDS
 
@@ -45,7 +46,8 @@ def room_in(
     """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres.
 
     It is negative where the car can't leave the disc. All that are in the lane drive on until they stand close behind
-    one another: behind what stands there now, behind an obstacle or before the next disc. Of the ego nobody knows
+    one another: behind what stands there now, behind an obstacle or before the next disc. Who drives in that disc has
+    left the lane. Of the ego nobody knows
     whether it drives on; at a crossing, where who finds one exit barred has to take another in time, it may back up as
     well. `inside` cars are still in the disc and will be before this one.
     """
@@ -55,6 +57,7 @@ def room_in(
     mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
     pitch = 2.0 * vehicle.reach + QUEUE_GAP
     start = lane_start(roads, net, out)
+    end = lane_end(roads, net, out)
     crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
     last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
@@ -64,16 +67,14 @@ def room_in(
         j = scratch.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-            oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
-            there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
-            if j != n and there and not oncoming and labels.crosses[b, j] != start:
+            gone = labels.at[b, j] == end and labels.bits[b, j] & STANDS == 0 and (j != EGO or n == EGO)
+            if j != n and not gone and takes_room(b, j, out, start, along, aside, labels, vehicle):
                 if look == 1:
                     last -= pitch if along < wall else 0.0
                     j = scratch.link[j]
                     continue
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
-                slow = abs(state.speed[b, j]) < BRISK or heading < 0.5
-                if slow and along < mouth + pitch:
+                if is_slow(b, j, heading, state) and along < mouth + pitch:
                     return -1.0
                 if labels.bits[b, j] & STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
                     back = vehicle.backs_up if j == EGO and n != EGO and crossing else 0.0
@@ -81,6 +82,45 @@ def room_in(
                     last = min(last, along - back - pitch)
             j = scratch.link[j]
     return last - pitch * inside - mouth
+
+
+@jit_inline
+def takes_room(
+    b: int, j: Any, out: int, start: int, along: float, aside: float, labels: Labels, vehicle: Vehicle
+) -> bool:
+    """Tell whether a car, at (along, aside) of the lane `out`, is in the way of those that come there from `start`."""
+    oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
+    there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
+    return there and not oncoming and labels.crosses[b, j] != start
+
+
+@jit_inline
+def is_slow(b: int, j: Any, heading: float, state: State) -> bool:
+    """Tell whether a car makes no room soon; `heading` is the cosine of its angle to the lane."""
+    return abs(state.speed[b, j]) < BRISK or heading < 0.5
+
+
+@jit
+def is_open(
+    b: int, n: int, out: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
+) -> bool:  # fmt: skip
+    """Tell whether a car can leave the disc by the lane `out` for all that is there now, wherever that may stop."""
+    net = drivers.net[b]
+    vehicle = drivers.vehicle[b]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
+    pitch = 2.0 * vehicle.reach + QUEUE_GAP
+    start = lane_start(roads, net, out)
+    tx, ty = lane_direction(roads, net, out)
+    j = scratch.head[out >> 1]
+    while j >= 0:
+        along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
+        heading = state.c[b, j] * tx + state.s[b, j] * ty
+        near = along < mouth + pitch and is_slow(b, j, heading, state)
+        if j != n and near and takes_room(b, j, out, start, along, aside, labels, vehicle):
+            return False
+        j = scratch.link[j]
+    return True
 
 
 @jit

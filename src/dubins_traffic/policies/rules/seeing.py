@@ -25,6 +25,8 @@ the largest distance between centres, at which it still counts as blocking the l
 """
 FACING_GAP = 0.8
 """Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
+OBSTACLE_GAP = 0.04
+"""Gap kept in a disc from an obstacle behind it, metres: it never moves, and who comes near may pass it then."""
 CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
 SIDE, NARROW = 0.04, 0.02
@@ -181,6 +183,12 @@ def around(way: ReferencePath) -> float:
 
 
 @jit_inline
+def chord(way: ReferencePath) -> float:
+    """Return metres between the ends of the arc of a way: it is at least so long."""
+    return way.radius * sqrt(2.0 * max(1.0 - way.tx * way.ux - way.ty * way.uy, 0.0))
+
+
+@jit_inline
 def see_obstacles(
     b: int, part: int, key: float, x: float, y: float, way: ReferencePath, low: float, high: float,
     gap: float, who: int, close: bool, obstacles: ObstacleTable, vehicle: Vehicle, car: Driver,
@@ -209,7 +217,7 @@ def see_obstacles(
             continue
         distance = sqrt(d2)
         if there - part == 2:
-            distance = max(distance, its_key - key + around(way))
+            distance = max(distance, its_key - key + max(around(way), chord(way)))
         its_gap = distance - vehicle.reach - row[7]
         if its_gap < gap:
             gap = its_gap
@@ -236,7 +244,7 @@ def wanted_gap(
     if labels.bits[b, n] & LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
-        return QUEUE_GAP if labels.crosses[b, n] >= 0 else standing
+        return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
     if car.violations & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])

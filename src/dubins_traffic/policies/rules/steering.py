@@ -9,6 +9,7 @@ import numpy as np
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
 from dubins_traffic.policies.rules.tables import LEFT_SIDE, Drivers, Scratch, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
@@ -54,6 +55,12 @@ def move(
     if not safe and passes and offset == 0.0:
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
+        )
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch)
+    elif not safe and passes and within_lane(drivers.car[b, n].aside, vehicle):
+        across = 1.0 if left > offset else -1.0
+        speed, yaw_rate = steer(
+            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch)
     if not safe:

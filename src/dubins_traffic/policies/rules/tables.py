@@ -53,6 +53,10 @@ class Driver:
     """Its first row of `Drivers.stage`: the lanes of a loop, or the goals' vertices."""
     last: int
     """The row after its last."""
+    goal_first: int
+    """The first row of `Drivers.stage` that is one of the goals of its trial, if the car minds them."""
+    goal_last: int
+    """The row after the last."""
     speed: float
     """How fast the car drives, m/s."""
     rolls: float
@@ -89,6 +93,8 @@ class Driver:
     """Ticks for which what it may pass has not moved."""
     kept_out: int
     """Ticks for which it has stood before a bend or dead end that it may not enter."""
+    within: int
+    """Ticks for which its body has met the crossing at the end of its lane."""
     aside: float
     """How far left of its way it passes what stands, metres, 0 if it passes nothing."""
     until: float
@@ -153,6 +159,8 @@ class Vehicle:
     """For how long an e-agent may stand with a free way (E5), seconds."""
     approaches: float
     """How near to a crossing a car takes its place in the order, metres."""
+    goal_time: float
+    """Within how many seconds every goal has to be free once (E6)."""
 
 
 @record
@@ -297,4 +305,5 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
         own.exit_gap = rules.exit_gap
         own.rest_time = rules.rest_time
         own.approaches = rules.approach_distance
+        own.goal_time = rules.goal_time
     return rows

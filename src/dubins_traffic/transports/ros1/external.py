@@ -27,7 +27,7 @@ NAME = "ros1-world"
 APPEAR = 10.0
 """Seconds within which every car must have been seen."""
 LATE = 0.5
-"""Age of a pose above which it is late, seconds."""
+"""Age of a pose above which it is late, seconds; then it is waited for as long again."""
 FROZEN = 2.0
 """Seconds for which a car that is told to drive may have the very same pose."""
 CREEP = 0.05
@@ -82,6 +82,7 @@ class ExternalWorld:
         problem = self._instance.problem
         self._touching = Touching(problem.car, problem.obstacles, problem.period)
         self._tick = 0
+        self._driven: dict[int, float] = {}
         self._listen()
         self._await()
         self._state = State.zeros(1, len(self._instance.names))
@@ -168,19 +169,16 @@ class ExternalWorld:
 
     def _look(self, speed: Floats | None) -> None:
         """Take the latest poses into the state; `speed` are the commands, None at the beginning."""
-        state, period, now = self._state, self._instance.problem.period, monotonic()
+        state, period = self._state, self._instance.problem.period
         reach = SHARE * self._instance.problem.car.bounds.speed * (period + LATE) + LEAP
         for n, name in enumerate(self._instance.names):
-            with self._lock:
-                seen = self._seen[name]
+            seen = self._latest(name)
             x, y, c, s = seen.pose
-            if now - seen.came > LATE:
-                raise _lost(f"no pose of {name} for {now - seen.came:.1f} s")
             if speed is not None:
                 moved = math.hypot(x - state.x[0, n], y - state.y[0, n])
                 if moved > reach:
                     raise _lost(f"{name} jumped by {moved:.2f} m")
-                if abs(speed[n]) > CREEP and now - max(seen.same_since, self._began) > FROZEN:
+                if self._is_frozen(n, seen, float(speed[n])):
                     raise _lost(f"the pose of {name} is frozen although it is told to drive")
                 turned = math.atan2(
                     s * state.c[0, n] - c * state.s[0, n], c * state.c[0, n] + s * state.s[0, n]
@@ -190,9 +188,29 @@ class ExternalWorld:
                     math.copysign(moved, ahead) / period,
                     turned / period,
                 )
-            else:
-                self._began = now
             state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = x, y, c, s
+
+    def _latest(self, name: str) -> _Seen:
+        """Return the latest pose of a car; one that is late is waited for: this process itself may have stood still."""
+        until = 0.0
+        while True:
+            with self._lock:
+                seen = self._seen[name]
+            now = monotonic()
+            if now - seen.came <= LATE:
+                return seen
+            until = until or now + LATE
+            if now > until:
+                raise _lost(f"no pose of {name} for {now - seen.came:.1f} s")
+            sleep(0.01)
+
+    def _is_frozen(self, n: int, seen: _Seen, speed: float) -> bool:
+        """Tell whether car n has stood in one place for too long since it was told to drive."""
+        now = monotonic()
+        if abs(speed) <= CREEP:
+            self._driven.pop(n, None)
+            return False
+        return now - max(seen.same_since, self._driven.setdefault(n, now)) > FROZEN
 
 
 def _lost(detail: str) -> ControllerError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,7 @@ class Ros2:
         self._maestro, self._here = maestro, here
         self._readers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
+        self._looking = Lock()
         self._looked = 0.0
         self._open = False
 
@@ -84,13 +86,14 @@ class Ros2:
         self._stamps.begin()
         self._services.begin()
         self._world.begin(instance)
-        for car in [car for car in self._readers if car not in remote]:
-            self._graph.drop(self._readers.pop(car))
-            self._there.pop(car)
-        for car in remote:
-            if car not in self._readers:
-                self._readers[car] = self._graph.reader(COMMANDS.format(car), m.Twist)
-                self._there[car] = 0
+        with self._looking:
+            for car in [car for car in self._readers if car not in remote]:
+                self._graph.drop(self._readers.pop(car))
+                self._there.pop(car)
+            for car in remote:
+                if car not in self._readers:
+                    self._readers[car] = self._graph.reader(COMMANDS.format(car), m.Twist)
+                    self._there[car] = 0
 
     def announce(self, instance: Instance) -> None:
         """Publish the problem instance."""
@@ -118,7 +121,18 @@ class Ros2:
                 self._mailbox.command(car, twist.linear.x, twist.angular.z)
         if monotonic() - self._looked > LOOK:
             self._looked = monotonic()
-            self._look()
+            self.look()
+
+    def look(self) -> None:
+        """Tell the mailbox who has come and gone, as far as DDS knows: of who was killed it knows after seconds."""
+        with self._looking:
+            for car, reader in self._readers.items():
+                there = len(reader.get_matched_publications())
+                for _ in range(there, self._there[car]):
+                    self._mailbox.left(car)
+                for _ in range(self._there[car], there):
+                    self._mailbox.joined(car)
+                self._there[car] = there
 
     def close(self) -> None:
         """Leave the domain."""
@@ -143,13 +157,3 @@ class Ros2:
     def _publish(self, view: View, *, frame: bool) -> None:
         self._stamps.see(view)
         self._world.publish(view, self._stamps.now(), self._stamps.simulated, frame=frame)
-
-    def _look(self) -> None:
-        """Tell the mailbox who has come and gone."""
-        for car, reader in self._readers.items():
-            there = len(reader.get_matched_publications())
-            for _ in range(there, self._there[car]):
-                self._mailbox.left(car)
-            for _ in range(self._there[car], there):
-                self._mailbox.joined(car)
-            self._there[car] = there

@@ -1,0 +1,144 @@
+"""Forks of some trials of a batch: the rows of these trials out of all its tables, as many times as they are wanted.
+
+Tables hold one row per trial, but for three sorts of arrays: goals and obstacles stand one trial after another, with
+offsets; the ego's path, for each car that follows, stands where the car says; and what no trial changes (roads, lanes
+of loops, scripts, stages) is shared by the batch and its forks.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.agents.tables import Agents
+from dubins_traffic.cars.rows import rows
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.engine.batch_kernel import World
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Rows, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
+from dubins_traffic.rules.tables import LabelTables, spread
+from dubins_traffic.scoring.tally import Tally
+
+Table = TypeVar("Table", bound=Tables)
+
+
+class Ragged(NamedTuple):
+    """Rows that stand one trial after another: those of trial b are `off[b]` to ``off[b + 1] - 1``; `row` (R,)."""
+
+    off: Ints
+    row: Ints
+
+
+def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt: float) -> World:
+    """Return the tables of forks of some trials, one of which may be named more than once.
+
+    The batch and its forks share nothing that changes.
+
+    Parameters
+    ----------
+    world : World
+        The tables of the batch, of whose breaches and contacts none is still to be taken over.
+    trials : (K,)
+        Numbers of trials of the batch.
+    seeds : (K,) uint64, optional
+        From which each fork draws from here on; by default from its own.
+    dt : float
+        Seconds of a tick.
+    """
+    cars = rows_of(world.cars, trials)
+    terms = spread(world.terms, trials)
+    goals = _goals(terms)
+    seed = {} if seeds is None else {"seed": seeds}
+    progress, work = world.progress, world.work
+    state, roads, beside = (
+        rows_of(world.state, trials), world.roads, world.beside.replace(base=world.beside.base[trials]),
+    )  # fmt: skip
+    rules, labels, memory = (
+        spread(world.rules, trials), rows_of(world.labels, trials), rows_of(world.memory, trials),
+    )  # fmt: skip
+    breach_log = _breach_log(world.breach_log, trials, goals)
+    spacing = rows_of(world.spacing, trials, near=world.spacing.near.copy())
+    return World(
+        state=state,
+        cars=cars,
+        obstacles=_obstacles(world.obstacles, trials),
+        rows=rows(cars, world.state.x.shape[1], dt),
+        work=_copied(work).replace(partner=work.partner[trials], touching=work.touching[trials]),
+        roads=roads,
+        beside=beside,
+        rules=rules,
+        terms=terms,
+        labels=labels,
+        memory=memory,
+        breach_log=breach_log,
+        drivers=rows_of(
+            world.drivers, trials, stage=world.drivers.stage, distance=world.drivers.distance, **seed
+        ),
+        scratch=_copied(world.scratch),
+        agents=_agents(world.agents, trials, seeds),
+        space=_copied(world.space),
+        tally=_tally(world.tally, trials),
+        progress=rows_of(progress, trials, contact=progress.contact.copy(), place=progress.place.copy()),
+        spacing=spacing,
+        labelling=LabelTables(state, roads, beside, rules, labels, memory),
+        judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
+    )
+
+
+def rows_of(table: Table, trials: Ints, **other: Any) -> Table:
+    """Return a table of which each array has the rows of `trials`, but for the arrays in `other`."""
+    names = table.field_names
+    own = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
+    return type(table)(*own)
+
+
+def ragged(off: Ints, trials: Ints) -> Ragged:
+    """Return the rows of `trials` out of rows with the offsets `off` (B + 1,), and their offsets (K + 1,)."""
+    first, count = off[trials], np.diff(off)[trials]
+    ends = np.append(0, count.cumsum())
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(first - ends[:-1], count)
+    return Ragged(ends, rows)
+
+
+def _copied(table: Table) -> Table:
+    return type(table)(*(array.copy() for array in table))
+
+
+def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
+    own = ragged(table.off, trials)
+    return ObstacleTable(own.off, table.part[own.row], table.owner[own.row])
+
+
+def _goals(terms: Rows[RefereeParameters]) -> Ints:
+    """Return the rows of the goals of forks, which are theirs from here on, one fork's after the other's."""
+    begin, end = terms["goals_begin"].copy(), terms["goals_end"].copy()
+    ends = np.append(0, (end - begin).cumsum())
+    terms["goals_begin"] = ends[:-1]
+    terms["goals_end"] = ends[1:]
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(begin - ends[:-1], end - begin)
+    return rows
+
+
+def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
+    row, filled = table(FoundBreach, len(log.row)), np.zeros_like(log.filled)
+    return rows_of(log, trials, goal=spread(log.goal, goals), look=log.look.copy(), row=row, filled=filled)
+
+
+def _tally(tally: Tally, trials: Ints) -> Tally:
+    goals = ragged(np.append(tally.goal_off, len(tally.goal)), trials)
+    return rows_of(tally, trials, goal_off=goals.off[:-1], goal=tally.goal[goals.row])
+
+
+def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:
+    """Return the e-agents of forks; each car that follows has the ego's path of its own."""
+    team, cars = agents.team[trials], agents.agent[trials]
+    if seeds is not None:
+        team["seed"] = seeds
+    follows = cars["trail"] >= 0
+    trail = cars["trail"][follows]
+    cars["trail"][follows] = np.arange(len(trail))
+    return Agents(team, cars, agents.cycle, agents.script, agents.trail[trail], agents.point[trail])

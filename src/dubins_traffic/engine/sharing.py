@@ -1,0 +1,53 @@
+"""Which trials can be stepped together with others, and which run by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, REMOTE
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+
+def fitness() -> Callable[[Instance], bool]:
+    """Return a function that does as `_is_fit`, and looks at trials that are alike in this once."""
+    known: dict[tuple[float, ...], bool] = {}
+
+    def fit(instance: Instance) -> bool:
+        problem = instance.problem
+        own = problem.network, problem.rules, problem.car, instance.e_agents
+        key = *map(id, own), problem.intersection_radius
+        if key not in known:
+            known[key] = _is_fit(instance)
+        return known[key]
+
+    return fit
+
+
+def can_share(instance: Instance) -> bool:
+    """Tell whether a trial can be stepped with others, whatever drives its ego."""
+    apart = any(agent.kind in (COUNTER, REMOTE) for agent in instance.e_agents)
+    return instance.simulator == "embedded" and not instance.problem.formulas and not apart
+
+
+def _is_fit(instance: Instance) -> bool:
+    """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
+    lawful = any(agent.kind in KEEP_RULES for agent in instance.e_agents)
+    try:
+        check_fit(instance.problem, owes=False)
+        if lawful:
+            check_fit(instance.problem, owes=True)
+    except InputError:
+        return False
+    return True
+
+
+def undisturbed(instance: Instance) -> bool:
+    """Tell whether nothing disturbs what the ego sees and asks for."""
+    own = instance.disturbances
+    noise = own.position_noise > 0.0 or own.heading_noise > 0.0
+    return not noise and own.command_delay == 0 and own.command_loss == 0.0

@@ -1,0 +1,190 @@
+"""Map formats by name: those that come with the package, those of other packages, and a user's own.
+
+A format reads a text into the fields of RND version 0 (`roads.formats.rnd`), which are checked then; so it knows of
+road networks only their segments, length and transform. A new one is a file beside this one and a line in `BUILT_IN`,
+or a class outside the package (docs/extending/map-format.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+from typing import Any, Protocol, cast, runtime_checkable
+
+from dubins_traffic import outside
+from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.outside import Seam
+from dubins_traffic.roads.formats.rnd_text import may_be
+
+BUILT_IN = {
+    "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
+    "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
+}
+"""The formats of this package by name: module and class, in the order in which they are asked."""
+GROUP = "dubins_traffic.map_formats"
+"""Entry points of other packages."""
+_SEAM = Seam(
+    "--map-format", "map format", ("sniff", "read"), "sniff(text) -> bool and read(text, file) -> mapping"
+)
+
+
+class MapFormat(Protocol):
+    """Reads road networks from texts of one kind. A class without arguments."""
+
+    @property
+    def name(self) -> str:
+        """Short name, such as ``rnd-json``."""
+        ...
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """Suffixes of its files, in lower case, with the dot."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """A line about it."""
+        ...
+
+    def sniff(self, text: str) -> bool:
+        """Tell whether a text is of this format, from its beginning; must not raise."""
+        ...
+
+    def read(self, text: str, file: str | None = None) -> Mapping[str, Any]:
+        """Return the fields of RND version 0 that a text describes: version, length, segments, transform, shape.
+
+        Raises
+        ------
+        InputError
+            If the text is broken; names `file`. The fields are checked by the caller.
+        """
+        ...
+
+
+@runtime_checkable
+class WritesMaps(MapFormat, Protocol):
+    """A map format that can be written, too."""
+
+    def write(self, document: Mapping[str, Any]) -> str:
+        """Return the text of an RND document."""
+        ...
+
+
+def names() -> Mapping[str, str]:
+    """Return the formats of this and other packages: name to one line of description."""
+    return {form.name: f"{form.description} ({', '.join(form.suffixes)})" for form in registered()}
+
+
+def registered() -> Iterator[MapFormat]:
+    """Yield the formats of this package, then those of others, which are looked for only then."""
+    yield from _built_in().values()
+    yield from _others()
+
+
+def forget() -> None:
+    """Look for the formats of other packages anew when next they are asked for."""
+    _others.cache_clear()
+
+
+def load(spec: str) -> MapFormat:
+    """Return a map format: a registered name, ``module:Class`` or ``path/to/file.py:Class``.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it lacks something of `MapFormat`.
+    """
+    for form in registered():
+        if form.name == spec:
+            return form
+    if not outside.is_place(spec):
+        own = ", ".join(form.name for form in registered())
+        raise _SEAM.refuse("unknown map format", spec, f"one of {own}, module:Class or path/to/file.py:Class")
+    return _made(outside.find(spec, _SEAM), spec)
+
+
+def sniffs(form: MapFormat, text: str) -> bool:
+    """Tell whether a text is of a format; InputError that names the format if it raises."""
+    try:
+        return bool(form.sniff(text))
+    except Exception as error:
+        raise InputError(f"the map format {form.name} raised {outside.plainly(error)} in sniff") from error
+
+
+def sniffed(text: str) -> MapFormat | None:
+    """Return the registered format of which a text is, None if it is of none."""
+    return next((form for form in registered() if sniffs(form, text)), None)
+
+
+def of_other_package(text: str) -> MapFormat | None:
+    """Return the format of another package of which a text is."""
+    return next((form for form in _others() if sniffs(form, text)), None)
+
+
+def of_text(text: str) -> MapFormat:
+    """Return the format in which a text is to be read that holds a road network; what can't be told is RND."""
+    return sniffed(text) or _built_in()["rnd-json" if text.lstrip()[:1] in ("{", "[") else "rnd-text"]
+
+
+def is_map(text: str) -> bool:
+    """Tell whether a text holds a road network and is no JSON, which other documents are, too."""
+    return text.lstrip()[:1] not in ("", "{", "[") and (sniffed(text) is not None or may_be(text))
+
+
+def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps | None:
+    """Return the format that writes files called so, None if there is none."""
+    suffix = Path(path).suffix.lower()
+    forms = chain([] if further is None else [further], registered())
+    return next((form for form in forms if suffix in form.suffixes and isinstance(form, WritesMaps)), None)
+
+
+def suffixes(further: MapFormat | None = None) -> tuple[str, ...]:
+    """Return the suffixes of all formats that can be written."""
+    forms = chain([] if further is None else [further], registered())
+    return tuple(suffix for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes)
+
+
+def document(form: MapFormat, text: str, file: str | None) -> Mapping[str, Any]:
+    """Return the RND document that `form` reads in a text.
+
+    Raises
+    ------
+    InputError
+        If it is broken; whatever else the format raises becomes one that names it.
+    """
+    if not text.strip():
+        raise InputError("empty", file=file, expected="a road network (RND, JSON or text)")
+    try:
+        return form.read(text, file)
+    except DubinsTrafficError:
+        raise
+    except Exception as error:
+        raise InputError(f"the map format {form.name} raised {outside.plainly(error)}", file=file) from error
+
+
+@cache
+def _built_in() -> Mapping[str, MapFormat]:
+    return {name: getattr(import_module(place), own)() for name, (place, own) in BUILT_IN.items()}
+
+
+@cache
+def _others() -> tuple[MapFormat, ...]:
+    from importlib.metadata import entry_points
+
+    found = sorted(entry_points(group=GROUP), key=lambda own: own.name)
+    return tuple(_made(own.load(), own.value) for own in found)
+
+
+def _made(maker: Any, spec: str) -> MapFormat:
+    made = outside.make(maker, spec, _SEAM)
+    for field, kind in (("name", str), ("suffixes", tuple), ("description", str)):
+        if not isinstance(getattr(made, field, None), kind):
+            raise _SEAM.refuse(
+                f"{spec.rpartition(':')[2]} is not a map format: it lacks {field}",
+                spec,
+                "name, suffixes, description",
+            )
+    return cast(MapFormat, made)

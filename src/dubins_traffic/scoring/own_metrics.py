@@ -1,0 +1,109 @@
+"""The metrics of a trial that are asked for by name or are the user's own: fed in blocks of one second, and checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.outside import plainly
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import Ending
+from dubins_traffic.scoring.blocks import Seconds
+from dubins_traffic.scoring.metric import KINDS, Column, Maker, Measured, Metric, Value
+
+
+class OwnMetrics:
+    """A sink that shows a trial to metrics of `Metric`, in the same blocks wherever the frames come from.
+
+    What a metric raises is no fault of the trial: it becomes an `InputError` that names the metric.
+    """
+
+    def __init__(self, makers: Sequence[Maker]) -> None:
+        self._metrics: tuple[Metric, ...] = tuple(maker() for maker in makers)
+
+    def begin(self, instance: Instance) -> None:
+        """Start all metrics."""
+        self._seconds = Seconds(instance.problem.rate)
+        for metric in self._metrics:
+            _guarded(metric, "begin", instance)
+
+    def frames(self, frames: Frames) -> None:
+        """Take a block of frames, of any length."""
+        for block in self._seconds.take(frames):
+            self._show(block)
+
+    def end(self, ending: Ending) -> None:
+        """Show what is left, and the ending."""
+        self._show_rest()
+        for metric in self._metrics:
+            _guarded(metric, "end", ending)
+
+    def result(self) -> tuple[Measured, ...]:
+        """Return the values of all metrics, in the order of their columns.
+
+        Raises
+        ------
+        InputError
+            If a metric raises, or tells anything but a value of its kind for each of its columns.
+        """
+        self._show_rest()
+        return tuple(own for metric in self._metrics for own in _values(metric))
+
+    def _show(self, block: Frames) -> None:
+        for metric in self._metrics:
+            _guarded(metric, "frames", block)
+
+    def _show_rest(self) -> None:
+        block = self._seconds.rest()
+        if block is not None:
+            self._show(block)
+
+
+def _guarded(metric: Metric, method: str, *arguments: object) -> Any:
+    try:
+        return getattr(metric, method)(*arguments)
+    except DubinsTrafficError:
+        raise
+    except Exception as error:
+        raise _fault(
+            metric, f"raised {plainly(error)} in {method}", None, "a metric that takes every trial"
+        ) from error
+
+
+def _values(metric: Metric) -> list[Measured]:
+    found = _guarded(metric, "result")
+    names = [column.name for column in metric.columns]
+    if not isinstance(found, Mapping) or set(cast("Mapping[str, Any]", found)) != set(names):
+        raise _fault(
+            metric,
+            "tells other values than its columns",
+            cast("object", found),
+            f"a mapping of {', '.join(names)}",
+        )
+    return [Measured(column, _value(metric, column, found[column.name])) for column in metric.columns]
+
+
+def _value(metric: Metric, column: Column, value: Any) -> Value:
+    """Return a value as a plain one of Python."""
+    plain = value.item() if hasattr(value, "item") and getattr(value, "shape", None) == () else value
+    if plain is None:
+        return None
+    own = KINDS[column.kind]
+    fits = isinstance(plain, own) and (column.kind == "bool" or not isinstance(plain, bool))
+    if fits and column.kind == "float64":
+        plain = float(plain)
+        fits = math.isfinite(plain)
+    if fits and column.kind in ("int32", "int64"):
+        fits = abs(plain) < 2 ** (int(column.kind[3:]) - 1)
+    if not fits:
+        raise _fault(
+            metric, f"tells no {column.kind} for {column.name}", value, f"a finite {column.kind}, or None"
+        )
+    return plain
+
+
+def _fault(metric: Metric, problem: str, value: object, expected: str) -> InputError:
+    return InputError(f"{type(metric).__name__} {problem}", file="--metric", value=value, expected=expected)

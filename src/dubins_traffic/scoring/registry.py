@@ -1,0 +1,136 @@
+"""Metrics by name: those that come with the package, those of other packages, and a user's own.
+
+The scores that every trial has stand in `scoring.score.Score`. These are told beside them where they are asked for. A
+new one is a file beside this one and a line in `BUILT_IN`, or a class outside the package (docs/extending/metric.md).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib import import_module
+from typing import Any, cast, get_args
+
+from dubins_traffic import outside
+from dubins_traffic.errors import InputError
+from dubins_traffic.outside import Seam
+from dubins_traffic.scoring.metric import KINDS, Column, Kind, Maker, MetricSpec
+
+BUILT_IN = {
+    "time_to_collision": ("dubins_traffic.scoring.time_to_collision", "TimeToCollision"),
+}
+"""The metrics of this package by name: module and class."""
+GROUP = "dubins_traffic.metrics"
+"""Entry points of other packages."""
+OPTION = "--metric"
+_SEAM = Seam(
+    OPTION,
+    "metric",
+    ("begin", "frames", "end", "result"),
+    "columns, begin(instance), frames(frames), end(ending) and result() -> mapping",
+)
+_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
+
+
+def names() -> Mapping[str, str]:
+    """Return the metrics of this and other packages: name to one line of description."""
+    return {name: _line(maker) for name, maker in _registered().items()}
+
+
+def load(spec: MetricSpec) -> Maker:
+    """Return what makes a metric, having made one.
+
+    Parameters
+    ----------
+    spec : str or callable
+        A registered name, ``module:Class``, ``path/to/file.py:Class``, or a class without arguments.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it lacks something of `scoring.metric.Metric`.
+    """
+    maker = _maker(spec)
+    _columns_of(maker, spec)
+    return maker
+
+
+def columns(specs: Sequence[MetricSpec], taken: Sequence[str] = ()) -> tuple[Column, ...]:
+    """Return what some metrics tell, in their order; `taken` are names that other columns have.
+
+    Raises
+    ------
+    InputError
+        As `load`; and if two columns have one name.
+    """
+    found: dict[str, Column] = {}
+    for spec in specs:
+        for own in _columns_of(_maker(spec), spec):
+            if own.name in found or own.name in taken:
+                raise _refuse(spec, f"has a column whose name is taken: {own.name}", "a name of its own")
+            found[own.name] = own
+    return tuple(found.values())
+
+
+def makers(specs: Sequence[MetricSpec]) -> tuple[Maker, ...]:
+    """Return what makes some metrics, each found once; the exceptions are those of `columns`."""
+    found = tuple(_maker(spec) for spec in specs)
+    columns(found)
+    return found
+
+
+def forget() -> None:
+    """Look for the metrics of other packages anew when next they are asked for."""
+    _registered.cache_clear()
+
+
+def _columns_of(maker: Maker, spec: MetricSpec) -> tuple[Column, ...]:
+    made = outside.make(maker, _called(spec), _SEAM)
+    columns: Any = getattr(made, "columns", None)
+    sound = isinstance(columns, list | tuple) and columns and all(isinstance(own, Column) for own in columns)  # pyright: ignore[reportUnknownVariableType]
+    if not sound:
+        raise _refuse(spec, "has no columns", "columns, a tuple of dubins_traffic.Column")
+    found = tuple(cast("Sequence[Column]", columns))
+    for own in found:
+        if not _NAME.fullmatch(own.name) or own.kind not in get_args(Kind) or own.kind not in KINDS:
+            raise _refuse(
+                spec, f"has a column that is none: {own.name} of kind {own.kind}", "a name and a kind"
+            )
+    return found
+
+
+def _called(spec: MetricSpec) -> str:
+    return spec if isinstance(spec, str) else getattr(spec, "__name__", "metric")
+
+
+def _refuse(spec: MetricSpec, problem: str, expected: str) -> InputError:
+    return _SEAM.refuse(f"{_called(spec).rpartition(':')[2]} {problem}", _called(spec), expected)
+
+
+def _maker(spec: MetricSpec) -> Maker:
+    if not isinstance(spec, str):
+        return spec
+    if outside.is_place(spec):
+        return outside.find(spec, _SEAM)
+    if spec not in _registered():
+        own = ", ".join(_registered())
+        raise _SEAM.refuse("unknown metric", spec, f"one of {own}, module:Class or path/to/file.py:Class")
+    return _registered()[spec]
+
+
+@cache
+def _registered() -> Mapping[str, Maker]:
+    from importlib.metadata import entry_points
+
+    found: dict[str, Callable[[], Any]] = {
+        name: getattr(import_module(place), own) for name, (place, own) in BUILT_IN.items()
+    }
+    for entry in sorted(entry_points(group=GROUP), key=lambda own: own.name):
+        found.setdefault(entry.name, entry.load())
+    return found
+
+
+def _line(maker: Maker) -> str:
+    """Return the first line of what a class says of itself."""
+    return (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".")

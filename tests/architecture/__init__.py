@@ -1,0 +1,1 @@
+"""Tests of the house: docstrings, names, sizes, circles and duplicates in src."""

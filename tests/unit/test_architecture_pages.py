@@ -1,0 +1,59 @@
+"""docs/index.md names every page, docs/architecture.md every room as it is, and its pictures are as drawn."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.architecture.house import PACKAGE
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PICTURES = DOCS / "pictures"
+
+
+def page(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def rooms() -> set[str]:
+    places = [path for path in PACKAGE.iterdir() if path.name not in {"__init__.py", "__pycache__"}]
+    return {path.stem for path in places if path.is_dir() or path.suffix == ".py"}
+
+
+def test_the_index_names_every_page_and_only_those() -> None:
+    named = set(re.findall(r"\]\(([\w./-]+\.md)\)", page("index.md")))
+    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+    apart = {name for name in pages if name.startswith("extending/") and name != "extending/index.md"}
+    assert {name for name in named if not name.startswith("../")} == pages - {"index.md"} - apart
+    assert all((DOCS / name).exists() for name in named)
+
+
+def test_the_architecture_names_every_room() -> None:
+    table = page("architecture.md").partition("## Rooms")[2].partition("## What may be plugged in")[0]
+    cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == rooms()
+
+
+def test_the_files_that_the_notes_name_exist() -> None:
+    pages = [DOCS / "architecture.md", *sorted((DOCS / "design").glob("*.md"))]
+    missing: list[str] = []
+    for path in pages:
+        for name in re.findall(
+            r"`((?:[a-z_0-9]+/)+[a-z_0-9]+\.py)(?:: [^`]*)?`", path.read_text(encoding="utf-8")
+        ):
+            if not any((base / name).exists() for base in (PACKAGE, ROOT, PACKAGE / "campaign")):
+                missing.append(f"{path.name}: {name}")
+    assert missing == []
+
+
+def test_the_pictures_show_the_layers_as_they_are(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, PICTURES / "house.py", tmp_path], check=True, timeout=120)
+    shown = re.findall(r"\]\(pictures/house/([\w.]+)\)", page("architecture.md"))
+    assert sorted(shown) == sorted(path.name for path in tmp_path.iterdir())
+    for name in shown:
+        drawn = (tmp_path / name).read_text(encoding="utf-8")
+        assert drawn == (PICTURES / "house" / name).read_text(encoding="utf-8")
+    assert all(f">{room}</text>" in (tmp_path / "rooms.svg").read_text(encoding="utf-8") for room in rooms())
