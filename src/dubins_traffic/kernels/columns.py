@@ -35,12 +35,12 @@ def columns(size: int) -> Callable[[type[R]], type[R]]:
 
         def at(rows: Any, far: int) -> Any:
             block = np.ndarray((), layout, rows, far)
-            own = cast(Any, row)()
+            own = row()
             for name in names:
                 setattr(own, name, block[name])
             return own
 
-        row = type(
+        row: Any = type(
             kind.__name__,
             (),
             {
@@ -50,9 +50,9 @@ def columns(size: int) -> Callable[[type[R]], type[R]]:
                 "__slots__": tuple(names),
                 "FIRST_VALUES": {},
                 "LAYOUT": layout,
-                "TABLE": type(f"{kind.__name__}Table", (Table,), {"KIND": staticmethod(at)}),
             },
         )
+        row.TABLE = type(f"{kind.__name__}Table", (Table,), {"KIND": staticmethod(at), "RECORD": row})
         return cast(type[R], row)
 
     return make

@@ -91,9 +91,10 @@ class Grid(Protocol[R_co]):
 class Table(np.ndarray[Any, Any]):
     """A structured array whose rows are made once: what `table` returns.
 
-    `KIND` makes rows: from the array and how many bytes from its beginning a row is.
+    `RECORD` is the class of its rows; `KIND` makes them: from the array and how many bytes from its beginning one is.
     """
 
+    RECORD: Any
     KIND: Callable[[Any, int], Any]
     known: dict[Any, Any]
 
@@ -112,7 +113,7 @@ class Table(np.ndarray[Any, Any]):
 
     def __reduce__(self) -> Any:
         """Be pickled as the array that it is."""
-        return _revive, (type(self), np.asarray(self))
+        return _revive, (self.RECORD, np.asarray(self))
 
     def _find(self, place: Any) -> Any:
         found = super().__getitem__(place)
@@ -126,8 +127,8 @@ class Table(np.ndarray[Any, Any]):
         return found
 
 
-def _revive(kind: type[Table], rows: npt.NDArray[Any]) -> Table:
-    return rows.view(kind)
+def _revive(kind: Any, rows: npt.NDArray[Any]) -> Any:
+    return rows.view(kind.TABLE)
 
 
 @dataclass_transform(kw_only_default=True)
@@ -164,9 +165,7 @@ def record(kind: type[R]) -> type[R]:
     }
     row: Any = type(kind.__name__, (ctypes.Structure,), members)
     row.LAYOUT = np.dtype([(name, np.dtype(KINDS[hint])) for name, hint in fields.items()], align=True)
-    row.TABLE = type(
-        f"{kind.__name__}Table", (Table,), {"KIND": row.from_buffer, "__module__": kind.__module__}
-    )
+    row.TABLE = type(f"{kind.__name__}Table", (Table,), {"KIND": row.from_buffer, "RECORD": row})
     return cast(type[R], row)
 
 
