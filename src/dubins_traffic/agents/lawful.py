@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.records import Rows, table
+from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
@@ -86,8 +86,7 @@ def pack_drivers(
     """
     fleets, whose = distinct([(id(own.e_agents), id(own.problem.car)) for own in instances])
     rows = [_fleet(instances[b], cars) for b in fleets]
-    table_of: Any = np.stack([cast(Any, own.cars) for own in rows])[whose]
-    drivers: Rows[Driver] = table_of
+    drivers: Rows[Driver] = stack([own.cars for own in rows])[whose]
     first = 0
     for b, (own, _) in enumerate(rounds):
         if len(own):

@@ -18,14 +18,15 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.kernels.records import Rows as TableOf
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Traffic
-from dubins_traffic.rules.breach_log import JUDGED, MOST, OF_CAR, BreachLog, RefereeParameters
+from dubins_traffic.rules.breach_log import MOST, BreachLog, RefereeParameters, RefereeTables
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
-from dubins_traffic.rules.tables import Memory, RuleTable
+from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
 from dubins_traffic.scoring.tally import CLEARANCE, SEALED, SIGHT2, Tally, count_frame
 
 RUNNING, ENDED, COLLIDED, FAULTY, NO_CONTACTS, NO_PAIRS, NO_SIGHT, NO_DOCKET = range(8)
@@ -63,13 +64,16 @@ class World(Scene, Traffic):
     rows: Rows
     work: Workspace
     beside: ObstacleLanes
-    rules: RuleTable
-    terms: RefereeParameters
+    rules: TableOf[TrialRules]
+    terms: TableOf[RefereeParameters]
     memory: Memory
     breach_log: BreachLog
     tally: Tally
     progress: Progress
     spacing: Spacing
+    labelling: LabelTables
+    judging: RefereeTables
+    """The same tables, as labels and referee take them."""
 
 
 @jit_wide
@@ -124,7 +128,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own[TICK] = tick + 1
     keep_apart(world.state, b, tick + 1, world.spacing)
-    label_trial(b, tick + 1, world.state, world.roads, world.beside, world.rules, world.labels, world.memory)
+    label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
         world.tally.ints[b, SEALED] = 1
@@ -137,8 +141,8 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
 @jit_inline
 def _room(b: int, world: World) -> int:
     """Return the most breaches that a frame of trial b can begin."""
-    goals = world.terms.goal_off[b + 1] - world.terms.goal_off[b]
-    return MOST * world.state.count[b] + goals
+    own = world.terms[b]
+    return MOST * world.state.count[b] + own.goals_end - own.goals_begin
 
 
 @jit_inline
@@ -196,15 +200,12 @@ def _observe(b: int, tick: int, world: World) -> None:
     count_frame(
         b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
     )
-    if world.terms.whole[b, JUDGED] == 0:
+    if world.terms[b].judged == 0:
         return
     first = breach_log.filled[0]
-    judge_trial(
-        b, tick, world.spacing, world.state, world.roads, world.beside,
-        world.rules, world.terms, world.labels, world.memory, breach_log,
-    )  # fmt: skip
+    judge_trial(b, tick, world.judging)
     for k in range(first, breach_log.filled[0]):
-        n = breach_log.row[k, OF_CAR]
+        n = breach_log.row[k].car
         world.progress.place[k, 0] = world.state.x[b, n]
         world.progress.place[k, 1] = world.state.y[b, n]
         if n == EGO:

@@ -17,8 +17,10 @@ from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.engine.batch_kernel import World
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.rules.breach_log import BreachLog
+from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
+from dubins_traffic.rules.tables import LabelTables, spread
 from dubins_traffic.scoring.tally import Tally
 
 Table = TypeVar("Table", bound=Tables)
@@ -48,22 +50,31 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
         Seconds of a tick.
     """
     cars = rows_of(world.cars, trials)
-    goals = ragged(world.terms.goal_off, trials)
+    terms = spread(world.terms, trials)
+    goals = _goals(terms)
     seed = {} if seeds is None else {"seed": seeds}
     progress, work = world.progress, world.work
+    state, roads, beside = (
+        rows_of(world.state, trials), world.roads, world.beside.replace(base=world.beside.base[trials]),
+    )  # fmt: skip
+    rules, labels, memory = (
+        spread(world.rules, trials), rows_of(world.labels, trials), rows_of(world.memory, trials),
+    )  # fmt: skip
+    breach_log = _breach_log(world.breach_log, trials, goals)
+    spacing = rows_of(world.spacing, trials, near=world.spacing.near.copy())
     return World(
-        state=rows_of(world.state, trials),
+        state=state,
         cars=cars,
         obstacles=_obstacles(world.obstacles, trials),
         rows=rows(cars, world.state.x.shape[1], dt),
         work=_copied(work).replace(partner=work.partner[trials], touching=work.touching[trials]),
-        roads=world.roads,
-        beside=world.beside.replace(base=world.beside.base[trials]),
-        rules=rows_of(world.rules, trials),
-        terms=rows_of(world.terms, trials, goal_off=goals.off, goal=world.terms.goal[goals.row]),
-        labels=rows_of(world.labels, trials),
-        memory=rows_of(world.memory, trials),
-        breach_log=_breach_log(world.breach_log, trials, goals.row),
+        roads=roads,
+        beside=beside,
+        rules=rules,
+        terms=terms,
+        labels=labels,
+        memory=memory,
+        breach_log=breach_log,
         drivers=rows_of(
             world.drivers, trials, stage=world.drivers.stage, distance=world.drivers.distance, **seed
         ),
@@ -72,7 +83,9 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
         space=_copied(world.space),
         tally=_tally(world.tally, trials),
         progress=rows_of(progress, trials, contact=progress.contact.copy(), place=progress.place.copy()),
-        spacing=rows_of(world.spacing, trials, near=world.spacing.near.copy()),
+        spacing=spacing,
+        labelling=LabelTables(state, roads, beside, rules, labels, memory),
+        judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
     )
 
 
@@ -100,11 +113,19 @@ def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
     return ObstacleTable(own.off, table.part[own.row], table.owner[own.row])
 
 
+def _goals(terms: Rows[RefereeParameters]) -> Ints:
+    """Return the rows of the goals of forks, which are theirs from here on, one fork's after the other's."""
+    begin, end = terms["goals_begin"].copy(), terms["goals_end"].copy()
+    ends = np.append(0, (end - begin).cumsum())
+    terms["goals_begin"] = ends[:-1]
+    terms["goals_end"] = ends[1:]
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(begin - ends[:-1], end - begin)
+    return rows
+
+
 def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
-    return rows_of(
-        log, trials, goal_clock=log.goal_clock[goals], goal_paused=log.goal_paused[goals], look=log.look.copy(),
-        row=np.zeros_like(log.row), filled=np.zeros_like(log.filled),
-    )  # fmt: skip
+    row, filled = table(FoundBreach, len(log.row)), np.zeros_like(log.filled)
+    return rows_of(log, trials, goal=spread(log.goal, goals), look=log.look.copy(), row=row, filled=filled)
 
 
 def _tally(tally: Tally, trials: Ints) -> Tally:

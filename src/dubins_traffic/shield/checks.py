@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
@@ -16,7 +16,7 @@ from dubins_traffic.roads.lookup import (
     nearest_segment,
     nearest_vertex,
 )
-from dubins_traffic.rules.lane_state import lane_state
+from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.tables import (
@@ -183,11 +183,13 @@ def _leaves_lane(
     vehicle = drivers.vehicle[b]
     lane = labels.lane[b, EGO]
     back = guards.ego[b].turn_back
-    after, top, progress, lateral, turned = lane_state(
-        roads, net, at, labels.at[b, EGO], lane, guards.ego[b].top, segment, off2, x, y, c, s, back
-    )
-    if after < 0:
+    if at >= 0:
         return NOTHING
+    pose = Pose(x, y, c, s)
+    after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
+    after, top, progress, lateral, turned = along_lane(
+        roads, net, after, fresh, guards.ego[b].top, back, pose
+    )
     if turned:
         return TURN
     if after == lane and top - progress > back - TURNING:

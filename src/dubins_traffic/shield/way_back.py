@@ -19,7 +19,7 @@ from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.blocking import obstacle_narrows
+from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch, travel_of
@@ -129,10 +129,9 @@ def _blocks(
     """Tell whether an obstacle blocks a lane where its progress is in [near, far]."""
     vehicle = drivers.vehicle[b]
     length = roads.seg[roads.seg_off[drivers.net[b]] + (lane >> 1), 4]
-    return obstacle_narrows(
-        guards.obstacles, b, lane, length, near + ROUNDED, far - ROUNDED, 2.0 * vehicle.middle,
-        vehicle.needed - ROUNDED,
-    )  # fmt: skip
+    place = RightLane(b, lane, length, 2.0 * vehicle.middle)
+    needed = vehicle.needed - ROUNDED
+    return obstacle_narrows(guards.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
 
 
 @jit_inline
