@@ -31,7 +31,7 @@ from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import scratch
+from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.table import pack_distinct
 from dubins_traffic.rules.propositions import LEFT
@@ -123,8 +123,10 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
     )
     bodies = pack_obstacles([problem.obstacles for problem in problems])
     law, drivers = egos(problems, places, net), egos(problems, places, net)
-    watch = guards(problems, roads, drivers)
     room = scratch(places, int(np.diff(roads.seg_off).max()))
+    traffic = Traffic(group.state, group.labels, roads, bodies, drivers, room)
+    by_law = traffic.replace(drivers=law)
+    watch = guards(problems, traffic)
     hostile = Hostile(kinds, law.vehicle, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
     passed, aside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
@@ -132,11 +134,9 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         tick = np.full(count, -1)
         tick[active] = group.ticks[active]
         now = int(tick.max())
-        decide(now, group.commands, group.state, group.labels, roads, bodies, law, room)
+        decide(now, group.commands, by_law)
         group.commands[:, EGO] = hostile.ask(now, group.state, group.labels, group.commands[:, EGO].copy())
-        shield(
-            tick, False, group.state, group.labels, roads, bodies, drivers, watch, room, group.commands
-        )  # fmt: skip
+        shield(tick, False, traffic, watch, group.commands)
         reasons[active, watch.ego["reason"][active]] += 1
         group.advance()
         before, aside = aside, (group.labels.bits[:, EGO] & LEFT) != 0

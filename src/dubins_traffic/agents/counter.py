@@ -17,7 +17,7 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.room import MARGIN
-from dubins_traffic.policies.rules.tables import ROLLING, ROUND, Driver, Drivers, scratch
+from dubins_traffic.policies.rules.tables import ROLLING, ROUND, Driver, Drivers, Traffic, scratch
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.parameters import RuleParameters
@@ -97,7 +97,8 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        decide(tick, commands, state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
+        tables = (self._roads, self._obstacles, self._drivers, self._scratch)
+        decide(tick, commands, Traffic(state, labels, *tables))
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
                 self._hold(car, commands[0, car.car])

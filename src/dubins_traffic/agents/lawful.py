@@ -23,6 +23,7 @@ from dubins_traffic.policies.rules.tables import (
     Driver,
     Drivers,
     KeptPath,
+    Traffic,
     scratch,
     vehicles_of,
 )
@@ -43,21 +44,28 @@ class Lawful:
         for instance in instances:
             if any(agent.kind in KEEP_RULES for agent in instance.e_agents):
                 check_fit(instance.problem, owes=True)
-        self._roads, net = pack_distinct(
+        roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
         )
-        self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
-        self._drivers = pack_drivers(instances, cars, net)
-        self._scratch = scratch(cars, int(np.diff(self._roads.seg_off).max()))
+        self._traffic = Traffic(
+            state,
+            Labels.zeros(*state.x.shape),
+            roads,
+            pack_obstacles([instance.problem.obstacles for instance in instances]),
+            pack_drivers(instances, cars, net),
+            scratch(cars, int(np.diff(roads.seg_off).max())),
+        )
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
-        self._drivers.seed[:] = seed
+        self._traffic.drivers.seed[:] = seed
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
-        decide(tick, commands, state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
+        if state is not self._traffic.state or labels is not self._traffic.labels:
+            self._traffic = self._traffic.replace(state=state, labels=labels)
+        decide(tick, commands, self._traffic)
 
 
 def pack_drivers(

@@ -15,6 +15,7 @@ from dubins_traffic.policies.rules.tables import (
     Drivers,
     KeptPath,
     Scratch,
+    Traffic,
     scratch,
     vehicles_of,
 )
@@ -78,8 +79,9 @@ class Rules:
             seen = observation.propositions
             ego.place = nearest_stage(drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment)
         decide(
-            observation.tick, self._command, self._state, self._labels, self._roads, self._obstacles, drivers,
-            self._scratch,
-        )  # fmt: skip
+            observation.tick,
+            self._command,
+            Traffic(self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch),
+        )
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)

@@ -14,14 +14,14 @@ from dubins_traffic.cars.motion import FULL, MOVED, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
 from dubins_traffic.cars.partners import Workspace
 from dubins_traffic.cars.rows import Rows
-from dubins_traffic.cars.state import EGO, Labels
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
-from dubins_traffic.policies.rules.tables import Drivers, Scratch
+from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.rules.breach_log import MOST, BreachLog, RefereeParameters, RefereeTables
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
@@ -57,7 +57,7 @@ class Progress(Tables):
     place: Floats
 
 
-class World(Scene):
+class World(Scene, Traffic):
     """All tables of a batch."""
 
     cars: CarTable
@@ -66,11 +66,8 @@ class World(Scene):
     beside: ObstacleLanes
     rules: TableOf[TrialRules]
     terms: TableOf[RefereeParameters]
-    labels: Labels
     memory: Memory
     breach_log: BreachLog
-    drivers: Drivers
-    scratch: Scratch
     tally: Tally
     progress: Progress
     spacing: Spacing
@@ -158,8 +155,7 @@ def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> Non
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world.state, world.labels,
-            world.roads, world.obstacles, world.drivers, world.scratch, commands,
+            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
     unsound = 0.0
     for n in range(world.state.count[b]):

@@ -38,7 +38,7 @@ class TablesType(types.Type):
     def __init__(self, name: str, fields: tuple[tuple[str, Any], ...]) -> None:
         self.fields = fields
         digest = hashlib.sha256(repr(fields).encode()).hexdigest()[:12]
-        cast(Any, super()).__init__(name=f"{name}-{digest}")
+        super().__init__(name=f"{name}-{digest}")  # pyright: ignore[reportUnknownMemberType]
 
     def place(self, field: str) -> tuple[Any, int]:
         """Return the type of a field, and at which byte what is known of it begins."""

@@ -36,7 +36,8 @@ class Tables:
 
     def __init_subclass__(cls) -> None:
         own = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
-        cls.field_names = (*cls.field_names, *own)
+        known = dict.fromkeys(name for base in cls.__bases__ for name in getattr(base, "field_names", ()))
+        cls.field_names = (*known, *own)
 
     def __init__(self, *values: Any, **named: Any) -> None:
         fields = self.field_names

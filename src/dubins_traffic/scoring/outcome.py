@@ -71,8 +71,7 @@ class BatchScores:
         cars: CarTable,
     ) -> None:
         found = table(EgoMargins, len(tally.ints))
-        longest: int = tally.pose.shape[1]
-        tables = MarginTables(margins, roads, cars, np.zeros(longest))
+        tables = MarginTables(margins, roads, cars, np.zeros(int(tally.pose.shape[1])))
         nets = np.ascontiguousarray(tally.ints[:, NET])
         find_margins(trials, frames, tally.pose, tally.mark, nets, tables, found)
         numbers: list[int] = trials.tolist()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, Pose, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD, may_hit, motion_is_safe
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
@@ -17,7 +16,6 @@ from dubins_traffic.roads.lookup import (
     nearest_segment,
     nearest_vertex,
 )
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
@@ -78,15 +76,13 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
 
 
 @jit
-def may_touch(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, obstacles: ObstacleTable, vehicle: Vehicle,
-    scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
     """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
 
     `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
     """
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach
     period = vehicle.period
@@ -107,15 +103,13 @@ def may_touch(
 
 
 @jit
-def refusal(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> int:  # fmt: skip
+def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards) -> int:
     """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
 
     NOTHING if it does not: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
     the road, and has touched nothing, whatever the others did.
     """
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, EGO])
     turns = yaw_rate != 0.0 and vehicle.half_length > 0.0
@@ -131,24 +125,20 @@ def refusal(
         if off2 >= before2:
             return ROAD
     v, away2 = nearest_vertex(roads, net, nx, ny)
-    found = _enters(b, v, nx, ny, nc, ns, state, labels, roads, drivers)
+    found = _enters(b, v, nx, ny, nc, ns, traffic)
     if found != NOTHING:
         return found
     at = v if away2 < vehicle.disc * vehicle.disc else -1
-    found = _leaves_lane(
-        b, at, segment, off2, nx, ny, nc, ns, state, labels, roads, drivers, guards,
-    )  # fmt: skip
+    found = _leaves_lane(b, at, segment, off2, nx, ny, nc, ns, traffic, guards)
     if found != NOTHING:
         return found
-    return CONTACT if may_touch(b, speed, yaw_rate, near, state, obstacles, vehicle, scratch) else NOTHING
+    return CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else NOTHING
 
 
 @jit
-def _enters(
-    b: int, v: int, x: float, y: float, c: float, s: float, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers,
-) -> int:  # fmt: skip
+def _enters(b: int, v: int, x: float, y: float, c: float, s: float, traffic: Traffic) -> int:
     """Return which part of rule 3 an ego that goes to a pose breaks; the nearest intersection to that is v."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
     row = roads.vert_off[net] + v
@@ -176,10 +166,19 @@ def _enters(
 
 @jit
 def _leaves_lane(
-    b: int, at: int, segment: int, off2: float, x: float, y: float, c: float, s: float, state: State,
-    labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards,
-) -> int:  # fmt: skip
+    b: int,
+    at: int,
+    segment: int,
+    off2: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    traffic: Traffic,
+    guards: Guards,
+) -> int:
     """Return whether an ego that goes to a pose, in the disc of `at` (-1: none), is left there or turns round."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     lane = labels.lane[b, EGO]
@@ -204,16 +203,13 @@ def _leaves_lane(
         return RETURN if reach >= guards.ego[b].left_release else NOTHING
     if reach <= vehicle.over - BRINK:
         return NOTHING
-    return (
-        NOTHING if reach < min(vehicle.over, _reach(b, after, state, labels, roads, net, vehicle)) else LANE
-    )
+    return NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else LANE
 
 
 @jit
-def _reach(
-    b: int, lane: int, state: State, labels: Labels, roads: RoadTable, net: int, vehicle: Vehicle
-) -> float:
+def _reach(b: int, lane: int, traffic: Traffic, net: int, vehicle: Vehicle) -> float:
     """Return the largest lateral coordinate of the ego's body in `lane`, if that is its lane state."""
+    state, labels, roads = traffic.state, traffic.labels, traffic.roads
     if labels.lane[b, EGO] != lane:
         return 0.0
     tx, ty = lane_direction(roads, net, lane)

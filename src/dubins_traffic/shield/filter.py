@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
-from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, scratch
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.policies.rules.tables import Traffic, scratch
+from dubins_traffic.roads.table import pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
     REASONS,
@@ -71,12 +71,15 @@ class ShieldFilter:
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
         self._command = np.zeros((1, cars, 2))
-        self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
-        self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
-        net = np.zeros(1, dtype=np.int64)
-        self._drivers: Drivers = egos([problem], cars, net)
-        self._guards: Guards = guards([problem], self._roads, self._drivers, overtakes=self._overtakes)
+        self._traffic = Traffic(
+            self._state,
+            self._labels,
+            pack([problem.network], [problem.car.lane_width]),
+            pack_obstacles([problem.obstacles]),
+            egos([problem], cars, np.zeros(1, dtype=np.int64)),
+            scratch(cars, len(problem.network.segments)),
+        )
+        self._guards: Guards = guards([problem], self._traffic, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
         self._shield()  # compiles, so that nobody waits for that in the first tick
 
@@ -105,7 +108,4 @@ class ShieldFilter:
         return given
 
     def _shield(self) -> None:
-        shield(
-            self._tick, True, self._state, self._labels, self._roads, self._obstacles, self._drivers,
-            self._guards, self._scratch, self._command,
-        )  # fmt: skip
+        shield(self._tick, True, self._traffic, self._guards, self._command)

@@ -13,16 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.policies.rules.passing import BACK, TURNING, along, find_way_past
 from dubins_traffic.policies.rules.policy import list_cars, unlist_cars
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.roads.lookup import lane_coordinates
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.propositions import LEFT
 from dubins_traffic.shield.checks import bounded, gather_close, may_touch, refusal
@@ -46,10 +43,7 @@ STEPS = 4
 
 
 @jit
-def shield(
-    tick: Any, sighted: bool, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def shield(tick: Any, sighted: bool, traffic: Traffic, guards: Guards, commands: Floats) -> None:
     """Put what each ego does in place of what it was asked to do, `commands[:, 0]`.
 
     Parameters
@@ -68,36 +62,30 @@ def shield(
     for b in range(tick.shape[0]):
         if tick[b] >= 0:
             sight2 = -1.0 if sighted else guards.ego[b].sight2
-            shield_trial(
-                b, tick[b], sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
-            )
+            shield_trial(b, tick[b], sight2, traffic, guards, commands)
 
 
 @jit_inner
 def shield_trial(
-    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+    b: int, tick: int, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
+) -> None:
     """Put what the ego of trial b does in place of what it was asked to do."""
+    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
-    _remember(b, tick, state, labels, roads, drivers, guards)
+    _remember(b, tick, traffic, guards)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0
-    law, law_yaw = _law(
-        b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
-    )  # fmt: skip
+    law, law_yaw = _law(b, tick, left, sight2, traffic, guards, commands)
     if not left:
         guards.ego[b].kept = 0
     near = gather_close(b, state, sight2, vehicle, scratch)
-    obeys = _may_obey(
-        b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch
-    )
+    obeys = _may_obey(b, tick, left, sight2, law, law_yaw, near, traffic, guards)
     near = gather_close(b, state, sight2, vehicle, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
     speed, yaw_rate = bounded(asked, asked_yaw, vehicle) if finite else (0.0, 0.0)
     reason = NOTHING if finite else NUMBER
     if finite and not (obeys and speed == law and yaw_rate == law_yaw):
-        reason = refusal(b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch)
+        reason = refusal(b, speed, yaw_rate, near, traffic, guards)
     guards.ego[b].reason = reason
     if reason == NOTHING:
         commands[b, EGO, 0] = asked
@@ -106,10 +94,7 @@ def shield_trial(
         if left:
             speed, yaw_rate = (law, law_yaw) if obeys else (0.0, 0.0)
         else:
-            speed, yaw_rate = _nearest(
-                b, speed, yaw_rate, obeys, law, law_yaw, near, state, labels, roads, obstacles, drivers,
-                guards, scratch,
-            )  # fmt: skip
+            speed, yaw_rate = _nearest(b, speed, yaw_rate, obeys, law, law_yaw, near, traffic, guards)
         commands[b, EGO, 0] = speed
         commands[b, EGO, 1] = yaw_rate
     obeyed = speed == law and yaw_rate == law_yaw
@@ -121,27 +106,33 @@ def shield_trial(
 
 @jit_inline
 def _law(
-    b: int, tick: int, left: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
+) -> tuple[float, float]:
     """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     if left and guards.ego[b].kept != 0:
-        copy_memory(b, drivers, guards.alone.drivers)
+        copy_memory(b, drivers, guards.alone.traffic.drivers)
         law, law_yaw = drive_alone(
-            b, tick, labels.lane[b, EGO], state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO],
-            roads, obstacles, drivers, guards, scratch,
-        )  # fmt: skip
-        copy_memory(b, guards.alone.drivers, drivers)
+            b,
+            tick,
+            labels.lane[b, EGO],
+            state.x[b, EGO],
+            state.y[b, EGO],
+            state.c[b, EGO],
+            state.s[b, EGO],
+            traffic,
+            guards,
+        )
+        copy_memory(b, guards.alone.traffic.drivers, drivers)
         return law, law_yaw
-    drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, scratch, commands)
+    drive_by_law(b, tick, sight2, traffic, commands)
     return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
-def _remember(
-    b: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards
-) -> None:
+def _remember(b: int, tick: int, traffic: Traffic, guards: Guards) -> None:
     """Keep the greatest progress as the referee does, and let the law begin with the goal nearest to the start."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     ego = guards.ego[b]
     lane = labels.lane[b, EGO]
     if lane >= 0:
@@ -165,44 +156,48 @@ def _remember(
 
 @jit_inline
 def _may_obey(
-    b: int, tick: int, left: bool, sight2: float, law: float, law_yaw: float, near: int, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int,
+    tick: int,
+    left: bool,
+    sight2: float,
+    law: float,
+    law_yaw: float,
+    near: int,
+    traffic: Traffic,
+    guards: Guards,
+) -> bool:
     """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
-    if may_touch(b, law, law_yaw, near, state, obstacles, drivers.vehicle[b], scratch):
+    drivers = traffic.drivers
+    if may_touch(b, law, law_yaw, near, traffic, drivers.vehicle[b]):
         return False
     if left:
         return True
-    found = refusal(b, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch)
+    found = refusal(b, law, law_yaw, near, traffic, guards)
     if found != LEAVES_LANE:
         return found == NOTHING
     mode = guards.ego[b].mode
     if drivers.car[b, EGO].aside == 0.0 or mode == NEVER:
         return False
     if mode == LAW:
-        return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, scratch)
-    sure = surely_returns(
-        b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, scratch
-    )  # fmt: skip
+        return _has_way_back(b, sight2, traffic, guards)
+    sure = surely_returns(b, tick, law, law_yaw, sight2, traffic, guards)
     guards.ego[b].kept = 1 if sure else 0
     return sure
 
 
 @jit_inline
-def _has_way_back(
-    b: int, sight2: float, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: Guards) -> bool:
     """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
+    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
     car = drivers.car[b, EGO]
     vehicle = drivers.vehicle[b]
     way = way_between(roads, drivers.net[b], car.lane, car.next_lane, vehicle.middle, vehicle.disc)
     if guards.ego[b].strayed != 0:
         waited = car.waited
         car.aside = 0.0
-        list_cars(b, sight2, state, labels, scratch)
-        find_way_past(b, EGO, way, -1, state, labels, roads, obstacles, drivers, scratch)
-        unlist_cars(b, state, labels, scratch)
+        list_cars(b, sight2, traffic)
+        find_way_past(b, EGO, way, -1, traffic)
+        unlist_cars(b, traffic)
         car.waited = waited
         if car.aside == 0.0:
             return False
@@ -212,18 +207,24 @@ def _has_way_back(
 
 @jit_inline
 def _nearest(
-    b: int, speed: float, yaw_rate: float, obeys: bool, law: float, law_yaw: float, near: int, state: State,
-    labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    speed: float,
+    yaw_rate: float,
+    obeys: bool,
+    law: float,
+    law_yaw: float,
+    near: int,
+    traffic: Traffic,
+    guards: Guards,
+) -> tuple[float, float]:
     """Return the command nearest to one that is refused, of those that are looked at, for an ego that is not left.
 
     Distance is that of (speed, yaw rate) in units of the largest speed and yaw rate. To stand is always possible.
     """
+    drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
     fastest = max(vehicle.fastest, -vehicle.slowest)
-    best, best_yaw = _slower(
-        b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch
-    )
+    best, best_yaw = _slower(b, speed, yaw_rate, near, traffic, guards)
     least = _apart(speed, yaw_rate, best, best_yaw, fastest, vehicle)
     if obeys and _apart(speed, yaw_rate, law, law_yaw, fastest, vehicle) < least:
         best, best_yaw = law, law_yaw
@@ -238,10 +239,7 @@ def _nearest(
                 far = _apart(speed, yaw_rate, u, w, fastest, vehicle)
                 if far >= least:
                     break
-                if (
-                    refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch)
-                    == NOTHING
-                ):
+                if refusal(b, u, w, near, traffic, guards) == NOTHING:
                     best, best_yaw, least = u, w, far
                     break
     return best, best_yaw
@@ -249,17 +247,17 @@ def _nearest(
 
 @jit_inline
 def _slower(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards
+) -> tuple[float, float]:
     """Return the command with the greatest share of a speed that is refused; (0, 0) if none will do."""
+    drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
     best, best_yaw = 0.0, 0.0
     low, high = 0.0, 1.0
     share = 0.0
     for _ in range(HALVINGS + 1):
         u, w = bounded(share * speed, yaw_rate, vehicle)
-        if refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch) == NOTHING:
+        if refusal(b, u, w, near, traffic, guards) == NOTHING:
             best, best_yaw = u, w
             low = share
         else:

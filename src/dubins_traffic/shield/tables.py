@@ -13,8 +13,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, KeptPath, vehicles_of
-from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, KeptPath, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
@@ -84,9 +83,7 @@ class Ego:
 class Alone(Tables):
     """An ego that sees no other car: tables of one car per trial, and what the law that drives it remembers."""
 
-    state: State
-    labels: Labels
-    drivers: Drivers
+    traffic: Traffic
     commands: Floats
 
 
@@ -108,18 +105,14 @@ def check_overtakes(value: object) -> Overtakes:
     )
 
 
-def guards(
-    problems: Sequence[Problem], roads: RoadTable, drivers: Drivers, *, overtakes: Overtakes = "sure"
-) -> Guards:
+def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> Guards:
     """Return what the shield knows of trials that have not begun.
 
     Parameters
     ----------
     problems
         One per trial.
-    roads
-        The road networks.
-    drivers
+    traffic
         The egos as the law drives them, see `egos`.
     overtakes
         When they may cross the centre line.
@@ -135,15 +128,15 @@ def guards(
         own.left_time = rules.left_time
         own.sight2 = problem.sensing_radius**2
         own.blocked_ahead = rules.blocked_ahead
-    obstacles = place_obstacles(
-        pack_obstacles([problem.obstacles for problem in problems]), roads, drivers.net
+    drivers = traffic.drivers
+    parts = pack_obstacles([problem.obstacles for problem in problems])
+    obstacles = place_obstacles(parts, traffic.roads, drivers.net)
+    unseen = traffic.replace(
+        state=State.zeros(trials, 1),
+        labels=Labels.zeros(trials, 1),
+        drivers=drivers.replace(car=table(Driver, (trials, 1)), way=table(KeptPath, (trials, 1))),
     )
-    alone = Alone(
-        State.zeros(trials, 1),
-        Labels.zeros(trials, 1),
-        drivers.replace(car=table(Driver, (trials, 1)), way=table(KeptPath, (trials, 1))),
-        np.zeros((trials, 1, 2)),
-    )
+    alone = Alone(unseen, np.zeros((trials, 1, 2)))
     return Guards(known, obstacles, alone)
 
 

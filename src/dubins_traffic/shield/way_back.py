@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.policy import decide_trial
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
@@ -36,26 +35,22 @@ ROUNDED = 1e-6
 
 
 @jit_inner
-def drive_by_law(
-    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
     """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
-    decide_trial(
-        b, tick, sight2, scratch.apart, 0.0, state, labels, roads, obstacles, drivers, scratch, commands
-    )
+    scratch = traffic.scratch
+    decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
 
 @jit_inner
 def drive_alone(
-    b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, traffic: Traffic, guards: Guards
+) -> tuple[float, float]:
     """Return the command, within bounds, by which the law drives an ego that is left and sees no other car.
 
     What the law remembers is that in `guards.alone`.
     """
-    alone = guards.alone
+    roads, drivers = traffic.roads, traffic.drivers
+    alone, commands = guards.alone.traffic, guards.alone.commands
     alone.state.x[b, EGO], alone.state.y[b, EGO] = x, y
     alone.state.c[b, EGO], alone.state.s[b, EGO] = c, s
     bits = LEFT | OVERTAKING
@@ -65,10 +60,8 @@ def drive_alone(
     alone.labels.bits[b, EGO] = bits
     alone.labels.lane[b, EGO] = lane
     alone.labels.segment[b, EGO] = lane >> 1
-    drive_by_law(
-        b, tick, -1.0, alone.state, alone.labels, roads, obstacles, alone.drivers, scratch, alone.commands
-    )  # fmt: skip
-    return bounded(alone.commands[b, EGO, 0], alone.commands[b, EGO, 1], drivers.vehicle[b])
+    drive_by_law(b, tick, -1.0, alone, commands)
+    return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
@@ -80,10 +73,10 @@ def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
 
 @jit_inner
 def surely_returns(
-    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: Guards
+) -> bool:
     """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
     lane = labels.lane[b, EGO]
@@ -93,16 +86,16 @@ def surely_returns(
     before, _ = lane_coordinates(roads, net, lane, x, y)
     top = guards.ego[b].top
     last = int(min(guards.ego[b].left_time, LONGEST) / vehicle.period)
-    copy_memory(b, drivers, guards.alone.drivers)
+    copy_memory(b, drivers, guards.alone.traffic.drivers)
     for k in range(1, last + 1):
-        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.state, obstacles, vehicle, scratch):
+        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.traffic, vehicle):
             return False
         x, y, c, s = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
         progress, lateral = lane_coordinates(roads, net, lane, x, y)
         top = max(top, progress)
         if progress < before and top - progress > guards.ego[b].turn_back - TURNING:
             return False
-        if k == 1 and not _overtakes(b, lane, progress, labels, roads, drivers, guards):
+        if k == 1 and not _overtakes(b, lane, progress, traffic, guards):
             return False
         if _leaves(lane, x, y, c, s, roads, net, vehicle) or _may_come(
             b, k, x, y, sight2, state, guards, vehicle
@@ -113,17 +106,14 @@ def surely_returns(
         if lateral + half < guards.ego[b].left_release:
             return True
         before = progress
-        speed, yaw_rate = drive_alone(
-            b, tick + k, lane, x, y, c, s, roads, obstacles, drivers, guards, scratch
-        )
+        speed, yaw_rate = drive_alone(b, tick + k, lane, x, y, c, s, traffic, guards)
     return False
 
 
 @jit_inline
-def _overtakes(
-    b: int, lane: int, progress: float, labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards
-) -> bool:
+def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Guards) -> bool:
     """Tell whether an ego overtakes in the next frame, with `progress` then, for the sake of an obstacle."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     if _blocks(b, lane, progress, progress + guards.ego[b].blocked_ahead, roads, drivers, guards):
         return True

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.deferred import note
 from dubins_traffic.policies.rules.path_cache import kept_way
@@ -31,7 +30,7 @@ from dubins_traffic.policies.rules.tables import (
     Driver,
     Drivers,
     KeptPath,
-    Scratch,
+    Traffic,
     Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, ReferencePath, in_arc, on_lane
@@ -45,14 +44,12 @@ EVERYWHERE = 1e9
 
 
 @jit_inline
-def coast(
-    b: int, n: int, kind: int, company: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    scratch: Scratch,
-) -> bool:  # fmt: skip
+def coast(b: int, n: int, kind: int, company: int, traffic: Traffic) -> bool:
     """Put off the command of a car that still just drives on as it did; tell whether it does.
 
     Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
     """
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     row = drivers.way[b, n]
     x, y = state.x[b, n], state.y[b, n]
     way = kept_way(row)
@@ -75,7 +72,7 @@ def coast(
         return False
     if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.vehicle[b]):
         return False
-    note(b, n, row.coast_speed, left, px, py, bend, state, scratch)
+    note(b, n, row.coast_speed, left, px, py, bend, traffic)
     return True
 
 
@@ -87,13 +84,21 @@ def stop_coasting(row: KeptPath) -> None:
 
 @jit_inline
 def drive_on(
-    b: int, n: int, part: int, left: float, px: float, py: float, outside: bool, way: ReferencePath, state: State,
-    labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int,
+    n: int,
+    part: int,
+    left: float,
+    px: float,
+    py: float,
+    outside: bool,
+    way: ReferencePath,
+    traffic: Traffic,
+) -> bool:
     """Put off the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
 
     Nothing is around the car that matters to it (`policy.just_drives`). What it does is kept for the ticks to come.
     """
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     row = drivers.way[b, n]
@@ -106,10 +111,10 @@ def drive_on(
         return False
     speed = cruise(False, labels.crosses[b, n] >= 0, vehicle, drivers.car[b, n])
     bend = way.bend if part == THROUGH else 0.0
-    gated = faces_gate(b, n, part, labels, roads, drivers)
+    gated = faces_gate(b, n, part, traffic)
     if labels.lane[b, n] < 0 and left > ASTRAY:
         return False
-    if gated and car.kind != ROUND and is_behind_ego(b, n, x, y, way, state, labels, drivers):
+    if gated and car.kind != ROUND and is_behind_ego(b, n, x, y, way, traffic):
         return False
     line = to_line(left, x, y, way, vehicle) if gated else EVERYWHERE
     if line < speed * vehicle.period:
@@ -117,24 +122,33 @@ def drive_on(
             return False
         speed = max(0.0, line) / vehicle.period
     else:
-        keep_course(b, n, speed, part, outside, gated, x, y, way, labels, drivers)
+        keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:
         count_turn(bits, row, car)
     car.waited = 0
-    note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, state, scratch)
+    note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, traffic)
     return True
 
 
 @jit_inline
 def keep_course(
-    b: int, n: int, speed: float, part: int, outside: bool, gated: bool, x: float, y: float, way: ReferencePath,
-    labels: Labels, drivers: Drivers,
-) -> None:  # fmt: skip
+    b: int,
+    n: int,
+    speed: float,
+    part: int,
+    outside: bool,
+    gated: bool,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    traffic: Traffic,
+) -> None:
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
 
     The stretch ends before the line at which the car may have to stop, for an e-agent that behind the ego. Without lane
     state it also ends where the arc does: there the part of the way changes, or the lane.
     """
+    labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     row = drivers.way[b, n]
     bend = way.bend if part == THROUGH else 0.0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
@@ -20,6 +19,7 @@ from dubins_traffic.policies.rules.tables import (
     Driver,
     Drivers,
     Scratch,
+    Traffic,
     Vehicle,
 )
 from dubins_traffic.roads.lookup import lane_end
@@ -42,11 +42,9 @@ BLOCK_TIME = 9.0
 
 
 @jit
-def take_lane(
-    b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
     """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
+    roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     car = drivers.car[b, n]
     seed = drivers.seed[b]
     trial = drivers.trial[b]
@@ -75,7 +73,7 @@ def take_lane(
     if car.parks > 0.0 and is_goal(v, car, drivers) and uniform(seed, trial, n, tick, DRAW + 8) < car.parks:
         car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW + 9)
     car.violations = violations
-    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+    price_exits(b, n, tick, traffic)
     car.next_lane = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
 
 
@@ -101,11 +99,9 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scrat
 
 
 @jit
-def price_exits(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
     """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
+    roads, obstacles, drivers, scratch = traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch
     net = drivers.net[b]
     car = drivers.car[b, n]
     lane = car.lane
@@ -116,7 +112,7 @@ def price_exits(
     follow = -1
     if on_loop:
         follow = drivers.stage[car.place + 1 if car.place + 1 < car.last else car.first]
-    known = aim(b, n, tick, v, state, labels, roads, drivers, scratch)
+    known = aim(b, n, tick, v, traffic)
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
         cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
@@ -133,19 +129,16 @@ def price_exits(
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
         if obstacles.off[b] != obstacles.off[b + 1] and (
-            is_shut(b, lane, int(out), roads, obstacles, drivers)
-            or leads_nowhere(b, int(out), roads, obstacles, drivers)
+            is_shut(b, lane, int(out), traffic) or leads_nowhere(b, int(out), traffic)
         ):
             cost += BARRED
         scratch.cost[k] = cost
 
 
 @jit
-def aim(
-    b: int, n: int, tick: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    scratch: Scratch,
-) -> bool:  # fmt: skip
+def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
     """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
+    roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     net = drivers.net[b]
     car = drivers.car[b, n]
     kind = car.kind
@@ -153,7 +146,7 @@ def aim(
         count = roads.vert_off[net + 1] - roads.vert_off[net]
         car.goal = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
     elif kind == NEMESIS:
-        car.goal = foreseen(b, state, labels, roads, drivers, car)
+        car.goal = foreseen(b, traffic, car)
     seeks_loop = kind == LOOP and car.place < 0 and car.last > car.first
     if not seeks_loop and (kind not in (PLACES, NEMESIS) or car.goal < 0):
         return False
@@ -166,7 +159,7 @@ def aim(
         return True
     seek(net, car.goal, roads, scratch)
     if kind == NEMESIS:
-        seek_ego(b, net, labels, roads, scratch)
+        seek_ego(b, net, traffic)
     return True
 
 
@@ -189,8 +182,9 @@ def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
 
 
 @jit
-def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratch) -> None:
+def seek_ego(b: int, net: int, traffic: Traffic) -> None:
     """Turn hops to the ego's goal into hops to the next lanes on its way there."""
+    labels, roads, scratch = traffic.labels, traffic.roads, traffic.scratch
     lane = labels.lane[b, 0]
     v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
     count = 0
@@ -218,8 +212,9 @@ def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratc
 
 
 @jit
-def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, car: Driver) -> int:
+def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
     """Return the goal to which the ego is nearest, but for the one it is at; -1 without goals."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     best = -1
     least = 1e300

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.policies.rules.tables import Vehicle
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction
-from dubins_traffic.roads.table import RoadTable
 
 BESIDE = 0.06
 """What a car keeps free beside an obstacle, metres."""
@@ -42,10 +41,10 @@ def offset_on_way(
 
 @jit
 def offset_in_lane(
-    roads: RoadTable, net: int, lane: int, begin: float, end: float, obstacles: ObstacleTable, first: int,
-    last: int, vehicle: Vehicle,
-) -> float:  # fmt: skip
+    traffic: Traffic, net: int, lane: int, begin: float, end: float, first: int, last: int, vehicle: Vehicle
+) -> float:
     """Return `clear_offset` for the stretch of a lane from `begin` to `end`, metres along it."""
+    roads, obstacles = traffic.roads, traffic.obstacles
     along, left = lane_coordinates(roads, net, lane, 0.0, 0.0)
     tx, ty = lane_direction(roads, net, lane)
     return clear_offset(

@@ -5,14 +5,13 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
-from dubins_traffic.policies.rules.tables import Driver, Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING, STANDS
 from dubins_traffic.rules.shape import half_extent
 
@@ -75,18 +74,21 @@ def can_come_back(vehicle: Vehicle) -> bool:
 
 
 @jit
-def find_way_past(
-    b: int, n: int, way: ReferencePath, who: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic) -> None:
     """Begin to pass what stands ahead, if there is room to return and the other lane is and stays free."""
+    state, labels, roads, obstacles, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.obstacles,
+        traffic.drivers,
+        traffic.scratch,
+    )
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     reach = vehicle.reach
     own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, _ = extent(
-        b, n, way, own, state, labels, obstacles, vehicle, drivers.car[b, n].lane, scratch
-    )
+    end, offset, _ = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
     offset += BERTH + vehicle.half_width + vehicle.rounding
     line = stop_line(vehicle)
     until = end + SLIP + 2.0 * vehicle.half_length
@@ -105,7 +107,7 @@ def find_way_past(
     if (
         n != EGO
         and crosses_over
-        and ego_is_beside(b, own, back, way, state, labels, drivers.car[b, n].lane, vehicle)
+        and ego_is_beside(b, own, back, way, traffic, drivers.car[b, n].lane, vehicle)
     ):
         return
     time = (back - own) / (0.8 * vehicle.fastest) + TURNING
@@ -131,9 +133,7 @@ def find_way_past(
         j = scratch.link[j]
     if room < 0.0:
         return
-    if -line - reach - vehicle.disc + (line - back) < comes and may_come(
-        b, n, who, comes, way, state, labels, roads, drivers, scratch
-    ):
+    if -line - reach - vehicle.disc + (line - back) < comes and may_come(b, n, who, comes, way, traffic):
         return
     car.aside = offset
     car.until = until
@@ -141,17 +141,15 @@ def find_way_past(
 
 
 @jit
-def keep_off(
-    b: int, n: int, p: int, way: ReferencePath, state: State, labels: Labels, obstacles: ObstacleTable, drivers:
-    Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> None:
     """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there.
 
     All that are near to one another are passed on one line, or else obstacle part p, the first of them, alone.
     """
+    state, obstacles, drivers = traffic.state, traffic.obstacles, traffic.drivers
     vehicle = drivers.vehicle[b]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, _, low = extent(b, n, way, own, state, labels, obstacles, vehicle, drivers.car[b, n].lane, scratch)
+    end, _, low = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
     offset = 0.0
     if end >= own and low > -INFINITE:
         offset = offset_on_way(b, way, own, end + SLIP, obstacles, vehicle)
@@ -165,11 +163,15 @@ def keep_off(
 
 
 @jit
-def may_come(
-    b: int, n: int, who: int, comes: float, way: ReferencePath, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car may come out of the next disc, from `comes` metres behind it at most."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
     v = lane_end(roads, net, drivers.car[b, n].lane)
     row = roads.vert_off[net] + v
@@ -190,16 +192,10 @@ def may_come(
 
 @jit_inline
 def ego_is_beside(
-    b: int,
-    own: float,
-    back: float,
-    way: ReferencePath,
-    state: State,
-    labels: Labels,
-    lane: int,
-    vehicle: Vehicle,
+    b: int, own: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
     """Tell whether the ego is in the lane where a car would pass: it might keep beside, or stop where that returns."""
+    state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
         return False
     key = along(way, state.x[b, EGO], state.y[b, EGO])
@@ -211,13 +207,13 @@ def ego_is_beside(
 
 @jit
 def extent(
-    b: int, n: int, way: ReferencePath, own: float, state: State, labels: Labels, obstacles: ObstacleTable,
-    vehicle: Vehicle, lane: int, scratch: Scratch,
-) -> tuple[float, float, float]:  # fmt: skip
+    b: int, n: int, way: ReferencePath, own: float, traffic: Traffic, vehicle: Vehicle, lane: int
+) -> tuple[float, float, float]:
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
     Both are metres left of the middle of the lane; on the right nobody passes a car.
     """
+    state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     end = own - 1.0
     offset = -1.0
     low = INFINITE
@@ -269,11 +265,15 @@ def stands_beside(
 
 
 @jit
-def keep_passing(
-    b: int, n: int, speed: float, way: ReferencePath, near: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> float:  # fmt: skip
+def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return the speed of a car that passes; end the manoeuvre when it is done or there is nothing left to pass."""
+    state, labels, obstacles, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.obstacles,
+        traffic.drivers,
+        traffic.scratch,
+    )
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     own = along(way, state.x[b, n], state.y[b, n])
@@ -282,7 +282,7 @@ def keep_passing(
         if abs(left) < 0.05:
             car.aside = 0.0
         elif labels.bits[b, n] & LEFT != 0:
-            pass_again(b, own, way, near, state, car, vehicle, scratch)
+            pass_again(b, own, way, near, traffic, car, vehicle)
         return speed
     if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(car.aside, vehicle):
         car.aside = 0.0
@@ -315,9 +315,10 @@ def keep_passing(
 
 @jit
 def pass_again(
-    b: int, own: float, way: ReferencePath, near: int, state: State, car: Driver, vehicle: Vehicle, scratch: Scratch
-) -> None:  # fmt: skip
+    b: int, own: float, way: ReferencePath, near: int, traffic: Traffic, car: Driver, vehicle: Vehicle
+) -> None:
     """Go on passing what has moved up meanwhile and stands where the car would return, if there is room."""
+    state, scratch = traffic.state, traffic.scratch
     length = 2.0 * vehicle.reach + BERTH
     for k in range(near):
         j = scratch.near[k]

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
 from dubins_traffic.policies.rules.exits import ticks_of
@@ -23,12 +22,11 @@ from dubins_traffic.policies.rules.tables import (
     Driver,
     Drivers,
     KeptPath,
-    Scratch,
+    Traffic,
     Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import CLEAR, FIRST, FORFEITED, LEFT, STOPPED
 
 CHOOSY = 1.0
@@ -55,21 +53,30 @@ GOES_NOW = STOPPED | FIRST | CLEAR
 
 @jit_inline
 def yield_at_line(
-    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: ReferencePath,
-    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch:
-    Scratch,
-) -> float:  # fmt: skip
+    b: int,
+    n: int,
+    tick: int,
+    speed: float,
+    part: int,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    near: int,
+    traffic: Traffic,
+) -> float:
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
-    if not faces_gate(b, n, part, labels, roads, drivers):
+    if not faces_gate(b, n, part, traffic):
         return speed
     bits = np.int64(labels.bits[b, n])
     its_turn = count_turn(bits, drivers.way[b, n], car)
     line = to_line(left, x, y, way, vehicle)
     minds = n != EGO and car.violations & TAILGATING == 0
-    behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
+    behind = minds and is_behind_ego(b, n, x, y, way, traffic)
     if behind and drivers.way[b, n].crossing != 0:
         line -= vehicle.approaches
         its_turn = False
@@ -77,10 +84,10 @@ def yield_at_line(
         return speed
     v = lane_end(roads, net, car.lane)
     if drivers.way[b, n].crossing != 0:
-        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
+        free = its_turn and may_go(b, n, tick, traffic)
         free = free or car.violations & ROLLING != 0
     else:
-        free = may_enter_bend(b, n, tick, v, way, near, state, labels, roads, obstacles, drivers, scratch)
+        free = may_enter_bend(b, n, tick, v, way, near, traffic)
     if bits & LEFT != 0 and car.violations & LEFT_SIDE == 0:
         free = False
     return speed if free else max(0.0, line) / vehicle.period
@@ -88,14 +95,20 @@ def yield_at_line(
 
 @jit
 def may_enter_bend(
-    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, traffic: Traffic
+) -> bool:
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
     An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone; who has waited for that
     for long takes the way on.
     """
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
@@ -109,16 +122,16 @@ def may_enter_bend(
             inside += 1 if turns else shares_way(b, j, way, degree, state, vehicle)
             held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
         elif turns and degree > 1:
-            held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
+            held = held or comes_first(b, n, j, v, traffic)
     long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
-        free = has_room(b, n, car.next_lane, inside, state, labels, roads, obstacles, drivers, scratch)
+        free = has_room(b, n, car.next_lane, inside, traffic)
         if long and inside == 0:
-            free = free or is_free(b, n, car.next_lane, state, roads, drivers, scratch)
+            free = free or is_free(b, n, car.next_lane, traffic)
     if long and not free and turns and degree == 2:
-        take_way_on(b, n, state, roads, obstacles, drivers, scratch)
+        take_way_on(b, n, traffic)
     car.kept_out = 0 if free else car.kept_out + 1
     return free
 
@@ -139,8 +152,9 @@ def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers
 
 
 @jit_inline
-def faces_gate(b: int, n: int, part: int, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
+def faces_gate(b: int, n: int, part: int, traffic: Traffic) -> bool:
     """Tell whether a car is before the disc at the end of its lane."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     return part == BEFORE and labels.crosses[b, n] != lane_end(roads, drivers.net[b], drivers.car[b, n].lane)
 
 
@@ -171,14 +185,13 @@ def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, ve
 
 
 @jit_inline
-def is_behind_ego(
-    b: int, n: int, x: float, y: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers
-) -> bool:
+def is_behind_ego(b: int, n: int, x: float, y: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether the ego is ahead in a car's lane.
 
     Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
     again, and then bars the way of who would be first.
     """
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     if labels.lane[b, EGO] != drivers.car[b, n].lane:
         return False
     return way_to_go(way, state.x[b, EGO], state.y[b, EGO]) > way_to_go(way, x, y)
@@ -191,10 +204,9 @@ def turns_round(car: Driver) -> bool:
 
 
 @jit_inline
-def comes_first(
-    b: int, n: int, j: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers
-) -> bool:
+def comes_first(b: int, n: int, j: int, v: int, traffic: Traffic) -> bool:
     """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     lane, net = labels.lane[b, j], drivers.net[b]
     if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
         return False
@@ -207,11 +219,9 @@ def comes_first(
 
 
 @jit
-def may_go(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     car = drivers.car[b, n]
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
@@ -225,18 +235,18 @@ def may_go(
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
-    if has_room(b, n, car.next_lane, 0, state, labels, roads, obstacles, drivers, scratch):
+    if has_room(b, n, car.next_lane, 0, traffic):
         return True
     waited = car.owed - ticks_of(CHOOSY, vehicle)
     if not due and (waited < 0 or waited % 8 != 0):
         return False
     budget = BUDGET * car.owed * vehicle.period if car.kind == ROUND else INFINITE
-    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
+    if take_another(b, n, tick, budget, traffic):
         return True
-    if due and take_last_resort(b, n, state, labels, roads, obstacles, drivers, scratch):
+    if due and take_last_resort(b, n, traffic):
         return True
     if due:
-        take_widest(b, n, state, labels, roads, obstacles, drivers, scratch)
+        take_widest(b, n, traffic)
     return due
 
 

@@ -6,13 +6,11 @@ from math import sqrt
 from typing import Any
 
 from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT, STANDS
 
 MARGIN = 0.02
@@ -27,22 +25,16 @@ PRESSED = 0.4
 
 
 @jit
-def has_room(
-    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def has_room(b: int, n: int, out: int, inside: int, traffic: Traffic) -> bool:
     """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
 
     `inside` cars are still in the disc and will be before it.
     """
-    return room_in(b, n, out, inside, state, labels, roads, obstacles, drivers, scratch) >= 0.0
+    return room_in(b, n, out, inside, traffic) >= 0.0
 
 
 @jit
-def room_in(
-    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> float:  # fmt: skip
+def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres.
 
     It is negative where the car can't leave the disc. All that are in the lane drive on until they stand close behind
@@ -51,6 +43,13 @@ def room_in(
     whether it drives on; at a crossing, where who finds one exit barred has to take another in time, it may back up as
     well. `inside` cars are still in the disc and will be before this one.
     """
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     edge = vehicle.disc + vehicle.reach + MARGIN
@@ -61,7 +60,7 @@ def room_in(
     crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
     last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
-    last = min(last, before_obstacles(b, out, roads, obstacles, drivers))
+    last = min(last, before_obstacles(b, out, traffic))
     wall = INFINITE
     for look in range(2):
         j = scratch.head[out >> 1]
@@ -101,10 +100,15 @@ def is_slow(b: int, j: Any, heading: float, state: State) -> bool:
 
 
 @jit
-def is_open(
-    b: int, n: int, out: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether a car can leave the disc by the lane `out` for all that is there now, wherever that may stop."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     edge = vehicle.disc + vehicle.reach + MARGIN
@@ -124,10 +128,9 @@ def is_open(
 
 
 @jit
-def is_free(
-    b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:
+def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
+    state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     j = scratch.head[out >> 1]
     while j >= 0:
@@ -141,10 +144,9 @@ def is_free(
 
 
 @jit
-def before_obstacles(
-    b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
-) -> float:
+def before_obstacles(b: int, lane: int, traffic: Traffic) -> float:
     """Return how far along a lane a car can drive before an obstacle that can't be passed in the lane, metres."""
+    roads, obstacles, drivers = traffic.roads, traffic.obstacles, traffic.drivers
     vehicle = drivers.vehicle[b]
     free = INFINITE
     net, first, last = drivers.net[b], obstacles.off[b], obstacles.off[b + 1]
@@ -155,19 +157,24 @@ def before_obstacles(
         if not (abs(aside + vehicle.middle) < wide and along + row[7] > vehicle.disc):
             continue
         begin, end = along - row[7], along + row[7]
-        if offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, vehicle) == 0.0:
+        if offset_in_lane(traffic, net, lane, begin, end, first, last, vehicle) == 0.0:
             free = min(free, begin - vehicle.reach - QUEUE_GAP)
     return free
 
 
 @jit
-def is_pressed(
-    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
     """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
 
     It, or the cars between, are close behind one another already.
     """
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net, vehicle, lane = drivers.net[b], drivers.vehicle[b], drivers.car[b, n].lane
     v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:

@@ -6,13 +6,12 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.policies.rules.tables import ROUND, TAILGATING, Driver, Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import ROUND, TAILGATING, Driver, Scratch, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import APPROACH, EXCUSED, LEFT, STANDS
 
 QUEUE_GAP = 0.12
@@ -93,11 +92,9 @@ def meets_nobody(
 
 
 @jit_inline
-def gather(
-    b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, labels: Labels, roads: RoadTable,
-    drivers: Drivers, scratch: Scratch,
-) -> int:  # fmt: skip
+def gather(b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, traffic: Traffic) -> int:
     """List the cars on the car's segment, and on those that meet it where it is near an end; return how many."""
+    labels, roads, drivers, scratch = traffic.labels, traffic.roads, traffic.drivers, traffic.scratch
     net = drivers.net[b]
     disc = drivers.vehicle[b].disc
     count = add_segment(labels.segment[b, n], n, 0, scratch)
@@ -132,13 +129,23 @@ def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
 
 @jit_inline
 def look_ahead(
-    b: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, near: int,
-    state: State, labels: Labels, obstacles: ObstacleTable, vehicle: Vehicle, car: Driver, scratch: Scratch,
-) -> tuple[float, int, bool]:  # fmt: skip
+    b: int,
+    part: int,
+    key: float,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    near: int,
+    traffic: Traffic,
+    vehicle: Vehicle,
+    car: Driver,
+) -> tuple[float, int, bool]:
     """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
 
     `who` is a car, or -2 - p for obstacle part p.
     """
+    state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     reach = vehicle.reach
     wide = 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE
     low, high = corridor(left, wide)
@@ -227,17 +234,10 @@ def see_obstacles(
 
 @jit_inline
 def wanted_gap(
-    b: int,
-    n: int,
-    who: int,
-    way: ReferencePath,
-    state: State,
-    labels: Labels,
-    car: Driver,
-    part: int,
-    reach: float,
+    b: int, n: int, who: int, way: ReferencePath, traffic: Traffic, car: Driver, part: int, reach: float
 ) -> float:
     """Return the gap to keep from `who`."""
+    state, labels = traffic.state, traffic.labels
     if who == -1:
         return 0.0
     standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)

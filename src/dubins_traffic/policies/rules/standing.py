@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.passing import along, aside, half_width
-from dubins_traffic.policies.rules.tables import Driver, Drivers, Scratch
+from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import APPROACH, OVERTAKING, STANDS, STOPPED
@@ -18,11 +17,9 @@ LINE, SURE = 0.002, 0.03
 
 
 @jit
-def stays_right(
-    b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
+    state, labels, obstacles, drivers = traffic.state, traffic.labels, traffic.obstacles, traffic.drivers
     vehicle = drivers.vehicle[b]
     x, y, c, s = advance(
         state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period
@@ -39,18 +36,17 @@ def stays_right(
         there = own - row[7] <= key <= own + row[7] + vehicle.fore
         if there and abs(aside(way, row[0], row[1])) - row[7] < vehicle.middle:
             return True
-    return surely_stands(b, n, own, way, state, labels, drivers, scratch)
+    return surely_stands(b, n, own, way, traffic)
 
 
 @jit
-def surely_stands(
-    b: int, n: int, own: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
 
     Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
     crossing; and it may drive off.
     """
+    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     lane = drivers.car[b, n].lane
     if drivers.car[b, n].watched * vehicle.period < vehicle.stand_time + vehicle.period:

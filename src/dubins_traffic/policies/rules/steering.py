@@ -6,12 +6,10 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
-from dubins_traffic.policies.rules.tables import LEFT_SIDE, Drivers, Scratch, Vehicle
+from dubins_traffic.policies.rules.tables import LEFT_SIDE, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.rules.propositions import LEFT
@@ -31,11 +29,22 @@ GAIN = 8.0
 
 @jit_inline
 def move(
-    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
-    way: ReferencePath, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    n: int,
+    allowed: float,
+    left: float,
+    offset: float,
+    px: float,
+    py: float,
+    bend: float,
+    outside: bool,
+    way: ReferencePath,
+    near: int,
+    trusted: int,
+    traffic: Traffic,
+) -> tuple[float, float]:
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     c, s, limit = state.c[b, n], state.s[b, n], vehicle.yaw_most
     passes = drivers.car[b, n].aside != 0.0
@@ -48,42 +57,42 @@ def move(
         c, s, left - offset, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
     )
     if passes or vehicle.tightest > 0.0:
-        speed, yaw_rate = keep_right(
-            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, scratch
-        )
-    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch)
+        speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
+    safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     if not safe and passes and offset == 0.0:
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch)
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     elif not safe and passes and within_lane(drivers.car[b, n].aside, vehicle):
         across = 1.0 if left > offset else -1.0
         speed, yaw_rate = steer(
             c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, vehicle.tightest, vehicle.period
         )
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch)
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     if not safe:
         speed = 0.0
-        if vehicle.half_length > 0.0 and not is_safe(
-            b, n, speed, yaw_rate, near, trusted, state, obstacles, vehicle, scratch
-        ):
+        if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
     return speed, yaw_rate
 
 
 @jit_inline
 def keep_right(
-    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, traffic: Traffic
+) -> tuple[float, float]:
     """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
     lawless = drivers.car[b, n].violations & LEFT_SIDE != 0
-    if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
-        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, scratch
-    ):  # fmt: skip
+    if (
+        lawless
+        or speed == 0.0
+        or not outside
+        or bits & LEFT != 0
+        or stays_right(b, n, speed, yaw_rate, way, traffic)
+    ):
         return speed, yaw_rate
     leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
     if drivers.car[b, n].aside != 0.0 or not leans or vehicle.slowest >= 0.0:
@@ -134,10 +143,10 @@ def steer(
 
 @jit
 def is_safe(
-    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
-    obstacles: ObstacleTable, vehicle: Vehicle, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
+) -> bool:
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     period = vehicle.period
     p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach

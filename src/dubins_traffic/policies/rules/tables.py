@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
 
@@ -245,6 +247,17 @@ class Scratch(Tables):
     late: Floats
     apart: Floats
     listed: Ints
+
+
+class Traffic(Tables):
+    """All that the cars of a batch that the law drives go by, and the law's room to work in."""
+
+    state: State
+    labels: Labels
+    roads: RoadTable
+    obstacles: ObstacleTable
+    drivers: Drivers
+    scratch: Scratch
 
 
 def scratch(cars: int, segments: int) -> Scratch:
