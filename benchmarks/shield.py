@@ -31,14 +31,14 @@ from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import scratch
+from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.table import pack_distinct
 from dubins_traffic.rules.propositions import LEFT
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.shield.nearest_command import shield
-from dubins_traffic.shield.tables import REASON, REASONS, egos, guards
+from dubins_traffic.shield.tables import REASONS, egos, guards
 
 DURATION = 60.0
 SEED = 2016
@@ -123,21 +123,21 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
     )
     bodies = pack_obstacles([problem.obstacles for problem in problems])
     law, drivers = egos(problems, places, net), egos(problems, places, net)
-    watch = guards(problems, roads, net)
     room = scratch(places, int(np.diff(roads.seg_off).max()))
-    hostile = Hostile(kinds, law.build, net, roads, SEED + own[0].trial)
+    traffic = Traffic(group.state, group.labels, roads, bodies, drivers, room)
+    by_law = traffic.replace(drivers=law)
+    watch = guards(problems, traffic)
+    hostile = Hostile(kinds, law.vehicle, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
     passed, aside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
     while len(active := group.active):
         tick = np.full(count, -1)
         tick[active] = group.ticks[active]
         now = int(tick.max())
-        decide(now, group.commands, *group.state, *group.labels, *roads, *bodies, *law, *room)
+        decide(now, group.commands, by_law)
         group.commands[:, EGO] = hostile.ask(now, group.state, group.labels, group.commands[:, EGO].copy())
-        shield(
-            tick, False, group.state, group.labels, roads, bodies, drivers, watch, room, group.commands
-        )  # fmt: skip
-        reasons[active, watch.mark[active, REASON]] += 1
+        shield(tick, False, traffic, watch, group.commands)
+        reasons[active, watch.ego["reason"][active]] += 1
         group.advance()
         before, aside = aside, (group.labels.bits[:, EGO] & LEFT) != 0
         passed += aside & ~before

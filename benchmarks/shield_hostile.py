@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.policies.rules.tables import FASTEST, MIDDLE, SLOWEST, YAW_MOST
+from dubins_traffic.kernels.records import Rows
+from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT
 
@@ -176,32 +177,34 @@ class Hostile:
     ----------
     kinds
         Which of KINDS drives in each trial.
-    build, net
-        `Drivers.build`, and the number of each trial's network in `roads`.
+    vehicles, net
+        `Drivers.vehicle`, and the number of each trial's network in `roads`.
     roads
         The roads.
     seed
         What all random numbers follow from.
     """
 
-    def __init__(self, kinds: Sequence[str], build: Floats, net: Ints, roads: RoadTable, seed: int) -> None:
+    def __init__(
+        self, kinds: Sequence[str], vehicles: Rows[Vehicle], net: Ints, roads: RoadTable, seed: int
+    ) -> None:
         self._rows: dict[str, npt.NDArray[np.intp]] = {
             kind: np.array([b for b, own in enumerate(kinds) if own == kind]) for kind in dict.fromkeys(kinds)
         }
-        self._build, self._net, self._roads = build, net, roads
+        self._vehicles, self._net, self._roads = vehicles, net, roads
         self._random = np.random.default_rng(seed)
         self._memory = np.full((len(kinds), 3), -1.0)
         self._late = np.zeros((LAG, len(kinds), 2))
 
     def ask(self, tick: int, state: State, labels: Labels, law: Floats) -> Floats:
         """Return what each ego is asked to do in frame `tick`, (B, 2), where the law says `law`."""
-        build = self._build
-        bounds = build[:, [FASTEST, YAW_MOST]]
+        own = self._vehicles
+        bounds = np.stack([own["fastest"], own["yaw_most"]], axis=1)
         wild = 1.5 * bounds * self._random.uniform(-1.0, 1.0, law.shape)
         dice = self._random.uniform(size=len(law))
         pose = np.stack([array[:, EGO] for array in state[:4]], axis=1)
         scene = Scene(
-            tick, law, build[:, FASTEST], build[:, SLOWEST], build[:, YAW_MOST], wild, dice, pose,
+            tick, law, own["fastest"].copy(), own["slowest"].copy(), own["yaw_most"].copy(), wild, dice, pose,
             self._lane(pose, labels), np.where(labels.bits[:, EGO] & LEFT, 1.0, 0.0), _toward(state),
             self._memory,
         )  # fmt: skip
@@ -227,7 +230,7 @@ class Hostile:
         sign = np.where(forth, 1.0, -1.0)
         tx, ty = sign * row[:, 2], sign * row[:, 3]
         across = tx * (y - row[:, 1]) - ty * (x - row[:, 0])
-        return np.stack([tx, ty, across, self._build[:, MIDDLE]], axis=1)
+        return np.stack([tx, ty, across, self._vehicles["middle"]], axis=1)
 
 
 def _toward(state: State) -> Floats:

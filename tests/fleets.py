@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dubins_traffic.agents.fleet import Fleet
-from dubins_traffic.agents.tables import LANE
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Contact, Labels, Pose, State
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
@@ -34,7 +33,7 @@ class Moment(NamedTuple):
     @property
     def lanes(self) -> np.ndarray:
         """The lanes that the cars drive, (B, N)."""
-        return self.fleet._agents.ints[:, :, LANE]
+        return self.fleet._agents.agent["lane"]
 
 
 Each = Callable[[Moment], None]

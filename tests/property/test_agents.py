@@ -13,7 +13,7 @@ from shapely import Point, Polygon
 from shapely.affinity import rotate, translate
 
 from dubins_traffic.agents import fleet
-from dubins_traffic.agents.sight import sees
+from dubins_traffic.agents.sight import Box, sees
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.trig import sincos
@@ -45,7 +45,7 @@ def test_sight_agrees_with_shapely(heading, distance, bearing, turned, a, b, r) 
     x, y = distance * math.cos(bearing), distance * math.sin(bearing)
     body = translate(rotate(box, turned, (0, 0), use_radians=True), x, y).buffer(r, quad_segs=64)
     nearest = body.intersection(rotate(WEDGE, heading, (0, 0), use_radians=True)).distance(Point(0, 0))
-    seen = sees(0.0, 0.0, *sincos(heading), 0.5, x, y, *sincos(turned), a, b, r)
+    seen = sees(0.0, 0.0, *sincos(heading), 0.5, Box(x, y, *sincos(turned), a, b, r))
     if math.isnan(nearest):
         assert not seen or body.buffer(1e-4).intersects(rotate(WEDGE, heading, (0, 0), use_radians=True))
     elif abs(nearest - 0.5) > 1e-4:

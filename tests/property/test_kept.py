@@ -10,35 +10,13 @@ from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.records import table as rows_of
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.roads.lookup import nearest_arm, patch
+from dubins_traffic.roads.lookup import ValidCell, nearest_arm, valid_cell
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
-from dubins_traffic.rules.label_cache import place
 from dubins_traffic.rules.labeller import Labeller
-from dubins_traffic.rules.tables import (
-    ALONG_HIGH,
-    ALONG_LOW,
-    ASIDE_HIGH,
-    ASIDE_LOW,
-    AXIS_X,
-    AXIS_Y,
-    CALM,
-    FORK_SURE,
-    FORK_X,
-    FORK_Y,
-    FROM_X,
-    FROM_Y,
-    RING_HIGH,
-    RING_LOW,
-    VALID_HIGH_X,
-    VALID_HIGH_Y,
-    VALID_LOW_X,
-    VALID_LOW_Y,
-    VERTEX_X,
-    VERTEX_Y,
-)
 
 
 @pytest.mark.parametrize("radius", [1.2, 9.0])
@@ -46,25 +24,25 @@ def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch(radius) -> No
     network = RoadNetwork.grid(3, 4, 4.0)
     table = pack([network], [0.6])
     random = np.random.default_rng(3)
-    row = np.zeros(6)
+    row = rows_of(ValidCell, 1)[0]
     filled = forked = 0
     for x, y in random.uniform((-1.0, -1.0), (13.0, 9.0), (400, 2)):
-        patch(table, 0, x, y, radius, row)
-        if not (row[0] < row[1] and row[2] < row[3]):
+        valid_cell(table, 0, x, y, radius, row)
+        if not (row.low_x < row.high_x and row.low_y < row.high_y):
             continue
         filled += 1
-        assert row[0] <= x <= row[1]
-        assert row[2] <= y <= row[3]
-        points = random.uniform((row[0], row[2]), (row[1], row[3]), (20, 2))
+        assert row.low_x <= x <= row.high_x
+        assert row.low_y <= y <= row.high_y
+        points = random.uniform((row.low_x, row.low_y), (row.high_x, row.high_y), (20, 2))
         nearest = network.surface.nearest_segment(points)[0]
-        if row[4] < 0:
+        if row.segment < 0:
             forked += 1
-            assert (network.ends[nearest] == row[5]).any(axis=1).all()
-            assert [nearest_arm(table, 0, int(row[5]), *point)[0] for point in points] == nearest.tolist()
+            assert (network.ends[nearest] == row.vertex).any(axis=1).all()
+            assert [nearest_arm(table, 0, row.vertex, *point)[0] for point in points] == nearest.tolist()
         else:
-            assert (nearest == row[4]).all()
+            assert (nearest == row.segment).all()
         vertex, away = network.surface.nearest_vertex(points)
-        assert ((vertex == row[5]) | (away > radius)).all()
+        assert ((vertex == row.vertex) | (away > radius)).all()
     assert filled > 300
     assert forked > 50
 
@@ -142,21 +120,24 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
         labeller.update(tick, group.state, [()])
         assert (labels.bits == group.labels.bits).all()
         for n in range(7):
-            row = labeller.memory.calm[0, [place(n) + k * BLOCK for k in range(CALM)]]
-            low, high = row[[VALID_LOW_X, VALID_LOW_Y]], row[[VALID_HIGH_X, VALID_HIGH_Y]]
+            block, k = labeller.memory.kept[0, n // BLOCK], n % BLOCK
+            row = {name: getattr(block, name)[k] for name in type(block).__slots__}
+            low = np.array([row["valid_low_x"], row["valid_low_y"]])
+            high = np.array([row["valid_high_x"], row["valid_high_y"]])
             if tick % 10 != n or not (low < high).all():
                 continue
             looked += 1
             points = random.uniform(low, high, (20, 2))
             segment, far = surface.nearest_segment(points)
             vertex, away = surface.nearest_vertex(points)
-            to_vertex = np.hypot(*(points - row[[VERTEX_X, VERTEX_Y]]).T) ** 2
-            kept = (row[RING_LOW] < to_vertex) & (to_vertex < row[RING_HIGH])
-            offset = points - row[[FROM_X, FROM_Y]]
-            along, aside = offset @ row[[AXIS_X, AXIS_Y]], offset @ (row[[AXIS_Y, AXIS_X]] * (-1.0, 1.0))
-            kept &= (row[ALONG_LOW] < along) & (along < row[ALONG_HIGH])
-            kept &= (row[ASIDE_LOW] < aside) & (aside < row[ASIDE_HIGH])
-            sure = (np.abs(points - row[[FORK_X, FORK_Y]]) < row[FORK_SURE]).all(axis=1)
+            to_vertex = np.hypot(*(points - (row["vertex_x"], row["vertex_y"])).T) ** 2
+            kept = (row["ring_low"] < to_vertex) & (to_vertex < row["ring_high"])
+            offset = points - (row["from_x"], row["from_y"])
+            along = offset @ (row["axis_x"], row["axis_y"])
+            aside = offset @ (-row["axis_y"], row["axis_x"])
+            kept &= (row["along_low"] < along) & (along < row["along_high"])
+            kept &= (row["aside_low"] < aside) & (aside < row["aside_high"])
+            sure = (np.abs(points - (row["fork_x"], row["fork_y"])) < row["fork_sure"]).all(axis=1)
             assert (segment[sure] == labels.segment[0, n]).all()
             kept &= segment == labels.segment[0, n]
             certain += int((kept & sure).sum())

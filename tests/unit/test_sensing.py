@@ -20,7 +20,7 @@ def cars_at(*places):
 def test_neighbours_are_those_within_the_radius_in_order_of_index() -> None:
     state = cars_at((0, 0), (5.0, 0), (0, 5.0000001), (3, 4), (-1, 0))
     reals, wholes = np.zeros((5, SEEN_REALS)), np.zeros((5, SEEN_WHOLES), dtype=np.int64)
-    count = neighbours(0, 0, 5.0, reals, wholes, *state, *Labels.zeros(1, 5))
+    count = neighbours(0, 0, 5.0, reals, wholes, state, Labels.zeros(1, 5))
     assert wholes[:count, 0].tolist() == [0, 1, 3, 4]
     assert reals[2, :2].tolist() == [3, 4]
     assert wholes[1].tolist() == [1, 0, -1, -1, -1, 0]
@@ -31,7 +31,7 @@ def test_neighbours_tell_whether_anything_but_places_has_changed() -> None:
     reals, wholes = np.zeros((3, SEEN_REALS)), np.full((3, SEEN_WHOLES), -1, dtype=np.int64)
 
     def look() -> int:
-        return neighbours(0, 0, 5.0, reals, wholes, *state, *labels)
+        return neighbours(0, 0, 5.0, reals, wholes, state, labels)
 
     assert [look(), look()] == [3, -3]
     state.x[0, 1] = 1.5

@@ -3,35 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from math import hypot
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from dubins_traffic.agents.lawful import drivers_of
-from dubins_traffic.cars.state import EGO, Labels, Pose, Propositions, State
+from dubins_traffic.cars.state import Labels, Pose, Propositions, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.room import MARGIN
-from dubins_traffic.policies.rules.tables import (
-    FIRST,
-    KIND,
-    LANE,
-    LAST,
-    NEXT,
-    PLACE,
-    ROLLING,
-    ROUND,
-    SPEED,
-    VIOLATIONS,
-    Drivers,
-    blank,
-    scratch,
-)
+from dubins_traffic.policies.rules.tables import ROLLING, ROUND, Driver, Drivers, Traffic, scratch
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.parameters import RuleParameters
@@ -111,8 +97,8 @@ class CounterTeam:
             self._choose(tick, cars)
         if self._jumps:
             self._jump(cars)
-        tables = (state, labels, self._roads, self._obstacles, self._drivers, self._scratch)
-        decide(tick, commands, *chain.from_iterable(tables))
+        tables = (self._roads, self._obstacles, self._drivers, self._scratch)
+        decide(tick, commands, Traffic(state, labels, *tables))
         for car in cars[1:]:
             if self._targets[car.car] == self._play.cells[car.car]:
                 self._hold(car, commands[0, car.car])
@@ -157,14 +143,14 @@ class CounterTeam:
         for car in cars[1:]:
             enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
             clear = car.propositions.bits & CLEAR != 0
-            self._drivers.ints[0, car.car, VIOLATIONS] = ROLLING if enters and clear else 0
+            self._drivers.car[0, car.car].violations = ROLLING if enters and clear else 0
 
     def _send(self, car: Sighting) -> None:
         """Let the law take a car to its target."""
         arena, cells = self._board.arena, self._play.cells
         nodes = len(arena.nodes)
         target, own = self._targets[car.car], cells[car.car]
-        ints = self._drivers.ints[0, car.car]
+        own_car = self._drivers.car[0, car.car]
         prices = self._drivers.distance[car.car]
         if target < nodes and own >= nodes:
             free = [lane for lane in arena.nodes[target].exits if nodes + lane not in cells]
@@ -176,8 +162,8 @@ class CounterTeam:
         prices[:] = NOT_LIKED
         prices[liked] = 0.0
         v = arena.nodes[target if target < nodes else own].vertex
-        if ints[LANE] >= 0 and arena.network.lane_ends(int(ints[LANE]))[1] == v:
-            ints[NEXT] = liked[0]
+        if own_car.lane >= 0 and arena.network.lane_ends(int(own_car.lane))[1] == v:
+            own_car.next_lane = liked[0]
 
     def _is_turning(self, car: Sighting, node: int) -> bool:
         """Say whether a car has begun its way through a disc; who stands in one has stopped at its edge."""
@@ -239,11 +225,11 @@ def _sighting(n: int, state: State, labels: Labels) -> Sighting:
 def _drivers(instance: Instance) -> Drivers:
     """Return the team as the law drives it: each car on a round of its own, without goals, at prices of its own."""
     problem, cars = instance.problem, len(instance.starts)
-    ints, floats = blank(cars)
+    rows = table(Driver, (1, cars))
     for n, agent in enumerate(instance.e_agents, start=1):
-        ints[n, [KIND, FIRST, LAST, PLACE]] = ROUND, n, n + 1, n
-        floats[n, SPEED] = min(agent.parameters["speed"], problem.car.bounds.speed)
-    ints[EGO, KIND] = 0
+        car = rows[0, n]
+        car.kind, car.first, car.last, car.place = ROUND, n, n + 1, n
+        car.speed = min(agent.parameters["speed"], problem.car.bounds.speed)
     net, goals = np.zeros(1, dtype=np.int64), np.full(cars, NO_GOAL, dtype=np.int64)
     prices = np.zeros((cars, problem.network.lanes))
-    return drivers_of([instance], net, (ints[None], floats[None]), goals, prices)
+    return drivers_of([instance], net, rows, goals, prices)

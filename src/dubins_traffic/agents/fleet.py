@@ -12,31 +12,19 @@ import numpy as np
 from dubins_traffic.agents.kernel import decide
 from dubins_traffic.agents.own import OwnAgents
 from dubins_traffic.agents.tables import (
-    AIMED,
-    BEGIN,
-    FIRST,
-    FLOATS,
     FOLLOW,
-    GAP,
-    GOAL_X,
-    INTS,
-    KIND,
     KINDS,
-    LANE,
-    LAST,
     LOOP,
-    NOBODY,
     PARKED,
-    PATIENCE,
-    PLACE,
-    REPEAT,
     SCRIPTED,
-    SINCE,
     STEP,
-    STOP,
-    TRAIL,
-    YAW_RATE,
+    Agent,
     Agents,
+    Point,
+    Scene,
+    Stretch,
+    Team,
+    Trail,
     workspace,
 )
 from dubins_traffic.cars.state import Labels, State
@@ -44,6 +32,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN, parameters_of
@@ -104,11 +93,7 @@ class Fleet:
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
-        self._gather()
-
-    def _gather(self) -> None:
-        self._arrays = (*self._roads, *self._obstacles, *self._agents, *self._work)
-        self._state: State | None = None
+        self._scene = Scene(state, self._roads, self._obstacles, self._agents, self._work)
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of the e-agents for [t_k, t_k+1) into `commands` (B, N, 2)."""
@@ -128,24 +113,23 @@ class Fleet:
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
-        self._agents.seed[:] = seed
+        self._agents.team["seed"] = seed
         for team in (self._lawful, self._counter, self._own):
             if team is not None:
                 team.reseed(seed)
 
     def _decide_others(self, tick: int, state: State, commands: Floats) -> None:
+        if state is not self._scene.state:
+            self._scene = self._scene.replace(state=state)
         done = 0
         while done < commands.shape[0]:
-            if state is not self._state:
-                self._state = state
-                self._call = bound(decide, (0, 0, commands), (*state, *self._arrays))
-            reached = self._call(tick, done, commands)
+            reached = decide(tick, done, commands, self._scene)
             done = reached
             if reached < 0:
                 done = -1 - reached
                 pairs = 4 * len(self._work.pair)
-                self._work = self._work._replace(pair=np.zeros((pairs, 2), dtype=np.int64))
-                self._gather()
+                self._work = self._work.replace(pair=np.zeros((pairs, 2), dtype=np.int64))
+                self._scene = self._scene.replace(space=self._work)
 
 
 def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
@@ -153,10 +137,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
 
     `net` holds the number of each trial's road network.
     """
-    trials = len(instances)
-    ints = np.zeros((trials, cars, INTS), dtype=np.int64)
-    ints[:, :, (KIND, PATIENCE, TRAIL, LANE, PLACE, SINCE)] = (NOBODY, -1, -1, -1, -1, -1)
-    floats = np.zeros((trials, cars, FLOATS))
+    agents = table(Agent, (len(instances), cars))
     cycle: list[int] = []
     script: list[tuple[float, float, float]] = []
     elsewhere = KEEP_RULES | ALONE
@@ -169,21 +150,19 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
             if agent.kind in elsewhere:
                 continue
             given = _parameters(agent)
-            floats[b, n, :GOAL_X] = _habits(instance, agent.kind, given)
-            _plan(instance, given, ints[b, n], agent.kind, cycle, script)
-    path, mark, last = _trails(ints, floats, min(instance.problem.car.w for instance in instances))
+            _habits(instance, agent.kind, given, agents[b, n])
+            _plan(instance, given, agents[b, n], agent.kind, cycle, script)
+    steps = table(Stretch, len(script))
+    for step, (end, speed, yaw_rate) in zip(range(len(script)), script, strict=True):
+        steps[step].end, steps[step].speed, steps[step].yaw_rate = end, speed, yaw_rate
+    trail, point = _trails(agents, min(instance.problem.car.w for instance in instances))
     return Agents(
-        net=net,
-        seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
-        trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-        build=_builds(instances, floats),
-        ints=ints,
-        floats=floats,
+        team=_teams(instances, agents, net),
+        agent=agents,
         cycle=np.array(cycle, dtype=np.int64),
-        script=np.array(script, dtype=np.float64).reshape(len(script), 3),
-        path=path,
-        mark=mark,
-        last=last,
+        script=steps,
+        trail=trail,
+        point=point,
     )
 
 
@@ -217,30 +196,30 @@ def _parameters(agent: EAgent) -> Mapping[str, Any]:
 def _plan(
     instance: Instance,
     given: Mapping[str, Any],
-    ints: Ints,
+    agent: Agent,
     kind: str,
     cycle: list[int],
     script: list[tuple[float, float, float]],
 ) -> None:
-    ints[KIND] = KINDS[kind]
+    agent.kind = KINDS[kind]
     patience = given["patience"]
-    ints[PATIENCE] = -1 if patience is None else math.ceil(patience * instance.problem.rate - 1e-9)
-    if ints[KIND] == LOOP:
-        ints[FIRST] = len(cycle)
+    agent.patience = -1 if patience is None else math.ceil(patience * instance.problem.rate - 1e-9)
+    if agent.kind == LOOP:
+        agent.first = len(cycle)
         cycle += cycle_lanes(instance.problem.network, given["cycle"])
-        ints[LAST] = len(cycle)
-    elif ints[KIND] == SCRIPTED:
-        ints[FIRST] = len(script)
+        agent.last = len(cycle)
+    elif agent.kind == SCRIPTED:
+        agent.first = len(script)
         script += script_rows(given["commands"], instance.problem.rate)
-        ints[LAST] = len(script)
-        ints[REPEAT] = given["repeat"]
-    elif ints[KIND] == PARKED:
+        agent.last = len(script)
+        agent.repeat = given["repeat"]
+    elif agent.kind == PARKED:
         after = given["vacates_after"]
-        ints[BEGIN] = NEVER if after is None else math.ceil(after * instance.problem.rate - 1e-9)
+        agent.begin = NEVER if after is None else math.ceil(after * instance.problem.rate - 1e-9)
 
 
-def _habits(instance: Instance, kind: str, given: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return the columns of `Agents.floats` before GOAL_X."""
+def _habits(instance: Instance, kind: str, given: Mapping[str, Any], agent: Agent) -> None:
+    """Say how an e-agent drives, turns and keeps away from others."""
     car = instance.problem.car
     speed = max(min(given["speed"], car.bounds.speed), car.bounds.speed_low)
     cosine, sine = sincos(min(given["bearing_tolerance"], WIDEST))
@@ -249,48 +228,45 @@ def _habits(instance: Instance, kind: str, given: Mapping[str, Any]) -> tuple[fl
     if stop > 0.0:
         stop = max(stop, car.body.reach + speed * instance.problem.period + MARGIN)
     sensing = kind == "follow" and given["sensing_only"]
-    return (
-        given["offset"] * car.lane_width,
-        given["waypoint_radius"],
-        tangent,
-        tangent * AS_FAR_AS_2016 * car.w / 0.3,
-        0.0 if kind == "scripted" else stop,
-        given["ego_range"] if kind in ("wander", "parked") else -1.0,
-        speed,
-        min(given["yaw_rate"], car.bounds.yaw_rate),
-        given.get("gap", 0.0),
-        instance.problem.sensing_radius if sensing else EVERYWHERE,
-    )
+    agent.offset = given["offset"] * car.lane_width
+    agent.reached = given["waypoint_radius"]
+    agent.tangent = tangent
+    agent.miss = tangent * AS_FAR_AS_2016 * car.w / 0.3
+    agent.stop = 0.0 if kind == "scripted" else stop
+    agent.berth = given["ego_range"] if kind in ("wander", "parked") else -1.0
+    agent.speed = speed
+    agent.yaw_rate = min(given["yaw_rate"], car.bounds.yaw_rate)
+    agent.gap = given.get("gap", 0.0)
+    agent.sight = instance.problem.sensing_radius if sensing else EVERYWHERE
 
 
-def _builds(instances: Sequence[Instance], floats: Floats) -> Floats:
-    """Return `Agents.build`."""
+def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Rows[Team]:
+    """Return `Agents.team`."""
     cars = pack_cars([instance.problem.car for instance in instances])
     slowest = np.maximum(cars.speed_low, 0.0)
-    turns = np.where(floats[:, :, YAW_RATE] > 0.0, floats[:, :, YAW_RATE], np.inf).min(axis=1)
-    columns = (
-        floats[:, :, STOP].max(axis=1) + cars.reach,
-        np.array([instance.problem.period for instance in instances]),
-        slowest,
-        np.maximum(cars.turning_radius, slowest / turns),
-        ((cars.turning_radius > 0.0) | (slowest > 0.0)).astype(np.float64),
-        cars.w,
-        cars.half_length,
-        cars.half_width,
-        cars.rounding,
-    )
-    return np.ascontiguousarray(np.stack(columns, axis=1))
+    yaw_rates = agents["yaw_rate"]
+    turns = np.where(yaw_rates > 0.0, yaw_rates, np.inf).min(axis=1)
+    teams = table(Team, len(instances))
+    teams["seed"] = [instance.seed for instance in instances]
+    teams["trial"] = [instance.trial for instance in instances]
+    teams["net"] = net
+    teams["curves"] = (cars.turning_radius > 0.0) | (slowest > 0.0)
+    teams["span"] = agents["stop"].max(axis=1) + cars.reach
+    teams["period"] = [instance.problem.period for instance in instances]
+    teams["slowest"] = slowest
+    teams["radius"] = np.maximum(cars.turning_radius, slowest / turns)
+    for name in ("w", "half_length", "half_width", "rounding"):
+        teams[name] = getattr(cars, name)
+    return teams
 
 
-def _trails(ints: Ints, floats: Floats, w: float) -> tuple[Floats, Ints, Floats]:
-    """Give every car that follows a ring for the ego's path; return `Agents.path`, `mark` and `last`."""
-    follows = ints[:, :, KIND] == FOLLOW
+def _trails(agents: Rows[Agent], w: float) -> tuple[Rows[Trail], Rows[Point]]:
+    """Give every car that follows a ring for the ego's path; return `Agents.trail` and `Agents.point`."""
+    follows = agents["kind"] == FOLLOW
     followers = int(follows.sum())
-    ints[follows, TRAIL] = np.arange(followers)
-    points = math.ceil((float(floats[:, :, GAP].max()) + REMEMBERED) / (STEP * w / 0.3)) + 2
-    mark = np.zeros((followers, 3), dtype=np.int64)
-    mark[:, AIMED] = -1
-    return np.zeros((followers, points, 3)), mark, np.zeros((followers, 3))
+    agents["trail"][follows] = np.arange(followers)
+    points = math.ceil((float(agents["gap"].max()) + REMEMBERED) / (STEP * w / 0.3)) + 2
+    return table(Trail, followers), table(Point, (followers, points))
 
 
 def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:

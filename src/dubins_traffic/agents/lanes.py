@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from dubins_traffic.agents.tables import Team
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import below
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import FAR
 
 CHOICE_DRAW = 0
 
 
 @jit
-def random_exit(
-    arms: Ints, degree: Ints, v: int, lane: int, seed: Any, trial: int, car: int, tick: int
-) -> int:
+def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
     """Return one of the lanes out of `v`, each equally likely, but the one back, which only a dead end gives."""
+    arms, degree = roads.arms, roads.degree
     if degree[v] < 2:
         return lane ^ 1
-    pick = below(seed, trial, car, tick, CHOICE_DRAW, degree[v] - 1)
+    pick = below(team.seed, team.trial, car, tick, CHOICE_DRAW, degree[v] - 1)
     for k in range(degree[v]):
         if arms[v, k] != lane ^ 1:
             if pick == 0:

@@ -11,32 +11,21 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
-    BLOCKS,
-    DEPARTS,
-    FIRST,
-    GOAL_FIRST,
-    GOAL_LAST,
+    ABSENT,
     GOES,
-    KIND,
-    LAST,
-    LEFTS,
     LOOP,
     NEMESIS,
-    PARK_TIME,
-    PARKS,
-    ROLLS,
     ROUND,
-    SPEED,
-    TAILGATES,
+    Driver,
     Drivers,
-    blank,
-    build_of,
-    no_ways,
+    KeptPath,
+    Traffic,
     scratch,
+    vehicles_of,
 )
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
@@ -55,32 +44,28 @@ class Lawful:
         for instance in instances:
             if any(agent.kind in KEEP_RULES for agent in instance.e_agents):
                 check_fit(instance.problem, owes=True)
-        self._roads, net = pack_distinct(
+        roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
         )
-        self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
-        self._drivers = pack_drivers(instances, cars, net)
-        own = scratch(cars, int(np.diff(self._roads.seg_off).max()))
-        self._arrays = (*self._roads, *self._obstacles, *self._drivers, *own)
-        self._state: State | None = None
-        self._labels: Labels | None = None
-        self._commands: Floats | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the call that is bound to these arrays: a copy binds its own."""
-        return {**vars(self), "_state": None, "_labels": None, "_commands": None, "_call": None}
+        self._traffic = Traffic(
+            state,
+            Labels.zeros(*state.x.shape),
+            roads,
+            pack_obstacles([instance.problem.obstacles for instance in instances]),
+            pack_drivers(instances, cars, net),
+            scratch(cars, int(np.diff(roads.seg_off).max())),
+        )
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
-        self._drivers.seed[:] = seed
+        self._traffic.drivers.seed[:] = seed
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
-        if state is not self._state or labels is not self._labels or commands is not self._commands:
-            self._state, self._labels, self._commands = state, labels, commands
-            self._call = bound(decide, (0, commands), (*state, *labels, *self._arrays))
-        self._call(tick, commands)
+        if state is not self._traffic.state or labels is not self._traffic.labels:
+            self._traffic = self._traffic.replace(state=state, labels=labels)
+        decide(tick, commands, self._traffic)
 
 
 def pack_drivers(
@@ -101,47 +86,44 @@ def pack_drivers(
     """
     fleets, whose = distinct([(id(own.e_agents), id(own.problem.car)) for own in instances])
     rows = [_fleet(instances[b], cars) for b in fleets]
-    ints = np.stack([own.ints for own in rows])[whose]
-    floats = np.stack([own.floats for own in rows])[whose]
-    counts = np.array([len(own) for own, _ in rounds], dtype=np.int64)
-    egos = np.flatnonzero(counts)
-    last = counts.cumsum()
-    ints[egos, EGO, KIND] = ROUND
-    ints[egos, EGO, FIRST] = (last - counts)[egos]
-    ints[egos, EGO, LAST] = last[egos]
-    floats[egos, EGO, SPEED] = [instances[b].problem.car.bounds.speed for b in egos.tolist()]
+    drivers: Rows[Driver] = stack([own.cars for own in rows])[whose]
+    first = 0
+    for b, (own, _) in enumerate(rounds):
+        if len(own):
+            ego = drivers[b, EGO]
+            ego.kind, ego.first, ego.last = ROUND, first, first + len(own)
+            ego.speed = instances[b].problem.car.bounds.speed
+            first += len(own)
     stage: list[int] = []
     for own, _ in rounds:
         stage += own.tolist()
     distance = _one_below_another([far for _, far in rounds])
-    _add_stages([instance.problem for instance in instances], rows, whose, ints, stage)
-    return drivers_of(instances, net, (ints, floats), np.array(stage, dtype=np.int64), distance)
+    _add_stages([instance.problem for instance in instances], rows, whose, drivers, stage)
+    return drivers_of(instances, net, drivers, np.array(stage, dtype=np.int64), distance)
 
 
 def _one_below_another(tables: Sequence[Floats]) -> Floats:
     """Return the rows of all tables; narrower ones are filled up with infinities."""
-    widest = max((table.shape[1] for table in tables), default=0)
+    widest = max((rows.shape[1] for rows in tables), default=0)
     whole = [np.zeros((0, widest))]
-    for table in tables:
-        short = widest - table.shape[1]
-        whole.append(np.pad(table, ((0, 0), (0, short)), constant_values=np.inf) if short else table)
+    for rows in tables:
+        short = widest - rows.shape[1]
+        whole.append(np.pad(rows, ((0, 0), (0, short)), constant_values=np.inf) if short else rows)
     return np.concatenate(whole)
 
 
 def drivers_of(
-    instances: Sequence[Instance], net: Ints, rows: tuple[Ints, Floats], stage: Ints, distance: Floats
+    instances: Sequence[Instance], net: Ints, cars: Rows[Driver], stage: Ints, distance: Floats
 ) -> Drivers:
-    """Return the cars of a batch that are described by the `ints` and `floats` of `Drivers`, on no way yet."""
-    ints, floats = rows
+    """Return the drivers of a batch, `cars` (B, N), on no way yet."""
     return Drivers(
-        active=(ints[:, :, KIND] != 0).any(axis=1).astype(np.int64),
+        active=(cars["kind"] != ABSENT).any(axis=1).astype(np.int64),
         net=net,
         seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
         trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-        build=build_of([instance.problem for instance in instances]),
-        ints=ints,
-        floats=floats,
-        way=no_ways(*ints.shape[:2]),
+        vehicle=vehicles_of([instance.problem for instance in instances]),
+        car=cars,
+        way=table(KeptPath, cars.shape),
         stage=stage,
         distance=distance,
     )
@@ -150,19 +132,18 @@ def drivers_of(
 class _Fleet(NamedTuple):
     """The cars of a trial that keep the rules: their rows, which of them go to goals, and the cycles of the others."""
 
-    ints: Ints
-    floats: Floats
+    cars: Rows[Driver]
     goers: list[int]
     loops: list[tuple[int, Sequence[Sequence[int]]]]
 
 
 def _fleet(instance: Instance, cars: int) -> _Fleet:
-    own = _Fleet(*blank(cars), [], [])
+    own = _Fleet(table(Driver, cars), [], [])
     for n, agent in enumerate(instance.e_agents, start=1):
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
-            _describe(agent.kind, given, instance.problem.car.bounds.speed, own.ints[n], own.floats[n])
-            if own.ints[n, KIND] == LOOP:
+            _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])
+            if own.cars[n].kind == LOOP:
                 own.loops.append((n, given["cycle"]))
             else:
                 own.goers.append(n)
@@ -174,22 +155,22 @@ def _defaults(kind: str) -> Mapping[str, Any]:
     return parameters_of(kind, {})
 
 
-def _describe(kind: str, given: Mapping[str, Any], fastest: float, ints: Ints, floats: Floats) -> None:
-    """Fill the rows of a car but for its stages."""
-    floats[SPEED] = min(given["speed"], fastest)
-    ints[KIND] = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
+def _describe(kind: str, given: Mapping[str, Any], fastest: float, car: Driver) -> None:
+    """Fill the row of a car but for its stages."""
+    car.speed = min(given["speed"], fastest)
+    car.kind = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
     if kind == "lawful":
-        shares = ("rolls", "left", "blocks", "tailgates", "parks", "parks_for")
-        floats[DEPARTS] = given["departs_after"]
-        floats[[ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME]] = [given[name] for name in shares]
+        car.departs = given["departs_after"]
+        car.rolls, car.lefts, car.blocks = given["rolls"], given["left"], given["blocks"]
+        car.tailgates, car.parks, car.park_time = given["tailgates"], given["parks"], given["parks_for"]
 
 
 def _add_stages(
-    problems: Sequence[Problem], fleets: Sequence[_Fleet], whose: Ints, ints: Ints, stage: list[int]
+    problems: Sequence[Problem], fleets: Sequence[_Fleet], whose: Ints, cars: Rows[Driver], stage: list[int]
 ) -> None:
     """Put the goals of each trial, at which cars may park, and the lanes of its loops into `stage`.
 
-    Trial b has the cars of fleets[whose[b]], which are described by ints[b].
+    Trial b has the cars of fleets[whose[b]], which are described by cars[b].
     """
     numbers: list[int] = whose.tolist()
     goals: list[tuple[int, int]] = []
@@ -199,13 +180,13 @@ def _add_stages(
             stage += dict.fromkeys(problem.goal_vertices)
         goals.append((first, len(stage)))
         for n, cycle in own.loops:
-            ints[b, n, FIRST] = len(stage)
+            cars[b, n].first = len(stage)
             stage += cycle_lanes(problem.network, cycle)
-            ints[b, n, LAST] = len(stage)
+            cars[b, n].last = len(stage)
     spans = np.array(goals, dtype=np.int64)
     for number, own in enumerate(fleets):
         trials = np.flatnonzero(whose == number)[:, None]
         bound_by_e6 = [*own.goers, *(n for n, _ in own.loops)]
-        for k, (first, own_goals) in enumerate(((FIRST, GOAL_FIRST), (LAST, GOAL_LAST))):
-            ints[trials, own.goers, first] = spans[trials, k]
-            ints[trials, bound_by_e6, own_goals] = spans[trials, k]
+        for k, (first, own_goals) in enumerate((("first", "goal_first"), ("last", "goal_last"))):
+            cars[first][trials, own.goers] = spans[trials, k]
+            cars[own_goals][trials, bound_by_e6] = spans[trials, k]

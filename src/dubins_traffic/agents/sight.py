@@ -3,25 +3,10 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
-from dubins_traffic.agents.tables import (
-    BARRED,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    PATIENCE,
-    PERIOD,
-    ROUNDING,
-    SEES,
-    SPAN,
-    SPEED,
-    STOP,
-    TIGHT,
-    Workspace,
-)
+from dubins_traffic.agents.tables import BARRED, SEES, TIGHT, Agent, Scene, Team
 from dubins_traffic.cars.near import candidates
-from dubins_traffic.cars.state import State
-from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import nearest_in_box, separation
 from dubins_traffic.kernels.compile import jit
 
@@ -35,26 +20,26 @@ SHOULDER = 0.03
 Numbers = tuple[float, float, float, float]
 
 
+class Box(NamedTuple):
+    """A rounded box: its centre, its axis, its half extents along and across that, and by how much it is grown."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+    half_length: float
+    half_width: float
+    rounding: float
+
+
 @jit
-def sees(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    stop: float,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    a: float,
-    b: float,
-    r: float,
-) -> bool:
+def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
     """Return whether a rounded box has a point nearer than `stop` to (x, y) and at most 2.0 rad off the heading.
 
     Exact: either the point of the box that is nearest lies in the sector, or else the nearest one in the sector
     lies on one of the sector's edges.
     """
+    ox, oy, oc, os, a, b, r = box
     px, py = nearest_in_box(x, y, ox, oy, oc, os, a, b)
     dx = px - x
     dy = py - y
@@ -77,95 +62,70 @@ def sees(
 
 
 @jit
-def in_way(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    front: float,
-    side: float,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    a: float,
-    b: float,
-    r: float,
-) -> bool:
-    """Return whether a rounded box meets the strip from (x, y) to `front` ahead, `side` to either side."""
+def in_way(pose: Numbers, front: float, side: float, box: Box) -> bool:
+    """Return whether a rounded box meets the strip from a pose to `front` ahead, `side` to either side, metres."""
+    x, y, c, s = pose
+    ox, oy, oc, os, a, b, r = box
     half = 0.5 * front
     gap, _, _, _, _ = separation(x + half * c, y + half * s, c, s, half, side, 0.0, ox, oy, oc, os, a, b, r)
     return gap <= 0.0
 
 
 @jit
-def consider(
-    n: int,
-    pose: Numbers,
-    build: Floats,
-    ints: Ints,
-    floats: Floats,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    a: float,
-    b: float,
-    r: float,
-) -> int:
+def consider(pose: Numbers, team: Team, agent: Agent, box: Box) -> int:
     """Return the bits of `Workspace.held` that one body brings upon a car."""
     x, y, c, s = pose
-    if not sees(x, y, c, s, floats[n, STOP], ox, oy, oc, os, a, b, r):
+    stop = agent.stop
+    if not sees(x, y, c, s, stop, box):
         return 0
-    if ints[n, PATIENCE] < 0:
+    if agent.patience < 0:
         return SEES
     bits = SEES
-    front = build[HALF_LENGTH] + build[ROUNDING] + ELBOW + floats[n, SPEED] * build[PERIOD]
-    side = build[HALF_WIDTH] + build[ROUNDING] + SHOULDER
-    if in_way(x, y, c, s, front, side, ox, oy, oc, os, a, b, r):
+    half_length, rounding = team.half_length, team.rounding
+    front = half_length + rounding + ELBOW + agent.speed * team.period
+    side = team.half_width + rounding + SHOULDER
+    if in_way(pose, front, side, box):
         bits |= BARRED
-    if build[HALF_LENGTH] > 0.0:
-        px, py = nearest_in_box(x, y, ox, oy, oc, os, a, b)
-        room = build[SPAN] - floats[n, STOP] + SHOULDER + r
+    if half_length > 0.0:
+        px, py = nearest_in_box(x, y, box.x, box.y, box.c, box.s, box.half_length, box.half_width)
+        room = team.span - stop + SHOULDER + box.rounding
         if (px - x) * (px - x) + (py - y) * (py - y) < room * room:
             bits |= TIGHT
     return bits
 
 
 @jit
-def look(
-    state: State, b: int, build: Floats, ints: Ints, floats: Floats, obstacles: ObstacleTable, work: Workspace
-) -> int:
+def look(scene: Scene, b: int) -> int:
     """Set `held` of each car of trial b by all that it sees.
 
-    `build`, `ints` and `floats` are the trial's rows of `Agents`. Returns the number of pairs that had to be looked
-    at; if it exceeds the room for pairs, nothing was decided.
+    Returns the number of pairs that had to be looked at; if it exceeds the room for pairs, nothing was decided.
     """
-    span = build[SPAN]
+    state, obstacles, work = scene.state, scene.obstacles, scene.space
+    team = scene.agents.team[b]
+    agents = scene.agents.agent
+    span = team.span
     found = candidates(state, b, span, obstacles, span, work.pair, work.head, work.link, work.cell)
     if found > work.pair.shape[0]:
         return found
     for n in range(state.count[b]):
         work.held[n] = 0
-    p = build[HALF_LENGTH]
-    q = build[HALF_WIDTH]
-    r = build[ROUNDING]
+    p = team.half_length
+    q = team.half_width
+    r = team.rounding
     for k in range(found):
         i = work.pair[k, 0]
         j = work.pair[k, 1]
         pose = (state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
         if j < 0:
             row = obstacles.part[-1 - j]
-            work.held[i] |= consider(
-                i, pose, build, ints, floats, row[0], row[1], row[2], row[3], row[4], row[5], row[6]
-            )
+            box = Box(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
+            work.held[i] |= consider(pose, team, agents[b, i], box)
             continue
         other = (state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         for _ in range(2):
-            if work.held[i] == 0 or ints[i, PATIENCE] >= 0:
-                work.held[i] |= consider(
-                    i, pose, build, ints, floats, other[0], other[1], other[2], other[3], p, q, r
-                )
+            if work.held[i] == 0 or agents[b, i].patience >= 0:
+                box = Box(other[0], other[1], other[2], other[3], p, q, r)
+                work.held[i] |= consider(pose, team, agents[b, i], box)
             i, j = j, i
             pose, other = other, pose
     return found

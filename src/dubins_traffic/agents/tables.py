@@ -1,89 +1,172 @@
-"""The e-agents of a batch as arrays for kernels: what they are, what they remember, room to work in.
-
-A call that takes many arrays costs more to compile and to make than what happens in it, so that the numbers of one
-car stand together in a row, and functions take rows.
-"""
+"""The e-agents of a batch as tables for kernels: what they are, what they remember, room to work in."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.cars.state import State
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Rows, record
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.table import RoadTable
 
 WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
 KINDS = {"wander": WANDER, "loop": LOOP, "follow": FOLLOW, "parked": PARKED, "scripted": SCRIPTED}
-NOBODY = -1
-
-KIND, BEGIN, FIRST, LAST, REPEAT, PATIENCE, TRAIL, LANE, LEG, PLACE, SINCE = range(11)
-INTS = 11
-"""Columns of `Agents.ints`.
-
-KIND: NOBODY where there's no e-agent. BEGIN: the tick at which the car begins to drive. FIRST, LAST: its rows of
-`cycle` or `script` are FIRST to LAST - 1. REPEAT: 1 if its script repeats. PATIENCE: ticks that it stands for others
-before it looks only at the way ahead; negative: for ever. TRAIL: its row of `path`, `mark` and
-`last`, or -1. It remembers LANE: the lane driven, -1 before the first; LEG: for cars that turn in place 0 toward
-the start of the lane and 1 toward its end, for others the lane to come, -1 until it is chosen; PLACE: the row of its
-cycle or script, -1 when not on it; SINCE: the tick since which it must stand, -1 if it need not.
-"""
-
-OFFSET, REACHED, TANGENT, MISS, STOP, BERTH, SPEED, YAW_RATE, GAP, SIGHT, GOAL_X, GOAL_Y = range(12)
-FLOATS = 12
-"""Columns of `Agents.floats`: metres, m/s, rad/s.
-
-OFFSET: how far right of the centre line it drives. REACHED: when a waypoint counts as reached. TANGENT and MISS: the
-bearing tolerance (see `policies.waypoint`). STOP: it stands while a surface in sight is nearer. BERTH: it does not
-drive while the ego's centre is within; negative: never mind. SPEED, YAW_RATE: how fast it drives and turns. GAP:
-kept behind the ego. SIGHT: from where the ego is seen. It remembers GOAL_X, GOAL_Y: the waypoint.
-"""
-
-SPAN, PERIOD, SLOWEST, RADIUS, CURVES, W, HALF_LENGTH, HALF_WIDTH, ROUNDING = range(9)
-"""Columns of `Agents.build`: metres, seconds, m/s.
-
-SPAN: no two bodies matter to each other whose centres are farther apart. PERIOD: of a tick. SLOWEST: smallest
-speed. RADIUS: of the tightest turn. CURVES: 1 if the cars can't turn in place, else 0. W. Then the body as a rounded
-box.
-"""
+NOBODY: Final = -1
 
 SEES, BARRED, TIGHT, WEARY = 1, 2, 4, 8
 """What holds a car, bits of `Workspace.held`: something is nearer than the car stops at; in its way; too near to turn
 in place. BARRED and TIGHT are looked at only for cars whose patience can end; WEARY: it ended, and the car is barred.
 """
 
-WRITTEN, AIMED, SEEN = range(3)
-"""Columns of `Agents.mark`: points of the ego's path written so far, the one driven to (-1: not on the path), and the
-tick at which the ego was last seen."""
-
-STEP = 0.1
+STEP: Final = 0.1
 """Metres between two remembered points of the ego's path (for w = 0.3 m)."""
 
 
-class Agents(NamedTuple):
+@record
+class Agent:
+    """An e-agent: what it is given, and what it remembers."""
+
+    kind: int = NOBODY
+    """WANDER to SCRIPTED; NOBODY where there's no e-agent."""
+    begin: int
+    """The tick at which the car begins to drive."""
+    first: int
+    """Its first row of `Agents.cycle` or `Agents.script`."""
+    last: int
+    """The row after its last."""
+    repeat: int
+    """1 if its script repeats."""
+    patience: int = -1
+    """Ticks that it stands for others before it looks only at the way ahead; negative: for ever."""
+    trail: int = -1
+    """Its row of `Agents.trail` and `Agents.point`, or -1."""
+    offset: float
+    """How far right of the centre line it drives, metres."""
+    reached: float
+    """From where a waypoint counts as reached, metres."""
+    tangent: float
+    """Tangent of the bearing error beyond which it turns (`policies.waypoint`)."""
+    miss: float
+    """Largest lateral distance of the waypoint from the line ahead that is left alone, metres."""
+    stop: float
+    """It stands while a surface in sight is nearer, metres."""
+    berth: float
+    """It does not drive while the ego's centre is within, metres; negative: never mind."""
+    speed: float
+    """How fast it drives, m/s."""
+    yaw_rate: float
+    """How fast it turns, rad/s."""
+    gap: float
+    """Kept behind the ego, metres."""
+    sight: float
+    """From where the ego is seen, metres."""
+    lane: int = -1
+    """The lane driven, -1 before the first."""
+    leg: int
+    """For cars that turn in place 0 toward the start of the lane and 1 toward its end, for others the lane to come, -1
+    until it is chosen."""
+    place: int = -1
+    """The row of its cycle or script, -1 when not on it."""
+    since: int = -1
+    """The tick since which it must stand, -1 if it need not."""
+    goal_x: float
+    """The waypoint, metres."""
+    goal_y: float
+    """The waypoint, metres."""
+
+
+@record
+class Team:
+    """What the e-agents of a trial have in common."""
+
+    seed: np.uint64
+    """Of the random numbers."""
+    trial: int
+    """Number of the trial, of the random numbers."""
+    net: int
+    """Number of the road network."""
+    curves: int
+    """1 if the cars can't turn in place."""
+    span: float
+    """No two bodies matter to each other whose centres are farther apart, metres."""
+    period: float
+    """Seconds of a tick."""
+    slowest: float
+    """Smallest speed, m/s."""
+    radius: float
+    """Of the tightest turn, metres."""
+    w: float
+    """Width of a lane, metres."""
+    half_length: float
+    """Of the body, a rounded box, metres."""
+    half_width: float
+    """Of the body, metres."""
+    rounding: float
+    """Of the body, metres."""
+
+
+@record
+class Stretch:
+    """A step of a script."""
+
+    end: float
+    """The tick of the script at which it ends."""
+    speed: float
+    """m/s."""
+    yaw_rate: float
+    """rad/s."""
+
+
+@record
+class Point:
+    """A point of the ego's path."""
+
+    x: float
+    """Metres."""
+    y: float
+    """Metres."""
+    driven: float
+    """How far the ego had driven, metres."""
+
+
+@record
+class Trail:
+    """What a car that follows remembers of the ego, beside points of its path."""
+
+    written: int
+    """Points written so far."""
+    aimed: int = -1
+    """The point driven to, -1: not on the path."""
+    seen: int
+    """The tick at which the ego was last seen."""
+    x: float
+    """Where, metres."""
+    y: float
+    """Where, metres."""
+    driven: float
+    """How far the ego had driven, metres."""
+
+
+class Agents(Tables):
     """The e-agents of a batch.
 
-    `net` (B,): number of the road network; `seed` (B,) uint64 and `trial` (B,): of the random numbers; `build`
-    (B, 9), `ints` (B, N, 11) and `floats` (B, N, 12): columns as above; `cycle` (M,): lanes in order; `script`
-    (M, 3): tick of the script at which the step ends, speed, yaw rate. Of the ego's path, for every car that
-    follows: `path` (F, M, 3), a ring of x, y and distance driven; `mark` (F, 3): columns as above; `last` (F, 3):
-    the ego's position when last seen and the distance driven to there.
+    `team` (B,), `agent` (B, N); `cycle` (M,): lanes in order; `script` (M,). Of the ego's path, for every car that
+    follows: `trail` (F,), and `point` (F, M), a ring.
     """
 
-    net: Ints
-    seed: npt.NDArray[np.uint64]
-    trial: Ints
-    build: Floats
-    ints: Ints
-    floats: Floats
+    team: Rows[Team]
+    agent: Rows[Agent]
     cycle: Ints
-    script: Floats
-    path: Floats
-    mark: Ints
-    last: Floats
+    script: Rows[Stretch]
+    trail: Rows[Trail]
+    point: Rows[Point]
 
 
-class Workspace(NamedTuple):
+class Workspace(Tables):
     """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), why cars must stand, lanes."""
 
     pair: Ints
@@ -93,6 +176,16 @@ class Workspace(NamedTuple):
     held: Ints
     hops: Ints
     queue: Ints
+
+
+class Scene(Tables):
+    """All that the e-agents of a batch go by."""
+
+    state: State
+    roads: RoadTable
+    obstacles: ObstacleTable
+    agents: Agents
+    space: Workspace
 
 
 def workspace(cars: int, pairs: int, lanes: int) -> Workspace:

@@ -4,26 +4,10 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.agents.tables import (
-    AIMED,
-    CURVES,
-    GAP,
-    LANE,
-    PERIOD,
-    RADIUS,
-    SEEN,
-    SIGHT,
-    SLOWEST,
-    SPEED,
-    STEP,
-    TRAIL,
-    WRITTEN,
-    YAW_RATE,
-    W,
-)
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.agents.tables import STEP, Agent, Agents, Point, Team, Trail
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 
 Numbers = tuple[float, float, float, float]
@@ -41,110 +25,105 @@ STEEP = 1.0
 
 @jit
 def follow(
-    tick: int,
-    n: int,
-    pose: Numbers,
-    ego: Numbers,
-    free: bool,
-    build: Floats,
-    ints: Ints,
-    floats: Floats,
-    paths: Floats,
-    marks: Ints,
-    lasts: Floats,
+    tick: int, b: int, n: int, pose: Numbers, ego: Numbers, free: bool, agents: Agents
 ) -> tuple[bool, bool, float, float]:
     """Return whether the ego is in sight, whether the car shall drive on lanes, else its speed and yaw rate.
 
     A car that is not `free` only looks.
     """
-    f = ints[n, TRAIL]
-    path = paths[f]
-    mark = marks[f]
-    last = lasts[f]
-    scale = build[W] / 0.3
-    sight = floats[n, SIGHT]
+    team, agent = agents.team[b], agents.agent[b, n]
+    path, f = agents.point, agent.trail
+    trail = agents.trail[f]
+    scale = team.w / 0.3
+    sight = agent.sight
     dx = pose[0] - ego[0]
     dy = pose[1] - ego[1]
     seen = dx * dx + dy * dy <= sight * sight
     if seen:
-        observe(tick, ego[0], ego[1], STEP * scale, path, mark, last)
-    if free and on_path(pose[0], pose[1], JOIN * scale, path, mark):
-        ints[n, LANE] = -1
-        speed, yaw_rate = track(n, pose, seen, build, floats, path, mark, last)
+        observe(tick, ego[0], ego[1], STEP * scale, path, f, trail)
+    if free and on_path(pose[0], pose[1], JOIN * scale, path, f, trail):
+        agent.lane = -1
+        speed, yaw_rate = track(pose, seen, team, agent, path, f, trail)
         return seen, False, speed, yaw_rate
     return seen, free, 0.0, 0.0
 
 
 @jit
-def observe(tick: int, x: float, y: float, step: float, path: Floats, mark: Ints, last: Floats) -> None:
+def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: int, trail: Trail) -> None:
     """Remember the ego's place; one that comes back into sight elsewhere begins a new path."""
-    dx = x - last[0]
-    dy = y - last[1]
+    dx = x - trail.x
+    dy = y - trail.y
     moved = sqrt(dx * dx + dy * dy)
-    if mark[WRITTEN] == 0 or (moved > JUMP and tick - mark[SEEN] > 1):
-        mark[WRITTEN] = 0
-        mark[AIMED] = -1
+    if trail.written == 0 or (moved > JUMP and tick - trail.seen > 1):
+        trail.written = 0
+        trail.aimed = -1
         moved = 0.0
-    mark[SEEN] = tick
-    last[0] = x
-    last[1] = y
-    last[2] += moved
-    newest = (mark[WRITTEN] - 1) % path.shape[0]
-    if mark[WRITTEN] == 0 or last[2] - path[newest, 2] >= step:
-        row = mark[WRITTEN] % path.shape[0]
-        for k in range(3):
-            path[row, k] = last[k]
-        mark[WRITTEN] += 1
-        if mark[WRITTEN] - mark[AIMED] >= path.shape[0]:
-            mark[AIMED] = -1
+    driven = trail.driven + moved
+    trail.seen = tick
+    trail.x = x
+    trail.y = y
+    trail.driven = driven
+    written = trail.written
+    newest = (written - 1) % path.shape[1]
+    if written == 0 or driven - path[f, newest].driven >= step:
+        point = path[f, written % path.shape[1]]
+        point.x = x
+        point.y = y
+        point.driven = driven
+        trail.written = written + 1
+        if written + 1 - trail.aimed >= path.shape[1]:
+            trail.aimed = -1
 
 
 @jit
-def on_path(x: float, y: float, near: float, path: Floats, mark: Ints) -> bool:
+def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: Trail) -> bool:
     """Return whether the car is on the ego's path: from when any point of it is near, the newest first."""
-    if mark[AIMED] < 0:
-        for k in range(mark[WRITTEN] - 1, max(mark[WRITTEN] - path.shape[0], -1), -1):
-            dx = path[k % path.shape[0], 0] - x
-            dy = path[k % path.shape[0], 1] - y
+    if trail.aimed < 0:
+        written = trail.written
+        for k in range(written - 1, max(written - path.shape[1], -1), -1):
+            point = path[f, k % path.shape[1]]
+            dx = point.x - x
+            dy = point.y - y
             if dx * dx + dy * dy < near * near:
-                mark[AIMED] = k
+                trail.aimed = k
                 return True
-    return mark[AIMED] >= 0
+    return trail.aimed >= 0
 
 
 @jit
 def track(
-    n: int, pose: Numbers, seen: bool, build: Floats, floats: Floats, path: Floats, mark: Ints, last: Floats
+    pose: Numbers, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
 ) -> tuple[float, float]:
     """Return (speed, yaw rate) along the ego's path; gives the path up at its end when the ego is out of sight."""
     x, y, c, s = pose
-    near = max(AHEAD * build[W] / 0.3, build[RADIUS])
-    aimed = mark[AIMED]
-    gx, gy, d = _aim(x, y, aimed, path)
-    while d < near and aimed + 1 < mark[WRITTEN]:
+    near = max(AHEAD * team.w / 0.3, team.radius)
+    aimed = trail.aimed
+    gx, gy, d = _aim(x, y, aimed, path, f)
+    while d < near and aimed + 1 < trail.written:
         aimed += 1
-        gx, gy, d = _aim(x, y, aimed, path)
-    mark[AIMED] = aimed
-    speed = floats[n, SPEED]
-    yaw = floats[n, YAW_RATE]
+        gx, gy, d = _aim(x, y, aimed, path, f)
+    trail.aimed = aimed
+    speed = agent.speed
+    yaw = agent.yaw_rate
     if seen:
-        room = last[2] - path[aimed % path.shape[0], 2] + d - floats[n, GAP]
+        room = trail.driven - path[f, aimed % path.shape[1]].driven + d - agent.gap
         if room <= 0.0:
             return 0.0, 0.0
-        speed = min(speed, room / max(EASE, 2.0 * build[PERIOD]))
+        speed = min(speed, room / max(EASE, 2.0 * team.period))
     elif d < near:
-        mark[AIMED] = -1
-        mark[WRITTEN] = 0
+        trail.aimed = -1
+        trail.written = 0
         return 0.0, 0.0
-    if build[CURVES] == 0.0:
-        _, turn = turn_then_drive(x, y, c, s, gx, gy, STEEP, NEVER, speed, yaw, build[PERIOD])
+    if team.curves == 0:
+        _, turn = turn_then_drive(x, y, c, s, gx, gy, STEEP, NEVER, speed, yaw, team.period)
         if turn != 0.0:
             return 0.0, turn
-    return pursue(x, y, c, s, gx, gy, speed, build[SLOWEST], yaw, build[RADIUS])
+    return pursue(x, y, c, s, gx, gy, speed, team.slowest, yaw, team.radius)
 
 
 @jit
-def _aim(x: float, y: float, aimed: int, path: Floats) -> tuple[float, float, float]:
-    gx = path[aimed % path.shape[0], 0]
-    gy = path[aimed % path.shape[0], 1]
+def _aim(x: float, y: float, aimed: int, path: Rows[Point], f: int) -> tuple[float, float, float]:
+    point = path[f, aimed % path.shape[1]]
+    gx = point.x
+    gy = point.y
     return gx, gy, sqrt((gx - x) * (gx - x) + (gy - y) * (gy - y))

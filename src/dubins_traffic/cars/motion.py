@@ -5,12 +5,10 @@ Loops over trials and cars; the element functions are in `kernels.trig` and `ker
 
 from __future__ import annotations
 
-from typing import Any
-
 from dubins_traffic.cars.near import FEW, candidates
 from dubins_traffic.cars.partners import PARTNERS, VACANT, Workspace, part
 from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
-from dubins_traffic.cars.state import STATE_END, State
+from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
@@ -19,14 +17,12 @@ from dubins_traffic.kernels.trig import advance
 
 MOVED, FULL, CROWDED = range(3)
 
-# Where each table begins and ends among the arrays of a call.
-CARS_END = STATE_END + len(CarTable._fields)
-OBSTACLES_END = CARS_END + len(ObstacleTable._fields)
-ROWS_END = OBSTACLES_END + len(Rows._fields)
-
 
 @jit
-def step(first: int, dt: float, commands: Floats, *arrays: Any) -> int:
+def step(
+    first: int, dt: float, commands: Floats, state: State, cars: CarTable, obstacles: ObstacleTable, r: Rows,
+    work: Workspace,
+) -> int:  # fmt: skip
     """Clip the commands in place and move trials `first`... for one tick of `dt` seconds.
 
     Parameters
@@ -37,9 +33,8 @@ def step(first: int, dt: float, commands: Floats, *arrays: Any) -> int:
         Seconds.
     commands : array (B, N, 2)
         Speed and yaw rate of every car.
-    *arrays
-        Those of State, CarTable, ObstacleTable, Rows and Workspace, one after another: a call from Python with
-        arrays takes a third of the time of one with tables of them.
+    state, cars, obstacles, r, work
+        The batch.
 
     Returns
     -------
@@ -47,24 +42,6 @@ def step(first: int, dt: float, commands: Floats, *arrays: Any) -> int:
         The number of trials B when all have moved, or the trial before which it stopped because the buffer of
         contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
     """
-    return _step(
-        State(*arrays[:STATE_END]), commands, CarTable(*arrays[STATE_END:CARS_END]),
-        ObstacleTable(*arrays[CARS_END:OBSTACLES_END]), Rows(*arrays[OBSTACLES_END:ROWS_END]),
-        dt, Workspace(*arrays[ROWS_END:]), first,
-    )  # fmt: skip
-
-
-@jit
-def _step(
-    state: State,
-    commands: Floats,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    r: Rows,
-    dt: float,
-    work: Workspace,
-    first: int,
-) -> int:
     work.found[0] = 0
     trials, n = state.x.shape
     total = trials * n

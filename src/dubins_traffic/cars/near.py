@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import floor, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.tables import Tables
 
 FEW = 24
 """Up to this many cars all pairs are looked at, which is faster."""
@@ -22,7 +22,7 @@ LONG = 1e6
 """Ticks beyond which it does not matter how many they are."""
 
 
-class Spacing(NamedTuple):
+class Spacing(Tables):
     """How far apart the cars of a batch are, as of frame `since` (B,) of each trial.
 
     `apart` (B, N): distance from each car's centre to the nearest other one's, metres, or less; `least` (B,): the least
@@ -61,7 +61,7 @@ def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
 def unknown(trials: int, cars: int) -> Spacing:
     """Return the spacing of cars of which nobody knows how they move."""
     own = spacing(trials, cars, np.zeros(trials))
-    return own._replace(head=np.zeros((trials, 0), dtype=np.int64))
+    return own.replace(head=np.zeros((trials, 0), dtype=np.int64))
 
 
 @jit_inline

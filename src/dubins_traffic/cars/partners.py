@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from dubins_traffic.cars.state import State
@@ -11,6 +9,7 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, separation
 from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.tables import Tables
 
 PARTED = 0.01
 """Two bodies that touched count as touching until they are this far apart, metres."""
@@ -19,7 +18,7 @@ VACANT = -(2**62)
 CONTACT_FIELDS = 12
 
 
-class Workspace(NamedTuple):
+class Workspace(Tables):
     """What `step` needs beside the state, allocated once.
 
     `partner` (B, N, PARTNERS): whom a car touches since their contact, VACANT where nobody; held by the lower

@@ -8,7 +8,6 @@ in which no two bodies can meet during the tick, which is nearly all of them.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
 RUN = 32
@@ -24,7 +24,7 @@ TOGETHER = 4
 """Cars of one trial that are moved at once, if it has a multiple of as many places."""
 
 
-class Rows(NamedTuple):
+class Rows(Tables):
     """Constants of a batch, one value per trial (B,), except `alike`, `mask` and `close`.
 
     `low`, `high`: bounds on the speed; `most`, `slack`, `curvature`: |yaw| <= min(most, slack + curvature |speed|);

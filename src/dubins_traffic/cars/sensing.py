@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import NONE, STATE_END, Labels, State
+from dubins_traffic.cars.state import NONE, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER
@@ -22,15 +22,15 @@ SEEN_WHOLES = 6
 
 
 @jit
-def neighbours(b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, *arrays: Any) -> int:
+def neighbours(
+    b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, state: State, labels: Labels
+) -> int:
     """Write car `viewer` (index), then the others within `radius` (m), by index, into two arrays; return how many.
 
     A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
-    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. `arrays` are those of State and
-    of Labels, one after another. Where `wholes` was as it is now already, minus the number is returned.
+    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. Where `wholes` was
+    as it is now already, minus the number is returned.
     """
-    state = State(*arrays[:STATE_END])
-    labels = Labels(*arrays[STATE_END:])
     limit = radius * radius
     x = state.x[b, viewer]
     y = state.y[b, viewer]

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dubins_traffic.cars.body import Body
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 
 EGO = 0
 NONE = -1
@@ -89,7 +90,7 @@ class Observation(NamedTuple):
     scan: Floats | None
 
 
-class State(NamedTuple):
+class State(Tables):
     """State of a batch after a tick. All arrays (B, N) float64, except `count` (B,) int64: cars in each trial.
 
     `speed` and `yaw_rate` are those in force when the frame was reached: 0 for a car that a contact had fixed.
@@ -101,7 +102,7 @@ class State(NamedTuple):
     s: Floats
     speed: Floats
     yaw_rate: Floats
-    count: Ints  # pyright: ignore[reportIncompatibleMethodOverride]  # as above
+    count: Ints
 
     @staticmethod
     def zeros(trials: int, cars: int) -> State:
@@ -110,11 +111,7 @@ class State(NamedTuple):
         return State(x, y, np.ones((trials, cars)), s, speed, yaw_rate, np.full(trials, cars, dtype=np.int64))
 
 
-STATE_END: Final = len(State._fields)
-"""Where the arrays of State end among those that a kernel takes one after another."""
-
-
-class Labels(NamedTuple):
+class Labels(Tables):
     """Propositions of a batch: int64 arrays (B, N) as in `Propositions`, and flags `bits` (B, N) uint32."""
 
     segment: Ints

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from dubins_traffic.cars.body import Car, Disc, DiscObstacle, Obstacle
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.tables import Tables
 
 
-class CarTable(NamedTuple):
+class CarTable(Tables):
     """The car of each trial; all arrays (B,), metres, m/s, rad/s."""
 
     reach: Floats
@@ -30,7 +30,7 @@ class CarTable(NamedTuple):
     w: Floats
 
 
-class ObstacleTable(NamedTuple):
+class ObstacleTable(Tables):
     """The static obstacles of each trial: those of trial b are the parts off[b] to off[b + 1] - 1.
 
     `off` (B + 1,); `part` (P, 8): x, y, cos, sin, half_length, half_width, rounding, reach; `owner` (P,): number

@@ -161,7 +161,7 @@ class Lanes:
         memory[0, columns.RAMP] = 0.2 + 0.8 * abs(left)
         memory[0, columns.UNTIL] = memory[0, columns.RAMP]
         span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
-        return known._replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
+        return known.replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
 
     def _entries(self, pose: Pose) -> list[tuple[int, float, float, float]]:
         """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import chain
-from typing import Any
-
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
-from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
-    FIRST,
-    KIND,
-    LAST,
-    PLACE,
     ROUND,
-    SPEED,
+    Driver,
     Drivers,
+    KeptPath,
     Scratch,
-    blank,
-    build_of,
-    no_ways,
+    Traffic,
     scratch,
+    vehicles_of,
 )
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
@@ -46,17 +38,11 @@ class Rules:
 
     def __init__(self) -> None:
         self._drivers: Drivers | None = None
-        self._decide: Callable[..., object] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the call that is bound to these arrays: a copy binds its own."""
-        return {**vars(self), "_decide": None}
 
     def start(self, problem: Problem) -> None:
         """Find the round; InputError if the car can't keep the rules."""
         check_fit(problem, owes=False)
         cars = 1 + len(problem.e_agents)
-        ints, floats = blank(cars)
         stage, distance = stages(problem)
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
@@ -66,21 +52,21 @@ class Rules:
         self._scratch: Scratch = scratch(cars, len(problem.network.segments))
         if not len(stage):
             return
-        ints[EGO, [KIND, FIRST, LAST]] = (ROUND, 0, len(stage))
-        floats[EGO, SPEED] = problem.car.bounds.speed
+        rows = table(Driver, (1, cars))
+        ego = rows[0, EGO]
+        ego.kind, ego.first, ego.last = ROUND, 0, len(stage)
+        ego.speed = problem.car.bounds.speed
         self._drivers = Drivers(
             active=np.ones(1, dtype=np.int64),
             net=np.zeros(1, dtype=np.int64),
             seed=np.zeros(1, dtype=np.uint64),
             trial=np.zeros(1, dtype=np.int64),
-            build=build_of([problem]),
-            ints=ints[None].copy(),
-            floats=floats[None].copy(),
-            way=no_ways(1, cars),
+            vehicle=vehicles_of([problem]),
+            car=rows,
+            way=table(KeptPath, (1, cars)),
             stage=stage,
             distance=distance,
         )
-        self._decide = None
 
     def act(self, observation: Observation) -> Command:
         """Drive on."""
@@ -88,17 +74,14 @@ class Rules:
         if drivers is None:
             return Command(0.0, 0.0)
         put_observed(self._state, self._labels, observation)
-        if drivers.ints[0, EGO, PLACE] < 0:
+        ego = drivers.car[0, EGO]
+        if ego.place < 0:
             seen = observation.propositions
-            drivers.ints[0, EGO, PLACE] = nearest_stage(
-                drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment
-            )
-        call = self._decide or self._bind(drivers)
-        call(observation.tick, self._command)
+            ego.place = nearest_stage(drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment)
+        decide(
+            observation.tick,
+            self._command,
+            Traffic(self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch),
+        )
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)
-
-    def _bind(self, drivers: Drivers) -> Callable[..., object]:
-        tables = (self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch)
-        self._decide = bound(decide, (0, self._command), tuple(chain.from_iterable(tables)))
-        return self._decide

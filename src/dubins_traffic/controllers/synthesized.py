@@ -16,7 +16,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.policies.rules.exits import BACK
 from dubins_traffic.policies.rules.room import MARGIN
-from dubins_traffic.policies.rules.tables import FIRST, LANE, LAST, NEXT, PLACE, TURN, Drivers
+from dubins_traffic.policies.rules.tables import Drivers
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
@@ -110,8 +110,9 @@ class Synthesized(Rules):
             [arena.goals.index(v) for v in vertices],
             vertices,
         )
-        drivers.ints[0, EGO, [FIRST, LAST, PLACE]] = 0, 1, 0
-        self._drivers = drivers._replace(
+        ego = drivers.car[0, EGO]
+        ego.first, ego.last, ego.place = 0, 1, 0
+        self._drivers = drivers.replace(
             stage=np.array([NO_GOAL]), distance=np.zeros((1, arena.network.lanes))
         )
         self._points: list[list[float]] = problem.network.points.tolist()
@@ -176,8 +177,8 @@ class Synthesized(Rules):
         for place, out in enumerate(_liked(pursuit.advice.exits, node.exits, drivers.distance[0])):
             back = BACK if out == lane ^ 1 and len(node.exits) > 1 else 0.0
             drivers.distance[0, out] = SECOND_BEST * place - back
-            if place == 0 and drivers.ints[0, EGO, LANE] == lane:
-                drivers.ints[0, EGO, NEXT] = out
+            if place == 0 and drivers.car[0, EGO].lane == lane:
+                drivers.car[0, EGO].next_lane = out
 
     @staticmethod
     def _note_wins(pursuit: _Pursuit, wins: bool) -> None:
@@ -198,7 +199,7 @@ class Synthesized(Rules):
         drivers, advice = self._drivers, pursuit.advice
         if advice is None or advice.enter or seen.propositions.crosses >= 0 or drivers is None:
             return command
-        if drivers.ints[0, EGO, TURN] > self._patience:
+        if drivers.car[0, EGO].turn > self._patience:
             return command
         x, y = self._points[pursuit.strategy.board.arena.nodes[advice.node].vertex]
         room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)

@@ -6,29 +6,27 @@ memory. The order of events in a tick is that of `docs/semantics.md`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
-from dubins_traffic.agents.tables import Agents
-from dubins_traffic.agents.tables import Workspace as AgentSpace
+from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import FULL, MOVED, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
 from dubins_traffic.cars.partners import Workspace
 from dubins_traffic.cars.rows import Rows
-from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.kernels.records import Rows as TableOf
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
-from dubins_traffic.policies.rules.tables import Drivers, Scratch
-from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.breach_log import JUDGED, MOST, OF_CAR, BreachLog, RefereeParameters
+from dubins_traffic.policies.rules.tables import Traffic
+from dubins_traffic.rules.breach_log import MOST, BreachLog, RefereeParameters, RefereeTables
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
-from dubins_traffic.rules.tables import Memory, RuleTable
+from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
 from dubins_traffic.scoring.tally import CLEARANCE, SEALED, SIGHT2, Tally, count_frame
 
 RUNNING, ENDED, COLLIDED, FAULTY, NO_CONTACTS, NO_PAIRS, NO_SIGHT, NO_DOCKET = range(8)
@@ -45,7 +43,7 @@ drivers do. ENDS: whether a collision of the ego ends it.
 """
 
 
-class Progress(NamedTuple):
+class Progress(Tables):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
     `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
@@ -59,28 +57,23 @@ class Progress(NamedTuple):
     place: Floats
 
 
-class World(NamedTuple):
+class World(Scene, Traffic):
     """All tables of a batch."""
 
-    state: State
     cars: CarTable
-    obstacles: ObstacleTable
     rows: Rows
     work: Workspace
-    roads: RoadTable
     beside: ObstacleLanes
-    rules: RuleTable
-    terms: RefereeParameters
-    labels: Labels
+    rules: TableOf[TrialRules]
+    terms: TableOf[RefereeParameters]
     memory: Memory
     breach_log: BreachLog
-    drivers: Drivers
-    scratch: Scratch
-    agents: Agents
-    space: AgentSpace
     tally: Tally
     progress: Progress
     spacing: Spacing
+    labelling: LabelTables
+    judging: RefereeTables
+    """The same tables, as labels and referee take them."""
 
 
 @jit_wide
@@ -135,7 +128,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own[TICK] = tick + 1
     keep_apart(world.state, b, tick + 1, world.spacing)
-    label_trial(b, tick + 1, world.state, world.roads, world.beside, world.rules, world.labels, world.memory)
+    label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
         world.tally.ints[b, SEALED] = 1
@@ -148,24 +141,21 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
 @jit_inline
 def _room(b: int, world: World) -> int:
     """Return the most breaches that a frame of trial b can begin."""
-    goals = world.terms.goal_off[b + 1] - world.terms.goal_off[b]
-    return MOST * world.state.count[b] + goals
+    own = world.terms[b]
+    return MOST * world.state.count[b] + own.goals_end - own.goals_begin
 
 
 @jit_inline
 def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
     if own[DECIDED] != 0:
         return
-    if own[OTHERS] != 0 and not decide_others(
-        b, tick, world.state, world.roads, world.obstacles, world.agents, world.space, commands
-    ):
+    if own[OTHERS] != 0 and not decide_others(b, tick, world, commands):
         own[STATUS] = NO_SIGHT
         return
     if own[LAWFUL] != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world.state, world.labels,
-            world.roads, world.obstacles, world.drivers, world.scratch, commands,
+            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
     unsound = 0.0
     for n in range(world.state.count[b]):
@@ -210,15 +200,12 @@ def _observe(b: int, tick: int, world: World) -> None:
     count_frame(
         b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
     )
-    if world.terms.whole[b, JUDGED] == 0:
+    if world.terms[b].judged == 0:
         return
     first = breach_log.filled[0]
-    judge_trial(
-        b, tick, world.spacing, world.state, world.roads, world.beside,
-        world.rules, world.terms, world.labels, world.memory, breach_log,
-    )  # fmt: skip
+    judge_trial(b, tick, world.judging)
     for k in range(first, breach_log.filled[0]):
-        n = breach_log.row[k, OF_CAR]
+        n = breach_log.row[k].car
         world.progress.place[k, 0] = world.state.x[b, n]
         world.progress.place[k, 1] = world.state.y[b, n]
         if n == EGO:

@@ -18,6 +18,7 @@ from dubins_traffic.controllers.registry import made
 from dubins_traffic.engine.group import Group, Outcome
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.record.sink import SHIELD
@@ -326,7 +327,7 @@ def _ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
             row += 1
 
 
-def _joined(tables: Sequence[tuple[Any, ...]]) -> list[Any]:
+def _joined(tables: Sequence[Tables]) -> list[Any]:
     """Return the arrays of several tables, one after another, column by column."""
     return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
 

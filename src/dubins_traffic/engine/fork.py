@@ -7,21 +7,23 @@ of loops, scripts, stages) is shared by the batch and its forks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.agents.tables import TRAIL, Agents
+from dubins_traffic.agents.tables import Agents
 from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.engine.batch_kernel import World
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.rules.breach_log import BreachLog
+from dubins_traffic.kernels.records import Rows, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
+from dubins_traffic.rules.tables import LabelTables, spread
 from dubins_traffic.scoring.tally import Tally
 
-Table = TypeVar("Table", bound=tuple[Any, ...])
+Table = TypeVar("Table", bound=Tables)
 
 
 class Ragged(NamedTuple):
@@ -48,37 +50,48 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
         Seconds of a tick.
     """
     cars = rows_of(world.cars, trials)
-    goals = ragged(world.terms.goal_off, trials)
+    terms = spread(world.terms, trials)
+    goals = _goals(terms)
     seed = {} if seeds is None else {"seed": seeds}
     progress, work = world.progress, world.work
+    state, roads, beside = (
+        rows_of(world.state, trials), world.roads, world.beside.replace(base=world.beside.base[trials]),
+    )  # fmt: skip
+    rules, labels, memory = (
+        spread(world.rules, trials), rows_of(world.labels, trials), rows_of(world.memory, trials),
+    )  # fmt: skip
+    breach_log = _breach_log(world.breach_log, trials, goals)
+    spacing = rows_of(world.spacing, trials, near=world.spacing.near.copy())
     return World(
-        state=rows_of(world.state, trials),
+        state=state,
         cars=cars,
         obstacles=_obstacles(world.obstacles, trials),
         rows=rows(cars, world.state.x.shape[1], dt),
-        work=_copied(work)._replace(partner=work.partner[trials], touching=work.touching[trials]),
-        roads=world.roads,
-        beside=world.beside._replace(base=world.beside.base[trials]),
-        rules=rows_of(world.rules, trials),
-        terms=rows_of(world.terms, trials, goal_off=goals.off, goal=world.terms.goal[goals.row]),
-        labels=rows_of(world.labels, trials),
-        memory=rows_of(world.memory, trials),
-        breach_log=_breach_log(world.breach_log, trials, goals.row),
+        work=_copied(work).replace(partner=work.partner[trials], touching=work.touching[trials]),
+        roads=roads,
+        beside=beside,
+        rules=rules,
+        terms=terms,
+        labels=labels,
+        memory=memory,
+        breach_log=breach_log,
         drivers=rows_of(
             world.drivers, trials, stage=world.drivers.stage, distance=world.drivers.distance, **seed
         ),
         scratch=_copied(world.scratch),
-        agents=_agents(world.agents, trials)._replace(**seed),
+        agents=_agents(world.agents, trials, seeds),
         space=_copied(world.space),
         tally=_tally(world.tally, trials),
         progress=rows_of(progress, trials, contact=progress.contact.copy(), place=progress.place.copy()),
-        spacing=rows_of(world.spacing, trials, near=world.spacing.near.copy()),
+        spacing=spacing,
+        labelling=LabelTables(state, roads, beside, rules, labels, memory),
+        judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
     )
 
 
 def rows_of(table: Table, trials: Ints, **other: Any) -> Table:
     """Return a table of which each array has the rows of `trials`, but for the arrays in `other`."""
-    names: Sequence[str] = getattr(table, "_fields")  # noqa: B009  # of a named tuple, which the type can't tell
+    names = table.field_names
     own = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
     return type(table)(*own)
 
@@ -100,11 +113,19 @@ def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
     return ObstacleTable(own.off, table.part[own.row], table.owner[own.row])
 
 
+def _goals(terms: Rows[RefereeParameters]) -> Ints:
+    """Return the rows of the goals of forks, which are theirs from here on, one fork's after the other's."""
+    begin, end = terms["goals_begin"].copy(), terms["goals_end"].copy()
+    ends = np.append(0, (end - begin).cumsum())
+    terms["goals_begin"] = ends[:-1]
+    terms["goals_end"] = ends[1:]
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(begin - ends[:-1], end - begin)
+    return rows
+
+
 def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
-    return rows_of(
-        log, trials, goal_clock=log.goal_clock[goals], goal_paused=log.goal_paused[goals], look=log.look.copy(),
-        row=np.zeros_like(log.row), filled=np.zeros_like(log.filled),
-    )  # fmt: skip
+    row, filled = table(FoundBreach, len(log.row)), np.zeros_like(log.filled)
+    return rows_of(log, trials, goal=spread(log.goal, goals), look=log.look.copy(), row=row, filled=filled)
 
 
 def _tally(tally: Tally, trials: Ints) -> Tally:
@@ -112,18 +133,12 @@ def _tally(tally: Tally, trials: Ints) -> Tally:
     return rows_of(tally, trials, goal_off=goals.off[:-1], goal=tally.goal[goals.row])
 
 
-def _agents(agents: Agents, trials: Ints) -> Agents:
+def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:
     """Return the e-agents of forks; each car that follows has the ego's path of its own."""
-    found = rows_of(
-        agents,
-        trials,
-        cycle=agents.cycle,
-        script=agents.script,
-        path=agents.path,
-        mark=agents.mark,
-        last=agents.last,
-    )
-    follows = found.ints[:, :, TRAIL] >= 0
-    trail = found.ints[follows, TRAIL]
-    found.ints[follows, TRAIL] = np.arange(len(trail))
-    return found._replace(path=agents.path[trail], mark=agents.mark[trail], last=agents.last[trail])
+    team, cars = agents.team[trials], agents.agent[trials]
+    if seeds is not None:
+        team["seed"] = seeds
+    follows = cars["trail"] >= 0
+    trail = cars["trail"][follows]
+    cars["trail"][follows] = np.arange(len(trail))
+    return Agents(team, cars, agents.cycle, agents.script, agents.trail[trail], agents.point[trail])

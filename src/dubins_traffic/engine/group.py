@@ -38,21 +38,20 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
-from dubins_traffic.policies.rules.tables import FIRST, KIND, PLACE, ROUND, scratch
-from dubins_traffic.policies.rules.tables import LAST as LAST_STAGE
+from dubins_traffic.kernels.records import table
+from dubins_traffic.policies.rules.tables import ROUND, scratch
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
-from dubins_traffic.rules.breach_log import MOST, OF_TRIAL, BreachLog
+from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeTables
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
-from dubins_traffic.rules.tables import NET
-from dubins_traffic.scoring.margins_kernel import margin_table
+from dubins_traffic.scoring.margins_kernel import margin_rules
 from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
@@ -117,20 +116,26 @@ class Group:
         labeller = Labeller(instances)
         labeller.begin(trials, places)
         roads, beside, rules = labeller.tables
-        net = rules.whole[:, NET].copy()
+        net = rules["net"].copy()
         cars, obstacles, rows, work = simulator.tables
-        terms = terms_of(problems)
-        breach_log = BreachLog.empty(trials, places, len(terms.goal))
-        most = MOST * places + int(np.diff(terms.goal_off).max())
-        breach_log = breach_log._replace(row=np.zeros((FRAMES * most, breach_log.row.shape[1]), np.int64))
+        terms, goals = terms_of(problems)
+        breach_log = BreachLog.empty(trials, places, goals)
+        most = MOST * places + int((terms["goals_end"] - terms["goals_begin"]).max())
+        breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * most))
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
+        apart = spacing(trials, places, rows.far - cars.reach)
+        labelling = labeller.seeing(self.state)
+        judging = RefereeTables(
+            self.state, roads, beside, rules, terms, labeller.labels, labeller.memory, breach_log, apart
+        )
         self._world = World(
-            self.state, cars, obstacles, rows, work, roads, beside, rules, terms, labeller.labels,
-            labeller.memory, breach_log, pack_drivers(instances, places, net, rounds), scratch(places, segments),
-            pack_agents(instances, places, net), agent_workspace(places, PAIRS, 2 * segments),
-            new_tally(instances, net, places), self._progress(len(work.contact), len(breach_log.row)),
-            spacing(trials, places, rows.far - cars.reach),
+            state=self.state, cars=cars, obstacles=obstacles, rows=rows, work=work, roads=roads, beside=beside,
+            rules=rules, terms=terms, labels=labeller.labels, memory=labeller.memory, breach_log=breach_log,
+            drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments),
+            agents=pack_agents(instances, places, net), space=agent_workspace(places, PAIRS, 2 * segments),
+            tally=new_tally(instances, net, places), progress=self._progress(len(work.contact), len(breach_log.row)),
+            spacing=apart, labelling=labelling, judging=judging,
         )  # fmt: skip
         self._note_rules()
         self.labels: Labels = labeller.labels
@@ -149,8 +154,7 @@ class Group:
         """Note the parameters of the rules, and what the margins follow from."""
         kinds, index = kinds_of([instance.problem for instance in self.instances])
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-        frames = self._world.tally.pose.shape[1]
-        self._margins = margin_table(rules, [kind.period for kind in kinds], index, frames)
+        self._margins = margin_rules(rules, [kind.period for kind in kinds], index)
         numbers: list[int] = index.tolist()
         self._rules = [rules[k] for k in numbers]
 
@@ -280,10 +284,10 @@ class Group:
         world = self._world
         drivers, labels = world.drivers, world.labels
         world.progress.ints[:, LAWFUL] = drivers.active
-        for b in np.flatnonzero(drivers.ints[:, EGO, KIND] == ROUND):
-            own = drivers.ints[b, EGO]
+        for b in np.flatnonzero(drivers.car["kind"][:, EGO] == ROUND).tolist():
+            own = drivers.car[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
-            own[PLACE] = nearest_stage(drivers.distance, int(own[FIRST]), int(own[LAST_STAGE]), lane, segment)
+            own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
         """Take trials up to `most` ticks farther, with the metrics that are shown every frame tick by tick."""
@@ -311,10 +315,10 @@ class Group:
         """Enlarge what was too small, and write down how trials ended."""
         status = self._world.progress.ints[active, STATUS]
         if (status == NO_PAIRS).any():
-            self._world = self._world._replace(work=enlarged(self._world.work))
+            self._world = self._world.replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
             room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
-            self._world = self._world._replace(space=self._world.space._replace(pair=room))
+            self._world = self._world.replace(space=self._world.space.replace(pair=room))
         numbers: list[int] = active.tolist()
         for b, why in zip(numbers, status.tolist(), strict=True):
             if why == ENDED:
@@ -329,16 +333,15 @@ class Group:
     def _drain(self) -> None:
         """Take over the contacts and breaches that have been found, and make room."""
         world = self._world
-        found, filled = int(world.work.found[0]), int(world.breach_log.filled[0])
+        found, rows = int(world.work.found[0]), world.breach_log.found()
         notes = zip(world.work.contact[:found].tolist(), world.progress.contact[:found].tolist(), strict=True)
         for row, (tick, own, other, own_seen, other_seen) in notes:
             b, contact = int(row[0]), contact_of(row, tick, self._rate)
             self._contacts[b].append(with_fault_by(contact, own, other))
             pair = ((contact.car, own_seen), (contact.other, other_seen))
             self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
-        rows: list[list[int]] = world.breach_log.row[:filled].tolist()
-        for row, (x, y) in zip(rows, world.progress.place[:filled].tolist(), strict=True):
-            b, breach = row[OF_TRIAL], breach_of(row, x, y)
+        for breached, (x, y) in zip(rows, world.progress.place[: len(rows)].tolist(), strict=True):
+            b, breach = int(breached.trial), breach_of(breached, x, y)
             self._breaches[b].append(breach)
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))

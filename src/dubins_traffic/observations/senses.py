@@ -21,7 +21,6 @@ from dubins_traffic.cars.state import (
 )
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
@@ -79,21 +78,10 @@ class Senses:
             self._obstacles = pack_obstacles([problem.obstacles])
             self._latest = -1
         self._scan: Floats | None = None
-        self._state: State | None = None
-        self._labels: Labels | None = None
-        self._look: Callable[..., int] = neighbours
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the call that is bound to these arrays: a copy binds its own."""
-        return {**vars(self), "_state": None, "_labels": None, "_look": neighbours}
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the car's driver knows at the beginning of the tick that starts in `state`."""
-        if state is not self._state or labels is not self._labels:
-            self._state, self._labels = state, labels
-            first = (0, 0, 0.0, self._reals, self._wholes)
-            self._look = bound(neighbours, first, (*state, *labels))
-        count = self._look(0, self._car, self._radius, self._reals, self._wholes)
+        count = neighbours(0, self._car, self._radius, self._reals, self._wholes, state, labels)
         if count > 0:
             self._seen = self._labelled(count)
         count = len(self._seen)

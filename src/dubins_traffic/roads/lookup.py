@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.records import record
 from dubins_traffic.roads.road_raster import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
@@ -169,26 +169,39 @@ def _nearest_segments(
     return best, sqrt(least), sqrt(second), sqrt(other)
 
 
-@jit
-def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, row: Floats) -> None:
-    """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `row` (6,).
+@record
+class ValidCell:
+    """A rectangle in which the nearest segment and the nearest vertex do not change, its edges not included; metres."""
 
-    The rectangle (x from row[0] to row[1], y from row[2] to row[3], its edges not included) lies within the cell of the
-    point, and within the disc in which nothing else can become nearest. It is empty outside the box of cells. Where it
-    would be small since roads meet, row[4] is -1 instead: nearest is always one of the roads that meet in the vertex.
-    Another vertex may become nearest as long as all are more than `radius` metres away.
+    low_x: float
+    high_x: float
+    low_y: float
+    high_y: float
+    segment: int
+    """The nearest segment; -1: it is always one of the roads that meet in the vertex."""
+    vertex: int
+
+
+@jit
+def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, cell: ValidCell) -> None:
+    """Write a rectangle about a point, in which nearest segment and vertex do not change, and these into `cell`.
+
+    The rectangle lies within the cell of the point, and within the disc in which nothing else can become nearest. It
+    is empty outside the box of cells. Where it would be small since roads meet, `cell.segment` is -1 instead: nearest
+    is always one of the roads that meet in the vertex. Another vertex may become nearest as long as all are more than
+    `radius` metres away.
     """
-    row[0] = row[1] = row[2] = row[3] = 0.0
-    cell = cell_of(t, net, x, y)
-    if cell < 0:
+    cell.low_x = cell.high_x = cell.low_y = cell.high_y = 0.0
+    number = cell_of(t, net, x, y)
+    if number < 0:
         s, _ = nearest_segment(t, net, x, y)
         v, _ = nearest_vertex(t, net, x, y)
-        row[4] = s
-        row[5] = v
+        cell.segment = s
+        cell.vertex = v
         return
-    vertex, near, second = _nearest_vertices(t, net, cell, x, y)
+    vertex, near, second = _nearest_vertices(t, net, number, x, y)
     spare = max(second - near, 2.0 * (near - radius))
-    segment, near, second, other = _nearest_segments(t, net, cell, vertex, x, y)
+    segment, near, second, other = _nearest_segments(t, net, number, vertex, x, y)
     if second - near < FORKED and near < other:
         segment = -1
         second = other
@@ -196,12 +209,12 @@ def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, row: F
     side = 1.0 / t.cell_box[net, 2]
     left = t.cell_box[net, 0] + side * int((x - t.cell_box[net, 0]) * t.cell_box[net, 2])
     low = t.cell_box[net, 1] + side * int((y - t.cell_box[net, 1]) * t.cell_box[net, 2])
-    row[0] = max(x - half, left + CERTAIN)
-    row[1] = min(x + half, left + side - CERTAIN)
-    row[2] = max(y - half, low + CERTAIN)
-    row[3] = min(y + half, low + side - CERTAIN)
-    row[4] = segment
-    row[5] = vertex
+    cell.low_x = max(x - half, left + CERTAIN)
+    cell.high_x = min(x + half, left + side - CERTAIN)
+    cell.low_y = max(y - half, low + CERTAIN)
+    cell.high_y = min(y + half, low + side - CERTAIN)
+    cell.segment = segment
+    cell.vertex = vertex
 
 
 @jit_inline

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.road_raster import road_raster
 
 
-class RoadTable(NamedTuple):
+class RoadTable(Tables):
     """K networks, one after another; segments, intersections and lanes are numbered within their network.
 
     Attributes
@@ -96,7 +97,7 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     if len(tables) == 1:
         return tables[0]
     joined = RoadTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
-    return joined._replace(
+    return joined.replace(
         seg_off=_offsets([len(table.seg) for table in tables]),
         vert_off=_offsets([len(table.vert) for table in tables]),
         cell_dim=_dimensions(joined.cell_dim),

@@ -5,8 +5,27 @@ What stands: docs/rules.md#stands. What blocks: docs/rules.md#blocked.
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit
+from typing import NamedTuple
+
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
+from dubins_traffic.rules.tables import TrialRules
+
+
+class RightLane(NamedTuple):
+    """The right lane of `lane` in trial `trial`: `length` metres long, `width` metres wide."""
+
+    trial: int
+    lane: int
+    length: float
+    width: float
+
+
+@jit_inline
+def lane_of(t: RoadTable, own: TrialRules, b: int, lane: int) -> RightLane:
+    """Return a lane of trial b, whose rules are `own`."""
+    return RightLane(b, lane, t.seg[t.seg_off[own.net] + (lane >> 1), 4], own.lane_width)
 
 
 @jit
@@ -14,7 +33,7 @@ def narrows(low: float, high: float, lane_width: float, needed: float) -> bool:
     """Tell whether a thing over the lateral interval [low, high] leaves less than `needed` of the right lane.
 
     The right lane lies over [-lane_width, 0]; what does not reach into it leaves all of it. Else the larger of
-    the gaps on the two sides of the thing counts.
+    the gaps on the two sides of the thing counts. Metres.
     """
     if high <= -lane_width or low >= 0.0:
         return False
@@ -23,41 +42,35 @@ def narrows(low: float, high: float, lane_width: float, needed: float) -> bool:
 
 @jit
 def obstacle_narrows(
-    obstacles: ObstacleLanes,
-    b: int,
-    lane: int,
-    length: float,
-    near: float,
-    far: float,
-    lane_width: float,
-    needed: float,
+    obstacles: ObstacleLanes, place: RightLane, near: float, far: float, needed: float
 ) -> bool:
-    """Tell whether an obstacle narrows `lane` where its progress is in [near, far].
+    """Tell whether an obstacle leaves less than `needed` metres of a lane where its progress is in [near, far], metres.
 
     An obstacle's lateral interval is the hull of its parts within that reach of the lane; its edges are clipped.
     """
-    base: int = obstacles.base[b]
+    base: int = obstacles.base[place.trial]
     if base < 0:
         return False
     begin = max(near, 0.0)
-    end = min(far, length)
-    segment = lane // 2
-    k = obstacles.start[base + segment]
-    stop = obstacles.start[base + segment + 1]
+    end = min(far, place.length)
+    segment = place.lane // 2
+    back = place.lane % 2 == 1
+    k: int = obstacles.start[base + segment]
+    stop: int = obstacles.start[base + segment + 1]
     while k < stop:
-        owner = obstacles.owner[k]
+        owner = obstacles.part[k].owner
         low = 1e300
         high = -1e300
-        while k < stop and obstacles.owner[k] == owner:
-            s0, l0 = obstacles.part[k, 0], obstacles.part[k, 1]
-            s1, l1 = obstacles.part[k, 2], obstacles.part[k, 3]
-            if lane % 2 == 1:
-                s0, l0, s1, l1 = length - s0, -l0, length - s1, -l1
-            part_low, part_high = _clipped(s0, l0, s1, l1, obstacles.part[k, 4], begin, end)
+        while k < stop and obstacles.part[k].owner == owner:
+            part = obstacles.part[k]
+            s0, l0, s1, l1 = part.s0, part.l0, part.s1, part.l1
+            if back:
+                s0, l0, s1, l1 = place.length - s0, -l0, place.length - s1, -l1
+            part_low, part_high = _clipped(s0, l0, s1, l1, part.rounding, begin, end)
             low = min(low, part_low)
             high = max(high, part_high)
             k += 1
-        if low <= high and narrows(low, high, lane_width, needed):
+        if low <= high and narrows(low, high, place.width, needed):
             return True
     return False
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.cars.near import Spacing
+from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
-from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.rules.tables import GRAIN, ticks
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.obstacles import ObstacleLanes
+from dubins_traffic.rules.tables import GRAIN, Memory, TrialRules, ticks
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.parameters import RuleParameters
@@ -37,148 +43,172 @@ RULES: Final[tuple[str, ...]] = (
 MOST: Final = 10
 """Most breaches that one car can begin in one frame."""
 
-JUDGED: Final = 0
-RETURN_TICKS: Final = 1
-ENTER_TICKS: Final = 2
-MOST_TICKETS: Final = 3
-EXIT_TICKS: Final = 4
-REST_TICKS: Final = 5
-GOAL_TICKS: Final = 6
-SHARED_TICKS: Final = 7
-WHOLES: Final = 8
-
-EXIT2: Final = 0
-WAY: Final = 1
-EXIT_GAP: Final = 2
-LANE_MIDDLE: Final = 3
-GOAL_GAP: Final = 4
-LONE: Final = 5
-REALS: Final = 6
-
-OFF_ROAD: Final = 0
-LEFT_SINCE: Final = 1
-UNBLOCKED_SINCE: Final = 2
-FIRST_SINCE: Final = 3
-EXIT_SINCE: Final = 4
-EXIT_PAUSED: Final = 5
-REST_SINCE: Final = 6
-AT_SINCE: Final = 7
-IN_SINCE: Final = 8
-CAME_BY: Final = 9
-EXIT_COUNTS: Final = 10
-CLOCKS: Final = 11
-
 NEVER: Final = -2
-"""In `OFF_ROAD`: the car has never been on the road."""
+"""In `JudgedCar.off_road`: the car has never been on the road."""
 
 NEVER_DUE: Final = 1 << 62
 """A tick that never comes."""
 
-BITS: Final = 0
-LANE: Final = 1
-CROSSES: Final = 2
-AT: Final = 3
-PAST: Final = 4
 
-OF_TRIAL: Final = 0
-OF_RULE: Final = 1
-OF_CAR: Final = 2
-AT_TICK: Final = 3
-SINCE_TICK: Final = 4
-AT_VERTEX: Final = 5
-ON_LANE: Final = 6
-COLUMNS: Final = 7
+@record
+class RefereeParameters:
+    """The terms by which one trial is judged; metres, eased by GRAIN for the car that would be in breach, and ticks."""
 
-
-class RefereeParameters(NamedTuple):
-    """The terms by which each trial is judged.
-
-    Attributes
-    ----------
-    real : (B, REALS) float64
-        Squared distance of a centre from a vertex up to which it is in the way of those who leave (`EXIT2`); distance
-        of others from a vertex from which on none of them meets the disc or is in anybody's way out of it (`LONE`);
-        E5's way ahead (`WAY`); E4's free length of an exit (`EXIT_GAP`); E6's distance of the ego from an exit
-        (`GOAL_GAP`); distance of the right lane's middle from the centre line (`LANE_MIDDLE`). Metres, eased by GRAIN
-        for the car that would be in breach.
-    whole : (B, WHOLES) int64
-        Whether the trial is judged at all, and the durations of the rules in ticks; E3's most new tickets.
-    goal_off : (B + 1,) int64
-        Goals of trial b are goal[goal_off[b]] to goal[goal_off[b + 1] - 1].
-    goal : (G,) int64
-        Vertices, each goal of a trial once.
-    """
-
-    real: Floats
-    whole: Ints
-    goal_off: Ints
-    goal: Ints
+    exit2: float
+    """Squared distance of a centre from a vertex up to which it is in the way of those who leave, square metres."""
+    lone: float
+    """Distance of others from a vertex from which on none of them meets the disc or is in anybody's way out of it."""
+    way: float
+    """E5's way ahead."""
+    exit_gap: float
+    """E4's free length of an exit."""
+    goal_gap: float
+    """E6's distance of the ego from an exit."""
+    lane_middle: float
+    """Distance of the right lane's middle from the centre line."""
+    judged: int
+    """Whether the trial is judged at all."""
+    return_ticks: int
+    enter_ticks: int
+    exit_ticks: int
+    rest_ticks: int
+    goal_ticks: int
+    shared_ticks: int
+    most_tickets: int
+    """E3's most new tickets in one wait."""
+    goals_begin: int
+    goals_end: int
+    """The trial's goals are rows goals_begin to goals_end - 1 of `BreachLog.goal`."""
 
 
-class BreachLog(NamedTuple):
+@record
+class JudgedCar:
+    """What the referee remembers of one car; of runs the first tick, -1 where there is none."""
+
+    number: int
+    """Which car of its trial it is."""
+    bits: int = 0
+    lane: int = -1
+    crosses: int = -1
+    at: int = -1
+    """Flags, lane state, disc that the body meets and disc that holds the centre, of the frame before."""
+    due: int = 0
+    """Tick in which the car has to be looked at though its labels stay as they are and nobody comes near."""
+    off_road: int = NEVER
+    """Run of being off the road (ego); `NEVER` before it has been on one."""
+    left_since: int = -1
+    unblocked_since: int = -1
+    """Run of being left and not overtaking."""
+    first_since: int = -1
+    """Run of being first at a clear crossing."""
+    exit_since: int = -1
+    """Run of being in a disc with a free exit."""
+    exit_paused: int = -1
+    """How many ticks of that run do not count."""
+    exit_counts: int = -1
+    """That run's first tick while its ticks count, else -1."""
+    rest_since: int = -1
+    """Run of lingering with a free way."""
+    at_since: int = -1
+    """Run of being where its centre is: at a vertex or none."""
+    in_since: int = -1
+    """Run of being in the disc that its body meets."""
+    came_by: int = -1
+    """The lane by which it came into the disc that its body meets, -1 if it started there."""
+
+
+@record
+class JudgedGoal:
+    """A goal of one trial, once however often it is listed there."""
+
+    vertex: int
+    since: int = -1
+    """First tick of the present run of being taken; -1 while it is free."""
+    paused: int = 0
+    """How many ticks of that run do not count."""
+
+
+@record
+class FoundBreach:
+    """A breach that has been found; `rule` is a number in `RULES`, `lane` and `vertex` are -1 for none."""
+
+    trial: int
+    rule: int
+    car: int
+    tick: int
+    since: int
+    vertex: int
+    lane: int
+
+
+class BreachLog(Tables):
     """What the referee remembers, and what he has found.
 
     Attributes
     ----------
-    past : (B, N, PAST) int64
-        Flags, lane state, disc that the body meets and disc that holds the centre, of the frame before.
-    due : (B, N) int64
-        Tick in which each car has to be looked at though its labels stay as they are and nobody comes near.
-    clock : (B, N, CLOCKS) int64
-        First tick of the present run of: off the road (ego; `NEVER` before it has been on one), left, left and not
-        overtaking, first at a clear crossing, in a disc with a free exit, lingering with a free way, where it
-        is: at a vertex or none, in the disc that its body meets; -1 where there is no run. `EXIT_PAUSED`: how many
-        ticks of a run in a disc with a free exit do not count; `EXIT_COUNTS`: the run's first tick while they do, else
-        -1; `CAME_BY`: the lane by which it came into the disc
-        that its body meets, -1 if it started there.
-    goal_clock : (G,) int64
-        First tick of the present run of a goal being taken; -1 while it is free.
-    goal_paused : (G,) int64
-        How many ticks of that run do not count.
+    car : (B, N) JudgedCar
+        What is remembered of each car.
+    goal : (G,) JudgedGoal
+        The goals of one trial after the other.
     goal_due : (B,) int64
         Tick in which the goals have to be looked at though no car comes or goes.
     look : (N,) int64
         Scratch: the cars to be looked at.
-    row : (K, COLUMNS) int64
-        Breaches found: trial, number of the rule, car, tick, tick since which, vertex, lane.
+    row : (K,) FoundBreach
+        Breaches found.
     filled : (1,) int64
         How many rows are filled.
     """
 
-    past: Ints
-    due: Ints
-    clock: Ints
-    goal_clock: Ints
-    goal_paused: Ints
+    car: Grid[JudgedCar]
+    goal: Rows[JudgedGoal]
     goal_due: Ints
     look: Ints
-    row: Ints
+    row: Rows[FoundBreach]
     filled: Ints
 
     @staticmethod
-    def empty(trials: int, cars: int, goals: int, frames: int = 1) -> BreachLog:
-        """Return the breach_log of `trials` x `cars` cars before their first frame, with room for `frames` frames."""
-        past = np.full((trials, cars, PAST), -1, dtype=np.int64)
-        past[:, :, BITS] = 0
-        clock = np.full((trials, cars, CLOCKS), -1, dtype=np.int64)
-        clock[:, :, OFF_ROAD] = NEVER
-        room = (MOST * trials * cars + goals) * frames
+    def empty(trials: int, cars: int, goals: Ints, frames: int = 1) -> BreachLog:
+        """Return the log of `trials` x `cars` cars before their first frame, with room for `frames` frames.
+
+        `goals` (G,) are the vertices of the goals, of one trial after the other (`rules.referee.terms_of`).
+        """
+        known: Any = table(JudgedCar, (trials, cars))
+        known["number"] = np.arange(cars)
+        taken: Any = table(JudgedGoal, len(goals))
+        taken["vertex"] = goals
         return BreachLog(
-            past,
-            np.zeros((trials, cars), dtype=np.int64),
-            clock,
-            np.full(goals, -1, dtype=np.int64),
-            np.zeros(goals, dtype=np.int64),
-            np.zeros(trials, dtype=np.int64),
-            np.zeros(cars, dtype=np.int64),
-            np.zeros((room, COLUMNS), dtype=np.int64),
-            np.zeros(1, dtype=np.int64),
+            car=known,
+            goal=taken,
+            goal_due=np.zeros(trials, dtype=np.int64),
+            look=np.zeros(cars, dtype=np.int64),
+            row=table(FoundBreach, (MOST * trials * cars + len(goals)) * frames),
+            filled=np.zeros(1, dtype=np.int64),
         )
 
     @property
     def room_of_a_frame(self) -> int:
         """The most rows that one frame can fill."""
-        return MOST * self.past.shape[0] * self.past.shape[1] + len(self.goal_clock)
+        trials, cars = self.car.shape
+        return MOST * trials * cars + len(self.goal)
+
+    def found(self) -> list[FoundBreach]:
+        """Return the breaches found; they stay as they are until the next frame is judged."""
+        return [self.row[k] for k in range(int(self.filled[0]))]
+
+
+class RefereeTables(Tables):
+    """All that the frames of a batch are judged by, and what is found (`rules.referee_kernel.judge_frame`)."""
+
+    state: State
+    roads: RoadTable
+    obstacles: ObstacleLanes
+    rules: Rows[TrialRules]
+    terms: Rows[RefereeParameters]
+    labels: Labels
+    memory: Memory
+    log: BreachLog
+    spacing: Spacing
 
 
 def pack_terms(
@@ -187,8 +217,8 @@ def pack_terms(
     radii: Sequence[float],
     rates: Sequence[float],
     cars: CarTable,
-) -> tuple[Floats, Ints]:
-    """Return `RefereeParameters.real` and `RefereeParameters.whole` of each trial.
+) -> Rows[RefereeParameters]:
+    """Return the terms by which each trial is judged; where its goals are is left to fill in.
 
     Parameters
     ----------
@@ -199,22 +229,22 @@ def pack_terms(
     cars
         The car of each trial.
     """
-    real = np.zeros((len(parameters), REALS))
-    whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
-    for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
-        far = radius + own.exit_gap + GRAIN
-        real[b, EXIT2] = far * far
-        real[b, LONE] = far + 2.0 * float(cars.reach[b])
-        real[b, WAY] = own.way_distance + GRAIN
-        real[b, EXIT_GAP] = own.exit_gap + GRAIN
-        real[b, GOAL_GAP] = own.goal_gap + GRAIN
-        real[b, LANE_MIDDLE] = cars.w[b]
-        whole[b, JUDGED] = judged[b]
-        whole[b, RETURN_TICKS] = ticks(own.left_time, rate)
-        whole[b, ENTER_TICKS] = ticks(own.enter_time, rate)
-        whole[b, MOST_TICKETS] = own.tickets
-        whole[b, EXIT_TICKS] = ticks(own.exit_time, rate)
-        whole[b, REST_TICKS] = ticks(own.rest_time, rate)
-        whole[b, GOAL_TICKS] = ticks(own.goal_time, rate)
-        whole[b, SHARED_TICKS] = ticks(own.shared_time, rate)
-    return real, whole
+    terms = table(RefereeParameters, len(parameters))
+    for b, (given, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
+        own = terms[b]
+        far = radius + given.exit_gap + GRAIN
+        own.exit2 = far * far
+        own.lone = far + 2.0 * float(cars.reach[b])
+        own.way = given.way_distance + GRAIN
+        own.exit_gap = given.exit_gap + GRAIN
+        own.goal_gap = given.goal_gap + GRAIN
+        own.lane_middle = float(cars.w[b])
+        own.judged = int(judged[b])
+        own.return_ticks = ticks(given.left_time, rate)
+        own.enter_ticks = ticks(given.enter_time, rate)
+        own.exit_ticks = ticks(given.exit_time, rate)
+        own.rest_ticks = ticks(given.rest_time, rate)
+        own.goal_ticks = ticks(given.goal_time, rate)
+        own.shared_ticks = ticks(given.shared_time, rate)
+        own.most_tickets = given.tickets
+    return terms

@@ -4,36 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
-    AT_SINCE,
-    AT_TICK,
-    AT_VERTEX,
-    BITS,
     CLEARANCE,
-    CROSSES,
     ENTER,
-    ENTER_TICKS,
-    FIRST_SINCE,
-    LANE,
-    LEFT_SINCE,
     LEFT_UNBLOCKED,
-    MOST_TICKETS,
     NEVER_DUE,
-    OF_CAR,
-    OF_RULE,
-    OF_TRIAL,
-    OFF_ROAD,
-    ON_LANE,
     ORDER,
     RETURN,
-    RETURN_TICKS,
     ROAD,
-    SINCE_TICK,
     STOP,
     TICKETS,
-    UNBLOCKED_SINCE,
+    BreachLog,
+    JudgedCar,
+    RefereeParameters,
+    RefereeTables,
 )
 from dubins_traffic.rules.propositions import (
     AHEAD,
@@ -42,123 +30,109 @@ from dubins_traffic.rules.propositions import (
     LEFT,
     OVERTAKING,
 )
-from dubins_traffic.rules.tables import FORFEITS, TICKET, WAIT_SINCE
 
-EGO: int = 0
 GOES = FIRST | CLEAR
 
 
 @jit_inner
-def add(
-    b: int, rule: int, n: int, tick: int, since: int, vertex: int, lane: int, row: Ints, filled: Ints
-) -> None:
-    """Write down a breach of car n in trial b."""
-    k = filled[0]
-    row[k, OF_TRIAL] = b
-    row[k, OF_RULE] = rule
-    row[k, OF_CAR] = n
-    row[k, AT_TICK] = tick
-    row[k, SINCE_TICK] = since
-    row[k, AT_VERTEX] = vertex
-    row[k, ON_LANE] = lane
-    filled[0] = k + 1
+def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex: int, lane: int) -> None:
+    """Write down that a car has broken a rule, a number in `RULES`, in frame `tick`, except in which trial."""
+    k: int = log.filled[0]
+    found = log.row[k]
+    found.rule = rule
+    found.car = car.number
+    found.tick = tick
+    found.since = since
+    found.vertex = vertex
+    found.lane = lane
+    log.filled[0] = k + 1
 
 
 @jit_inline
-def run(holds: bool, tick: int, clock: Ints, which: int) -> int:
-    """Keep the clock of a run; return for how many ticks it has gone on, -1 if there is none."""
+def run(holds: bool, tick: int, since: int) -> int:
+    """Return the first tick of a run that had begun in `since` (-1: there was none): -1 if it does not go on."""
     if not holds:
-        clock[which] = -1
         return -1
-    if clock[which] < 0:
-        clock[which] = tick
-    return tick - clock[which]
+    return since if since >= 0 else tick
 
 
 @jit_inline
-def when_due(tick: int, clock: Ints, which: int, ago: int) -> int:
+def lasted(tick: int, since: int) -> int:
+    """Return for how many ticks a run has gone on that began in `since`, -1 if there is none."""
+    return tick - since if since >= 0 else -1
+
+
+@jit_inline
+def when_due(tick: int, since: int, ago: int) -> int:
     """Return the tick in which a run will have gone on for `ago` ticks, `NEVER_DUE` if none will after this one."""
-    due = clock[which] + ago
-    return due if clock[which] >= 0 and due > tick else NEVER_DUE
+    return since + ago if since >= 0 and since + ago > tick else NEVER_DUE
 
 
 @jit_inner
 def judge_lane(
-    b: int, n: int, tick: int, bits: Any, lane: int, whole: Ints, clock: Ints, row: Ints, filled: Ints
+    car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
 ) -> None:
-    """Rule 2: left only while overtaking, and for a while."""
-    long = run(bits & LEFT != 0, tick, clock, LEFT_SINCE)
-    alone = run(bits & (LEFT | OVERTAKING) == LEFT, tick, clock, UNBLOCKED_SINCE)
-    if alone == 0:
-        add(b, LEFT_UNBLOCKED, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
-    if long == whole[RETURN_TICKS]:
-        add(b, RETURN, n, tick, clock[LEFT_SINCE], -1, lane, row, filled)
+    """Rule 2: left only while overtaking, and for a while. `bits` and `lane` are the car's in this frame."""
+    car.left_since = run(bits & LEFT != 0, tick, car.left_since)
+    car.unblocked_since = run(bits & (LEFT | OVERTAKING) == LEFT, tick, car.unblocked_since)
+    if lasted(tick, car.unblocked_since) == 0:
+        add(log, car, LEFT_UNBLOCKED, tick, car.left_since, -1, lane)
+    if lasted(tick, car.left_since) == terms.return_ticks:
+        add(log, car, RETURN, tick, car.left_since, -1, lane)
 
 
 @jit_inner
-def judge_entry(
-    b: int,
-    n: int,
-    tick: int,
-    v: int,
-    stopped: bool,
-    near: Ints,
-    count: int,
-    past: Ints,
-    row: Ints,
-    filled: Ints,
-) -> None:
-    """Rule 3, of a car that enters crossing v in this frame: judged on the frame before, in which it had `stopped`
-    there or not. The first `count` cars of `near` are all that may have been there.
+def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
+    """Rule 3, of car n of trial b that enters crossing v in this frame: judged on the frame before.
+
+    In that it had `stopped` there or not. The first `count` cars of `spacing.near` are all that may have been there.
     """
-    lane = past[n, LANE]
+    log, near = tables.log, tables.spacing.near
+    car = log.car[b, n]
     if not stopped:
-        add(b, STOP, n, tick, tick, v, lane, row, filled)
-    elif past[n, BITS] & AHEAD != 0:
-        add(b, ORDER, n, tick, tick, v, lane, row, filled)
+        add(log, car, STOP, tick, tick, v, car.lane)
+    elif car.bits & AHEAD != 0:
+        add(log, car, ORDER, tick, tick, v, car.lane)
     for i in range(count):
         k = near[i]
-        if k != n and past[k, CROSSES] == v:
-            add(b, CLEARANCE, n, tick, tick, v, lane, row, filled)
+        if k != n and log.car[b, k].crosses == v:
+            add(log, car, CLEARANCE, tick, tick, v, car.lane)
             return
 
 
 @jit_inline
-def judge_road(b: int, tick: int, on: bool, lane: int, clock: Ints, row: Ints, filled: Ints) -> None:
+def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -> None:
     """Rule 1: the ego stays on the road from its first frame there; `on` tells whether it is there."""
     if on:
-        clock[OFF_ROAD] = -1
-    elif clock[OFF_ROAD] == -1:
-        clock[OFF_ROAD] = tick
-        add(b, ROAD, EGO, tick, tick, -1, lane, row, filled)
+        car.off_road = -1
+    elif car.off_road == -1:
+        car.off_road = tick
+        add(log, car, ROAD, tick, tick, -1, lane)
 
 
 @jit_inner
-def judge_queue(
-    b: int,
-    n: int,
-    tick: int,
-    bits: Any,
-    lane: int,
-    v: int,
-    whole: Ints,
-    mark: Ints,
-    clock: Ints,
-    row: Ints,
-    filled: Ints,
-) -> None:
-    """E3, of a car that has stopped at v: who is first at a clear crossing enters in time, and takes few tickets."""
-    if run(bits & GOES == GOES, tick, clock, FIRST_SINCE) == whole[ENTER_TICKS]:
-        add(b, ENTER, n, tick, clock[FIRST_SINCE], v, lane, row, filled)
-    if mark[FORFEITS] == whole[MOST_TICKETS] + 1 and mark[TICKET] == tick:
-        add(b, TICKETS, n, tick, mark[WAIT_SINCE], v, lane, row, filled)
+def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> None:
+    """E3, of car n of trial b that has stopped at v.
+
+    Who is first at a clear crossing enters in time, and takes few tickets.
+    """
+    log, terms, kept = tables.log, tables.terms[b], tables.memory.car[b, n]
+    car, lane = log.car[b, n], tables.labels.lane[b, n]
+    car.first_since = run(tables.labels.bits[b, n] & GOES == GOES, tick, car.first_since)
+    if lasted(tick, car.first_since) == terms.enter_ticks:
+        add(log, car, ENTER, tick, car.first_since, v, lane)
+    if kept.forfeits == terms.most_tickets + 1 and kept.ticket == tick:
+        add(log, car, TICKETS, tick, kept.wait_since, v, lane)
 
 
 @jit_inline
-def at_goal(goal: int, cars: int, at: Ints, clock: Ints) -> int:
-    """E6: return the e-agent that has been at a goal longest, -1 if none is there."""
+def at_goal(goal: int, count: int, at: Ints, cars: Rows[JudgedCar]) -> int:
+    """E6: return the e-agent that has been at a goal longest, -1 if none is there.
+
+    `at` (N,) are the discs that hold the centres; only the first `count` cars exist.
+    """
     who = -1
-    for n in range(1, cars):
-        if at[n] == goal and (who < 0 or clock[n, AT_SINCE] < clock[who, AT_SINCE]):
+    for n in range(EGO + 1, count):
+        if at[n] == goal and (who < 0 or cars[n].at_since < cars[who].at_since):
             who = n
     return who

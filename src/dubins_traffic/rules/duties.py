@@ -7,288 +7,161 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.near import Spacing, list_near, ticks_within
-from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.near import list_near, ticks_within
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.roads.lookup import lane_end
-from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.blocking import obstacle_narrows
-from dubins_traffic.rules.breach_log import (
-    CAME_BY,
-    CROSSES,
-    ENTER_TICKS,
-    EXIT,
-    EXIT_COUNTS,
-    EXIT_PAUSED,
-    EXIT_SINCE,
-    EXIT_TICKS,
-    FIRST_SINCE,
-    GOAL,
-    GOAL_GAP,
-    GOAL_TICKS,
-    IN_SINCE,
-    LONE,
-    NEVER_DUE,
-    REST,
-    REST_SINCE,
-    REST_TICKS,
-    SHARED_TICKS,
-    WAY,
-    BreachLog,
-    RefereeParameters,
-)
-from dubins_traffic.rules.breaches import GOES, add, at_goal, judge_queue, run, when_due
+from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
+from dubins_traffic.rules.breach_log import EXIT, GOAL, NEVER_DUE, REST, RefereeTables
+from dubins_traffic.rules.breaches import GOES, add, at_goal, judge_queue, lasted, run, when_due
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
-from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.propositions import BLOCKED, EXCUSED, LINGERS, STANDS, STOPPED
-from dubins_traffic.rules.tables import (
-    CROSSING_DEGREE,
-    FREE_NEEDED,
-    GRAIN,
-    LANE_WIDTH,
-    NET,
-    PROGRESS,
-    RADIUS,
-    Memory,
-    RuleTable,
-)
+from dubins_traffic.rules.tables import GRAIN
 
 WAITS = STANDS | LINGERS | EXCUSED | STOPPED
 """Flags of a car that is no reason to expect the one behind it to go on."""
 
 
 @jit_inline
-def judge_agent(
-    b: int,
-    n: int,
-    tick: int,
-    bits: Any,
-    lane: int,
-    v: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    memory: Memory,
-    breach_log: BreachLog,
-) -> int:
-    """E3 to E5, of an e-agent in lane `lane` whose body meets the disc of v, or none (-1).
+def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
+    """E3 to E5, of e-agent n of trial b.
 
     Returns the next tick in which more may be due, if its labels stay as they are.
     """
-    whole, row, filled, clock = terms.whole[b], breach_log.row, breach_log.filled, breach_log.clock[b, n]
+    log, terms, labels = tables.log, tables.terms[b], tables.labels
+    car, lane, v = log.car[b, n], labels.lane[b, n], labels.crosses[b, n]
+    bits = np.int64(labels.bits[b, n])
     if bits & STOPPED != 0:
-        ahead = lane_end(roads, rules.whole[b, NET], lane)
-        judge_queue(b, n, tick, bits, lane, ahead, whole, memory.mark[b, n], clock, row, filled)
+        judge_queue(b, n, tick, lane_end(tables.roads, tables.rules[b].net, lane), tables)
     else:
-        clock[FIRST_SINCE] = -1
-    if breach_log.past[b, n, CROSSES] != v or v < 0:
-        clock[EXIT_SINCE] = -1
-        clock[EXIT_COUNTS] = -1
-    due = when_due(tick, clock, FIRST_SINCE, whole[ENTER_TICKS])
+        car.first_since = -1
+    if car.crosses != v or v < 0:
+        car.exit_since = -1
+        car.exit_counts = -1
+    due = when_due(tick, car.first_since, terms.enter_ticks)
     if v >= 0:
-        again = _judge_exit(
-            b, n, tick, lane, v, spacing, state, roads, obstacles, rules, terms, labels, breach_log
-        )  # fmt: skip
-        due = min(due, again)
+        due = min(due, _judge_exit(b, n, tick, v, tables))
     free = bits & LINGERS != 0
     if free:
         due = tick + 1
-        free = has_way(b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, breach_log)
-    if run(free, tick, clock, REST_SINCE) == whole[REST_TICKS]:
-        add(b, REST, n, tick, clock[REST_SINCE], -1, lane, row, filled)
+        free = has_way(b, n, tick, tables)
+    car.rest_since = run(free, tick, car.rest_since)
+    if lasted(tick, car.rest_since) == terms.rest_ticks:
+        add(log, car, REST, tick, car.rest_since, -1, lane)
     return due
 
 
-@jit_inline
-def _judge_exit(
-    b: int,
-    n: int,
-    tick: int,
-    lane: int,
-    v: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    breach_log: BreachLog,
-) -> int:
-    """E4, of an e-agent whose body meets the disc of v; return when to ask again, if its labels stay as they are.
+@jit_inner
+def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int:
+    """E4, of e-agent n of trial b whose body meets the disc of v; return when to ask again, if its labels stay.
 
     The ticks do not count in which the ego is there that came after it, or, for a while, with it.
     """
-    clock, ego, ago = breach_log.clock[b, n], breach_log.clock[b, EGO], terms.whole[b, EXIT_TICKS]
-    back = way_back(b, v, clock[CAME_BY], roads, rules)
-    free, again = look_for_exit(
-        b, n, tick, v, back, spacing, state, roads, obstacles, rules, terms, labels, breach_log
-    )
+    log, terms = tables.log, tables.terms[b]
+    car, ego = log.car[b, n], log.car[b, EGO]
+    back = way_back(v, car.came_by, tables.roads, tables.rules[b])
+    free, again = look_for_exit(b, n, tick, v, back, tables)
     paused = False
-    if labels.crosses[b, EGO] == v:
-        shares = ego[IN_SINCE] == clock[IN_SINCE]
-        lately = tick - clock[IN_SINCE] <= terms.whole[b, SHARED_TICKS]
-        paused = ego[IN_SINCE] > clock[IN_SINCE] or (shares and lately)
-    long = run(free, tick, clock, EXIT_SINCE)
+    if tables.labels.crosses[b, EGO] == v:
+        shares = ego.in_since == car.in_since
+        lately = tick - car.in_since <= terms.shared_ticks
+        paused = ego.in_since > car.in_since or (shares and lately)
+    car.exit_since = run(free, tick, car.exit_since)
+    long = lasted(tick, car.exit_since)
     if long <= 0:
-        clock[EXIT_PAUSED] = 0
+        car.exit_paused = 0
     elif paused:
-        clock[EXIT_PAUSED] += 1
-    if long >= 0 and long - clock[EXIT_PAUSED] == ago and (long == 0 or not paused):
-        add(b, EXIT, n, tick, clock[EXIT_SINCE], v, lane, breach_log.row, breach_log.filled)
-    clock[EXIT_COUNTS] = -1 if paused else clock[EXIT_SINCE]
+        car.exit_paused += 1
+    ago = terms.exit_ticks + car.exit_paused
+    if long >= 0 and long == ago and (long == 0 or not paused):
+        add(log, car, EXIT, tick, car.exit_since, v, tables.labels.lane[b, n])
+    car.exit_counts = -1 if paused else car.exit_since
     if paused:
         return tick + 1
-    return min(again, when_due(tick, clock, EXIT_SINCE, ago + clock[EXIT_PAUSED]))
+    return min(again, when_due(tick, car.exit_since, ago))
 
 
 @jit_inner
-def has_way(
-    b: int,
-    n: int,
-    tick: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    memory: Memory,
-    breach_log: BreachLog,
-) -> bool:
-    """E5: tell whether car n is in a lane with a free way ahead."""
+def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
+    """E5: tell whether car n of trial b is in a lane with a free way ahead."""
+    state, roads, labels, row = tables.state, tables.roads, tables.labels, tables.memory.car[b]
+    own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0 or bits & BLOCKED != 0 or (bits & STOPPED != 0 and bits & GOES != GOES):
         return False
-    net: int = rules.whole[b, NET]
-    own = memory.measure[b, n, PROGRESS]
-    reach = terms.real[b, WAY]
+    here = row[n].progress
     for k in range(state.count[b]):
-        if labels.lane[b, k] == lane and np.int64(labels.bits[b, k]) & WAITS != 0:
-            ahead = memory.measure[b, k, PROGRESS] - own
-            if 0.0 < ahead <= reach:
-                return False
-    length = roads.seg[roads.seg_off[net] + lane // 2, 4]
-    real = rules.real[b]
-    needed = real[FREE_NEEDED] + GRAIN
-    if obstacle_narrows(obstacles, b, lane, length, own, own + reach, real[LANE_WIDTH], needed):
+        waits = labels.lane[b, k] == lane and np.int64(labels.bits[b, k]) & WAITS != 0
+        if waits and 0.0 < row[k].progress - here <= terms.way:
+            return False
+    place = lane_of(roads, own, b, lane)
+    if obstacle_narrows(tables.obstacles, place, here, here + terms.way, own.free_needed + GRAIN):
         return False
-    v = lane_end(roads, net, lane)
-    row = roads.vert_off[net] + v
-    if roads.degree[row] >= rules.whole[b, CROSSING_DEGREE] or length - real[RADIUS] - own > reach:
+    v = lane_end(roads, own.net, lane)
+    vertex = roads.vert_off[own.net] + v
+    if roads.degree[vertex] >= own.crossing_degree or place.length - own.radius - here > terms.way:
         return True
     for k in range(state.count[b]):
-        if k != n and labels.crosses[b, k] == v and (k == EGO or breach_log.clock[b, k, CAME_BY] == lane):
+        if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
             return False
-    vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
-    count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
-    back = way_back(b, v, lane, roads, rules)
-    return find_exit(
-        b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, breach_log
-    )
+    vx, vy = float(roads.vert[vertex, 0]), float(roads.vert[vertex, 1])
+    count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
+    return find_exit(b, n, v, way_back(v, lane, roads, own), count, tables)
 
 
 @jit
-def find_ways(
-    tick: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    memory: Memory,
-    breach_log: BreachLog,
-    found: Any,
-) -> None:
-    """Write down which cars of a frame that has been judged are in a lane with a free way ahead, (B, N)."""
-    for b in range(state.count.shape[0]):
-        for n in range(state.count[b]):
-            found[b, n] = has_way(
-                b, n, tick, spacing, state, roads, obstacles, rules, terms, labels, memory, breach_log
-            )
+def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
+    """Write which cars of frame `tick`, which has been judged, are in a lane with a free way ahead, (B, N) bool."""
+    for b in range(tables.state.count.shape[0]):
+        for n in range(tables.state.count[b]):
+            found[b, n] = has_way(b, n, tick, tables)
 
 
-@jit_inline
-def judge_goals(
-    b: int,
-    tick: int,
-    cars: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    breach_log: BreachLog,
-) -> None:
+@jit_inner
+def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
     """E6: no goal is taken for too long; find when one will be, or has to be looked at, if no car comes or goes."""
-    ago = terms.whole[b, GOAL_TICKS]
-    clock, ticks_paused = breach_log.goal_clock, breach_log.goal_paused
+    log, terms = tables.log, tables.terms[b]
     due = NEVER_DUE
-    for g in range(terms.goal_off[b], terms.goal_off[b + 1]):
-        who = at_goal(terms.goal[g], cars, labels.at[b], breach_log.clock[b])
-        long = run(who >= 0, tick, clock, g)
+    for g in range(terms.goals_begin, terms.goals_end):
+        goal = log.goal[g]
+        who = at_goal(goal.vertex, tables.state.count[b], tables.labels.at[b], log.car[b])
+        goal.since = run(who >= 0, tick, goal.since)
+        long = lasted(tick, goal.since)
         if long < 0:
             continue
-        paused, again = _holds_up(
-            b, terms.goal[g], tick, cars, spacing, state, roads, obstacles, rules, terms, labels, breach_log
-        )
+        paused, again = _holds_up(b, goal.vertex, tick, tables)
         if long == 0:
-            ticks_paused[g] = 0
+            goal.paused = 0
         elif paused:
-            ticks_paused[g] += 1
-        if long - ticks_paused[g] == ago and (long == 0 or not paused):
-            add(b, GOAL, who, tick, clock[g], terms.goal[g], -1, breach_log.row, breach_log.filled)
-        due = min(due, again)
-        due = min(due, when_due(tick, clock, g, ago + ticks_paused[g]))
-    breach_log.goal_due[b] = due
+            goal.paused += 1
+        ago = terms.goal_ticks + goal.paused
+        if long == ago and (long == 0 or not paused):
+            add(log, log.car[b, who], GOAL, tick, goal.since, goal.vertex, -1)
+        due = min(due, again, when_due(tick, goal.since, ago))
+    log.goal_due[b] = due
 
 
-@jit_inline
-def _holds_up(
-    b: int,
-    v: int,
-    tick: int,
-    cars: int,
-    spacing: Spacing,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    terms: RefereeParameters,
-    labels: Labels,
-    breach_log: BreachLog,
-) -> tuple[bool, int]:
+@jit_inner
+def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, int]:
     """E6: tell whether no exit of the goal v is free, for any e-agent in it, and the ego is near one.
 
     Also returns when to ask again, if no car comes or goes.
     """
-    row = roads.vert_off[rules.whole[b, NET]] + v
+    state, roads, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
+    row = roads.vert_off[own.net] + v
     vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
     dx, dy = state.x[b, EGO] - vx, state.y[b, EGO] - vy
-    spare = (
-        sqrt(dx * dx + dy * dy) - terms.real[b, LONE] - terms.real[b, GOAL_GAP] - rules.real[b, LANE_WIDTH]
-    )
+    spare = sqrt(dx * dx + dy * dy) - terms.lone - terms.goal_gap - own.lane_width
     if spare > 0.0:
-        return False, tick + ticks_within(spare, spacing, b)
+        return False, tick + ticks_within(spare, tables.spacing, b)
     near = False
-    for n in range(1, cars):
-        if labels.at[b, n] != v:
+    for n in range(EGO + 1, state.count[b]):
+        if tables.labels.at[b, n] != v:
             continue
-        back = way_back(b, v, breach_log.clock[b, n, CAME_BY], roads, rules)
-        count = list_near(state, b, tick, vx, vy, terms.real[b, LONE], spacing)
-        if find_exit(
-            b, n, v, back, spacing.near, count, state, roads, obstacles, rules, terms, labels, breach_log
-        ):
+        back = way_back(v, tables.log.car[b, n].came_by, roads, own)
+        count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
+        if find_exit(b, n, v, back, count, tables):
             return False, tick + 1
-        near |= ego_at_exit(b, v, back, state, roads, rules, terms, labels)
+        near |= ego_at_exit(b, v, back, tables)
     return near, tick + 1

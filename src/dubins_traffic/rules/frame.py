@@ -9,18 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import STATE_END, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
     lane_end,
 )
-from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.blocking import narrows, obstacle_narrows
+from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.label_cache import holds_on, look_who_holds
 from dubins_traffic.rules.location import locate, moved2, put_in_order
-from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.propositions import (
     AHEAD,
     APPROACH,
@@ -38,332 +36,262 @@ from dubins_traffic.rules.propositions import (
     STILL,
     STOPPED,
 )
-from dubins_traffic.rules.queue import foremost, keep_order
+from dubins_traffic.rules.queue import Queue, foremost, gather, keep_order
 from dubins_traffic.rules.shape import half_extent
-from dubins_traffic.rules.tables import (
-    APPROACH2,
-    APPROACH_SINCE,
-    BLOCKED_AHEAD,
-    CROSS2,
-    CROSSERS,
-    DUE,
-    EXCUSE,
-    FIRST_SINCE,
-    FORFEITS,
-    FREE_NEEDED,
-    GAP2,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LANE,
-    LANE_WIDTH,
-    LEFT_RELEASE,
-    LEFT_SET,
-    NET,
-    NEXT_IN_LANE,
-    NEXT_IN_QUEUE,
-    NEXT_ON_SEGMENT,
-    OVERTAKING_AHEAD,
-    OVERTAKING_BEHIND,
-    PROGRESS,
-    QUEUE,
-    QUEUE2,
-    RANK,
-    REACH,
-    ROUNDING,
-    SEGMENT,
-    STOP2,
-    STOP_MOVE2,
-    STOP_TICKS,
-    TICKET,
-    WAIT_SINCE,
-    ZONE,
-    Memory,
-    RuleTable,
-)
+from dubins_traffic.rules.tables import CarMemory, LabelTables
 
 LONG = STILL | LINGERS
 BESIDE = LONG | LEFT | OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
-# Where each table begins and ends among the arrays of a call.
-ROADS_END = STATE_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleLanes._fields)
-RULES_END = OBSTACLES_END + len(RuleTable._fields)
-LABELS_END = RULES_END + len(Labels._fields)
-
 
 @jit
-def label_frame(tick: int, *arrays: Any) -> None:
+def label_frame(tick: int, tables: LabelTables) -> None:
     """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
 
-    Before frame 0 both are as they are made: no lane, no vertex, no flag. `arrays` are those of State, RoadTable,
-    ObstacleLanes, RuleTable, Labels and Memory, one after another: a call from Python with arrays takes a third of
-    the time of one with tables of them.
+    Before frame 0 both are as they are made: no lane, no vertex, no flag.
     """
-    label_tables(
-        tick, State(*arrays[:STATE_END]), RoadTable(*arrays[STATE_END:ROADS_END]),
-        ObstacleLanes(*arrays[ROADS_END:OBSTACLES_END]), RuleTable(*arrays[OBSTACLES_END:RULES_END]),
-        Labels(*arrays[RULES_END:LABELS_END]), Memory(*arrays[LABELS_END:]),
-    )  # fmt: skip
+    for b in range(tables.state.count.shape[0]):
+        label_trial(b, tick, tables)
 
 
 @jit_inner
-def label_tables(
-    tick: int,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    labels: Labels,
-    memory: Memory,
-) -> None:
-    """Do what `label_frame` does, for a kernel that has the tables."""
-    for b in range(state.count.shape[0]):
-        label_trial(b, tick, state, roads, obstacles, rules, labels, memory)
-
-
-@jit_inner
-def label_trial(
-    b: int,
-    tick: int,
-    state: State,
-    roads: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    labels: Labels,
-    memory: Memory,
-) -> None:
-    """Label frame `tick` of one trial."""
-    look_who_holds(b, tick, state, rules, memory)
+def label_trial(b: int, tick: int, tables: LabelTables) -> None:
+    """Label frame `tick` of trial b."""
+    state, labels, memory = tables.state, tables.labels, tables.memory
+    own, row, due = tables.rules[b], memory.car[b], memory.due[b]
+    look_who_holds(b, tick, state, own, memory)
     cars = state.count[b]
     stirred = False
-    due = 0
+    count = 0
     some = 0
     for n in range(cars):
-        if not holds_on(b, n, roads, rules, labels, memory):
-            stirred |= locate(b, n, tick, state, roads, rules, labels, memory)
-        elif memory.mark[b, n, ZONE] == 0:
+        if not holds_on(b, n, tables.roads, own, labels, memory):
+            stirred |= locate(b, n, tick, tables)
+        elif row[n].zone == 0:
             some |= np.int64(labels.bits[b, n])
             continue
-        memory.link[b, due, DUE] = n
-        due += 1
-    for k in range(cars if stirred else due):
-        n = k if stirred else memory.link[b, k, DUE]
-        some |= _stop(b, n, tick, state, roads, rules, labels, memory)
+        due[count] = n
+        count += 1
+    for k in range(cars if stirred else count):
+        n = k if stirred else due[k]
+        some |= _stop(b, n, tick, tables)
     if some & STOPPED != 0:
-        _queue_up(b, tick, cars, roads, rules, labels, memory)
+        _queue_up(b, tick, tables)
     elif some & LONG != 0:
         for n in range(cars):
-            _say_stands(b, n, labels)
-    if some & BESIDE != 0 or obstacles.base[b] >= 0:
-        _look_beside(b, state, roads, obstacles, rules, labels, memory)
+            labels.bits[b, n] = _who_stands(np.int64(labels.bits[b, n]))
+    if some & BESIDE != 0 or tables.obstacles.base[b] >= 0:
+        _look_beside(b, tables)
+
+
+@jit_inner
+def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
+    """Order the queues of trial b, and say who stands."""
+    labels, memory, t = tables.labels, tables.memory, tables.roads
+    own, head, row, members = tables.rules[b], memory.head[b], memory.car[b], memory.member[b]
+    bits, lanes = labels.bits[b], labels.lane[b]
+    cars: int = tables.state.count[b]
+    for n in range(cars):
+        if bits[n] & STOPPED == 0:
+            continue
+        v = lane_end(t, own.net, lanes[n])
+        if head[v].queue == n:
+            queue = Queue(row, lanes, members, gather(n, row, members))
+            keep_order(t, own, queue, head[v].crossers == 0, tick)
+            _flag_queue(n, row, bits)
+    for n in range(cars):
+        lane: int = lanes[n]
+        if lane >= 0 and head[lane].lane == n:
+            put_in_order(head[lane], row)
+    for n in range(cars):
+        lane = lanes[n]
+        if lane < 0:
+            bits[n] = _who_stands(np.int64(bits[n]))
+        elif head[lane].lane == n:
+            _excuse(n, own.excuse, row, bits)
+    for n in range(cars):
+        if bits[n] & STOPPED != 0:
+            head[lane_end(t, own.net, lanes[n])].queue = -1
+
+
+@jit_inner
+def _look_beside(b: int, tables: LabelTables) -> None:
+    """Find who of trial b is blocked, overtakes and is left."""
+    segments, head, row = tables.labels.segment[b], tables.memory.head[b], tables.memory.car[b]
+    cars: int = tables.state.count[b]
+    for n in range(cars):
+        segment: int = segments[n]
+        first = head[segment]
+        row[n].next_on_segment = first.segment
+        first.segment = n
+    for n in range(cars):
+        _block(b, n, tables)
+    for n in range(cars):
+        segment = segments[n]
+        head[segment].segment = -1
 
 
 @jit_inline
-def _queue_up(
-    b: int, tick: int, cars: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
-) -> None:
-    """Order the queues, and say who stands."""
-    head = memory.head[b]
-    for n in range(cars):
-        _queue(b, n, tick, t, rules, labels, memory)
-    for n in range(cars):
-        lane = labels.lane[b, n]
-        if lane >= 0 and head[lane, LANE] == n:
-            put_in_order(b, lane, memory)
-    for n in range(cars):
-        _stand(b, n, rules, labels, memory)
-    for n in range(cars):
-        if labels.bits[b, n] & STOPPED != 0:
-            head[lane_end(t, rules.whole[b, NET], labels.lane[b, n]), QUEUE] = -1
-
-
-@jit_inline
-def _look_beside(
-    b: int, state: State, roads: RoadTable, obstacles: ObstacleLanes, rules: RuleTable, labels: Labels,
-    memory: Memory,
-) -> None:  # fmt: skip
-    """Find who is blocked, overtakes and is left."""
-    head = memory.head[b]
-    for n in range(state.count[b]):
-        memory.link[b, n, NEXT_ON_SEGMENT] = head[labels.segment[b, n], SEGMENT]
-        head[labels.segment[b, n], SEGMENT] = n
-    for n in range(state.count[b]):
-        _block(b, n, state, roads, obstacles, rules, labels, memory)
-    for n in range(state.count[b]):
-        head[labels.segment[b, n], SEGMENT] = -1
-
-
-@jit_inline
-def _stop(
-    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
-) -> Any:
-    """Find whether a car approaches, has stopped and gets a ticket; enter it in the queue ahead.
+def _stop(b: int, n: int, tick: int, tables: LabelTables) -> Any:
+    """Find whether car n approaches, has stopped and gets a ticket; enter it in the queue ahead.
 
     Sets CLEAR too, which needs who crosses what. Returns the car's flags so far, with LEFT if it will be left.
     """
-    net: int = rules.whole[b, NET]
-    real = rules.real
-    mark = memory.mark
-    gap2 = memory.measure[b, n, GAP2]
-    lane = labels.lane[b, n]
-    crosses = labels.crosses[b, n]
+    labels, memory = tables.labels, tables.memory
+    own, row, head = tables.rules[b], memory.car[b], memory.head[b]
+    car = row[n]
+    gap2 = car.gap2
+    lane: int = labels.lane[b, n]
+    crosses: int = labels.crosses[b, n]
     bits = np.int64(labels.bits[b, n]) & ~CLEAR
-    mark[b, n, RANK] = -1
+    car.rank = -1
+    left = LEFT if car.reach > own.left_set else 0
     if gap2 < 0.0:
-        if bits & IN_CROSSING != 0 and memory.head[b, crosses, CROSSERS] == 1:
+        if bits & IN_CROSSING != 0 and head[crosses].crossers == 1:
             bits |= CLEAR
         bits &= ~STOPPED
         labels.bits[b, n] = bits
-        return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
-    v = lane_end(t, net, lane)
-    own = 1 if crosses == v else 0
-    if memory.head[b, v, CROSSERS] == own:
+        return bits | left
+    v = lane_end(tables.roads, own.net, lane)
+    ahead = head[v]
+    if ahead.crossers == (1 if crosses == v else 0):
         bits |= CLEAR
-    outside = gap2 >= real[b, CROSS2]
+    outside = gap2 >= own.cross2
     if not outside:
-        mark[b, n, WAIT_SINCE] = -1
-    if not outside or gap2 > real[b, QUEUE2]:
+        car.wait_since = -1
+    if not outside or gap2 > own.queue2:
         bits &= ~STOPPED
-    if outside and gap2 <= real[b, STOP2] and foremost(rules, memory, b, n, lane):
-        if gap2 <= real[b, APPROACH2]:
+    if outside and gap2 <= own.stop2 and foremost(n, head[lane].lane, row, own):
+        if gap2 <= own.approach2:
             bits |= APPROACH
-        if mark[b, n, APPROACH_SINCE] < 0:
-            mark[b, n, APPROACH_SINCE] = tick
-        ago = rules.whole[b, STOP_TICKS]
-        long = tick - mark[b, n, APPROACH_SINCE] >= ago
-        if bits & STOPPED == 0 and long:
-            moved = moved2(b, n, tick, state.x[b, n], state.y[b, n], ago, memory)
-            if moved <= real[b, STOP_MOVE2]:
+        if car.approach_since < 0:
+            car.approach_since = tick
+        ago = own.stop_ticks
+        if bits & STOPPED == 0 and tick - car.approach_since >= ago:
+            x, y = tables.state.x[b, n], tables.state.y[b, n]
+            if moved2(b, n, tick, ago, x, y, memory) <= own.stop_move2:
                 bits |= STOPPED
-                mark[b, n, TICKET] = tick
-                mark[b, n, FORFEITS] = 0 if mark[b, n, WAIT_SINCE] < 0 else mark[b, n, FORFEITS] + 1
-                mark[b, n, FIRST_SINCE] = -1
-                if mark[b, n, WAIT_SINCE] < 0:
-                    mark[b, n, WAIT_SINCE] = tick
+                _give_ticket(car, tick)
     else:
-        mark[b, n, APPROACH_SINCE] = -1
+        car.approach_since = -1
     if bits & STOPPED != 0:
-        memory.link[b, n, NEXT_IN_QUEUE] = memory.head[b, v, QUEUE]
-        memory.head[b, v, QUEUE] = n
+        car.next_in_queue = ahead.queue
+        ahead.queue = n
     labels.bits[b, n] = bits
-    return bits | (LEFT if memory.measure[b, n, REACH] > real[b, LEFT_SET] else 0)
+    return bits | left
 
 
-@jit
-def _queue(b: int, n: int, tick: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> None:
-    """Order the queue of which car n is the head of the list, and flag its cars."""
-    if labels.bits[b, n] & STOPPED == 0:
-        return
-    net: int = rules.whole[b, NET]
-    v = lane_end(t, net, labels.lane[b, n])
-    if memory.head[b, v, QUEUE] != n:
-        return
-    clear = memory.head[b, v, CROSSERS] == 0
-    keep_order(t, rules, labels.lane, memory, b, net, n, clear, tick)
-    member = n
-    while member >= 0:
-        flags = FIRST if memory.mark[b, member, RANK] == 0 else AHEAD
-        if memory.mark[b, member, FORFEITS] > 0:
-            flags |= FORFEITED
-        else:
-            flags |= EXCUSED
-        labels.bits[b, member] = np.int64(labels.bits[b, member]) | flags
-        member = memory.link[b, member, NEXT_IN_QUEUE]
+@jit_inline
+def _give_ticket(car: CarMemory, tick: int) -> None:
+    """Give a car that has stopped before a crossing the ticket of this tick."""
+    car.ticket = tick
+    car.first_since = -1
+    if car.wait_since < 0:
+        car.forfeits = 0
+        car.wait_since = tick
+    else:
+        car.forfeits += 1
 
 
-@jit
-def _stand(b: int, n: int, rules: RuleTable, labels: Labels, memory: Memory) -> None:
-    """Excuse the cars close behind excused ones, and say who stands, in the lane of which car n is foremost.
+@jit_inline
+def _flag_queue(first: int, cars: Rows[CarMemory], bits: Any) -> None:
+    """Flag the cars of the queue that begins with car `first` and is in order, in `bits` (N,)."""
+    n = first
+    while n >= 0:
+        car = cars[n]
+        flags = FIRST if car.rank == 0 else AHEAD
+        flags |= FORFEITED if car.forfeits > 0 else EXCUSED
+        bits[n] = np.int64(bits[n]) | flags
+        n = car.next_in_queue
 
-    A car without lane state is excused by nothing.
+
+@jit_inline
+def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
+    """Excuse the cars up to `far` metres behind excused ones, and say who stands, in `bits` (N,).
+
+    They are those of one lane, in order, of which car `first` is foremost. A car without lane state is excused by
+    nothing.
     """
-    lane = labels.lane[b, n]
-    if lane < 0:
-        _say_stands(b, n, labels)
-        return
-    if memory.head[b, lane, LANE] != n:
-        return
-    measure = memory.measure
-    start = n
-    member = n
-    while member >= 0:
-        progress = measure[b, member, PROGRESS]
-        while measure[b, start, PROGRESS] - progress > rules.real[b, EXCUSE]:
-            start = memory.link[b, start, NEXT_IN_LANE]
+    start = first
+    n = first
+    while n >= 0:
+        car = cars[n]
+        progress = car.progress
+        while cars[start].progress - progress > far:
+            start = cars[start].next_in_lane
         other = start
-        while other != member and measure[b, other, PROGRESS] > progress:
-            if labels.bits[b, other] & EXCUSED != 0:
-                labels.bits[b, member] = np.int64(labels.bits[b, member]) | EXCUSED
+        while other != n and cars[other].progress > progress:
+            if bits[other] & EXCUSED != 0:
+                bits[n] = np.int64(bits[n]) | EXCUSED
                 break
-            other = memory.link[b, other, NEXT_IN_LANE]
-        _say_stands(b, member, labels)
-        member = memory.link[b, member, NEXT_IN_LANE]
+            other = cars[other].next_in_lane
+        bits[n] = _who_stands(np.int64(bits[n]))
+        n = car.next_in_lane
 
 
-@jit
-def _say_stands(b: int, n: int, labels: Labels) -> None:
-    bits = np.int64(labels.bits[b, n])
-    if bits & EXCUSED == 0 and bits & LONG != 0:
-        labels.bits[b, n] = bits | STANDS
+@jit_inline
+def _who_stands(bits: Any) -> Any:
+    """Return the flags of a car with STANDS, if it does."""
+    return bits | STANDS if bits & EXCUSED == 0 and bits & LONG != 0 else bits
 
 
-@jit
-def _block(
-    b: int,
-    n: int,
-    state: State,
-    t: RoadTable,
-    obstacles: ObstacleLanes,
-    rules: RuleTable,
-    labels: Labels,
-    memory: Memory,
-) -> None:
-    """Find whether the lane of a car is blocked, whether it overtakes, and whether it is left."""
-    real = rules.real
+@jit_inner
+def _block(b: int, n: int, tables: LabelTables) -> None:
+    """Find whether the lane of car n is blocked, whether it overtakes, and whether it is left."""
+    labels, t = tables.labels, tables.roads
+    own, car = tables.rules[b], tables.memory.car[b, n]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0:
         labels.bits[b, n] = bits & ~(OVERTAKING | LEFT)
         return
-    net: int = rules.whole[b, NET]
-    tx, ty = lane_direction(t, net, lane)
-    own = memory.measure[b, n, PROGRESS]
-    width = real[b, LANE_WIDTH]
-    needed = real[b, FREE_NEEDED]
-    blocked = False
-    beside = False
-    other = memory.head[b, lane // 2, SEGMENT]
-    while other >= 0:
-        if other != n and labels.bits[b, other] & STANDS != 0:
-            progress, lateral = lane_coordinates(t, net, lane, state.x[b, other], state.y[b, other])
-            half = half_extent(
-                tx, ty, state.c[b, other], state.s[b, other],
-                real[b, HALF_LENGTH], real[b, HALF_WIDTH], real[b, ROUNDING],
-            )  # fmt: skip
-            ahead = progress - own
-            if narrows(lateral - half, lateral + half, width, needed):
-                blocked = blocked or 0.0 < ahead <= real[b, BLOCKED_AHEAD]
-                beside = beside or -real[b, OVERTAKING_BEHIND] <= ahead <= real[b, OVERTAKING_AHEAD]
-        other = memory.link[b, other, NEXT_ON_SEGMENT]
-    if obstacles.base[b] >= 0:
-        length = t.seg[t.seg_off[net] + lane // 2, 4]
+    blocked, beside = _cars_beside(b, n, lane, tables)
+    if tables.obstacles.base[b] >= 0:
+        place = lane_of(t, own, b, lane)
+        here = car.progress
         blocked = blocked or obstacle_narrows(
-            obstacles, b, lane, length, own, own + real[b, BLOCKED_AHEAD], width, needed
+            tables.obstacles, place, here, here + own.blocked_ahead, own.free_needed
         )
         beside = beside or obstacle_narrows(
-            obstacles, b, lane, length,
-            own - real[b, OVERTAKING_BEHIND], own + real[b, OVERTAKING_AHEAD], width, needed,
-        )  # fmt: skip
+            tables.obstacles,
+            place,
+            here - own.overtaking_behind,
+            here + own.overtaking_ahead,
+            own.free_needed,
+        )
     if blocked:
         bits |= BLOCKED | OVERTAKING
     elif not beside and bits & LEFT == 0:
         bits &= ~OVERTAKING
-    if bits & ENTERED != 0 or labels.crosses[b, n] == lane_end(t, net, lane):
+    if bits & ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
         bits &= ~OVERTAKING
-    reach = memory.measure[b, n, REACH]
-    if reach > real[b, LEFT_SET]:
+    if car.reach > own.left_set:
         bits |= LEFT
-    elif reach < real[b, LEFT_RELEASE]:
+    elif car.reach < own.left_release:
         bits &= ~LEFT
     labels.bits[b, n] = bits
+
+
+@jit_inline
+def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, bool]:
+    """Tell whether a car that stands blocks the lane of car n, and whether one keeps it overtaking."""
+    state, t, row = tables.state, tables.roads, tables.memory.car[b]
+    own = tables.rules[b]
+    tx, ty = lane_direction(t, own.net, lane)
+    here = row[n].progress
+    blocked = False
+    beside = False
+    other = tables.memory.head[b, lane // 2].segment
+    while other >= 0:
+        if other != n and tables.labels.bits[b, other] & STANDS != 0:
+            progress, lateral = lane_coordinates(t, own.net, lane, state.x[b, other], state.y[b, other])
+            half = half_extent(
+                tx, ty, state.c[b, other], state.s[b, other], own.half_length, own.half_width, own.rounding
+            )
+            ahead = progress - here
+            if narrows(lateral - half, lateral + half, own.lane_width, own.free_needed):
+                blocked = blocked or 0.0 < ahead <= own.blocked_ahead
+                beside = beside or -own.overtaking_behind <= ahead <= own.overtaking_ahead
+        other = row[other].next_on_segment
+    return blocked, beside

@@ -16,7 +16,7 @@ from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.roads.lookup import CERTAIN, nearest_arm
+from dubins_traffic.roads.lookup import CERTAIN, ValidCell, nearest_arm
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import (
     BREACH3,
@@ -29,168 +29,139 @@ from dubins_traffic.rules.propositions import (
     STILL,
     STOPPED,
 )
-from dubins_traffic.rules.tables import (
-    ALONG_HIGH,
-    ALONG_LOW,
-    ASIDE_HIGH,
-    ASIDE_LOW,
-    AWAY2,
-    AXIS_X,
-    AXIS_Y,
-    BASE,
-    CALM,
-    CROSS2,
-    FORK_SURE,
-    FORK_X,
-    FORK_Y,
-    FROM_X,
-    FROM_Y,
-    GAP2,
-    HERE_X,
-    HERE_Y,
-    HOLDS,
-    LATERAL,
-    LEFT_SET,
-    LINGER_GROWTH,
-    LINGER_TICKS,
-    LINGERS_FROM,
-    NET,
-    NEVER_AGAIN,
-    NOW,
-    PROGRESS,
-    QUEUE2,
-    RADIUS,
-    RING_HIGH,
-    RING_LOW,
-    ROUNDING,
-    SIGN,
-    STAND_MOVE2,
-    STAND_TICKS,
-    STOP2,
-    THEN_X,
-    THEN_Y,
-    TOP,
-    TOP_SO_FAR,
-    TOP_THEN,
-    TURN_BACK,
-    VALID_CELL_HIGH_X,
-    VALID_CELL_HIGH_Y,
-    VALID_CELL_LOW_X,
-    VALID_CELL_LOW_Y,
-    VALID_CELL_VERTEX,
-    VALID_HIGH_X,
-    VALID_HIGH_Y,
-    VALID_LOW_X,
-    VALID_LOW_Y,
-    VERTEX_X,
-    VERTEX_Y,
-    WAS_LINGERING,
-    WAS_STILL,
-    WAY_SO_FAR,
-    ZONE,
-    Memory,
-    RuleTable,
-)
+from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Kept, Memory, TrialRules
 
 KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
 CALMLY = KEPT | ON_ROAD | IN_CROSSING | CLEAR
-"""Flags of a car that holds on to its labels, but for those that others bring about."""
+"""Flags of a car that holds on to its labels, except those that others bring about."""
 IF_NEAREST = 2.0
-"""Value of HOLDS of a car that holds on to its labels if the nearest of the roads that meet is still the same."""
+"""Value of `Kept.holds` of a car that holds on to its labels if the nearest of the roads that meet is the same."""
 FARTHEST = 100.0
 """Metres up to which a place is said to be far from any that matters."""
 HUGE = 1e300
 
 
 @jit_inline
-def place(n: int) -> int:
-    """Return where car n stands in the first column of a row of `Memory.kept`; column k is k * BLOCK farther."""
-    return (n & -BLOCK) * CALM + (n & (BLOCK - 1))
-
-
-@jit_inline
-def look_who_holds(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
+def look_who_holds(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
     """Note where the cars of trial b are; find who holds on to its labels where no roads fork, and who was still.
 
     Of those who hold on it is found who lingers, too, and their greatest progress is kept.
     """
-    _bring(b, tick, state, rules, memory)
-    real = rules.real[b]
-    back = real[TURN_BACK]
-    still2 = real[STAND_MOVE2] if tick >= rules.whole[b, STAND_TICKS] else -1.0
-    least, now = real[LINGER_GROWTH], float(tick)
-    growth = memory.growth[b, growth_row(b, tick, rules)]
-    kept = memory.kept[b]
-    for first in range(0, state.count[b], BLOCK):
-        begin = first * CALM
-        here = min(state.count[b] - first, BLOCK)
-        for k in range(begin, begin + ((here + WIDE - 1) & -WIDE)):
-            x = kept[k + BLOCK * HERE_X]
-            y = kept[k + BLOCK * HERE_Y]
-            inside = (kept[k + BLOCK * VALID_LOW_X] < x) & (x < kept[k + BLOCK * VALID_HIGH_X])
-            inside &= (kept[k + BLOCK * VALID_LOW_Y] < y) & (y < kept[k + BLOCK * VALID_HIGH_Y])
-            rx = x - kept[k + BLOCK * VERTEX_X]
-            ry = y - kept[k + BLOCK * VERTEX_Y]
-            away2 = rx * rx + ry * ry
-            inside &= (kept[k + BLOCK * RING_LOW] < away2) & (away2 < kept[k + BLOCK * RING_HIGH])
-            rx = x - kept[k + BLOCK * FROM_X]
-            ry = y - kept[k + BLOCK * FROM_Y]
-            along = rx * kept[k + BLOCK * AXIS_X] + ry * kept[k + BLOCK * AXIS_Y]
-            progress = kept[k + BLOCK * BASE] + kept[k + BLOCK * SIGN] * along
-            top = kept[k + BLOCK * TOP_SO_FAR]
-            inside &= (top - progress < back) & (kept[k + BLOCK * ALONG_LOW] < along)
-            inside &= along < kept[k + BLOCK * ALONG_HIGH]
-            aside = kept[k + BLOCK * AXIS_X] * ry - kept[k + BLOCK * AXIS_Y] * rx
-            inside &= (kept[k + BLOCK * ASIDE_LOW] < aside) & (aside < kept[k + BLOCK * ASIDE_HIGH])
-            half = kept[k + BLOCK * FORK_SURE]
-            rx = x - kept[k + BLOCK * THEN_X]
-            ry = y - kept[k + BLOCK * THEN_Y]
-            kept[k + BLOCK * AWAY2] = away2
-            kept[k + BLOCK * WAY_SO_FAR] = progress
-            top = max(top, progress)
-            kept[k + BLOCK * TOP_SO_FAR] = top
-            then = growth[first + k - begin]
-            growth[first + k - begin] = top
-            kept[k + BLOCK * TOP_THEN] = then
-            little = (now >= kept[k + BLOCK * LINGERS_FROM]) & (top - then < least)
-            kept[k + BLOCK * WAS_LINGERING] = 1.0 if little else 0.0
-            sure = (abs(x - kept[k + BLOCK * FORK_X]) < half) & (abs(y - kept[k + BLOCK * FORK_Y]) < half)
-            holds = 1.0 if sure else IF_NEAREST
-            kept[k + BLOCK * HOLDS] = holds if inside else 0.0
-            kept[k + BLOCK * WAS_STILL] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
+    _bring(b, tick, state, own, memory)
+    still2 = own.stand_move2 if tick >= own.stand_ticks else -1.0
+    growth = memory.growth[b, growth_row(tick, own)]
+    count = state.count[b]
+    for first in range(0, count, BLOCK):
+        here = min(count - first, BLOCK)
+        last = (here + WIDE - 1) & -WIDE
+        block = memory.kept[b, first // BLOCK]
+        _look_who_stays(block, last, own.turn_back)
+        _look_who_moves(block, growth[first : first + last], float(tick), own.linger_growth, still2)
 
 
 @jit_inline
-def _bring(b: int, tick: int, state: State, rules: RuleTable, memory: Memory) -> None:
+def _look_who_stays(block: Kept, last: int, back: float) -> None:
+    """Find who of the first `last` cars of a block holds on to its labels, its progress, and the most of that.
+
+    `back` is how far progress may fall, metres.
+    """
+    here_x, here_y, vertex_x, vertex_y = block.here_x, block.here_y, block.vertex_x, block.vertex_y
+    low_x, high_x, low_y, high_y = (
+        block.valid_low_x,
+        block.valid_high_x,
+        block.valid_low_y,
+        block.valid_high_y,
+    )
+    ring_low, ring_high, from_x, from_y = block.ring_low, block.ring_high, block.from_x, block.from_y
+    axis_x, axis_y, base, sign = block.axis_x, block.axis_y, block.base, block.sign
+    along_low, along_high, aside_low, aside_high = (
+        block.along_low, block.along_high, block.aside_low, block.aside_high,
+    )  # fmt: skip
+    fork_x, fork_y, fork_sure, tops = block.fork_x, block.fork_y, block.fork_sure, block.top_so_far
+    away, way, holds = block.away2, block.way_so_far, block.holds
+    for k in range(last):
+        x = here_x[k]
+        y = here_y[k]
+        inside = (low_x[k] < x) & (x < high_x[k])
+        inside &= (low_y[k] < y) & (y < high_y[k])
+        rx = x - vertex_x[k]
+        ry = y - vertex_y[k]
+        away2 = rx * rx + ry * ry
+        inside &= (ring_low[k] < away2) & (away2 < ring_high[k])
+        rx = x - from_x[k]
+        ry = y - from_y[k]
+        along = rx * axis_x[k] + ry * axis_y[k]
+        progress = base[k] + sign[k] * along
+        top = tops[k]
+        inside &= (top - progress < back) & (along_low[k] < along)
+        inside &= along < along_high[k]
+        aside = axis_x[k] * ry - axis_y[k] * rx
+        inside &= (aside_low[k] < aside) & (aside < aside_high[k])
+        half = fork_sure[k]
+        away[k] = away2
+        way[k] = progress
+        tops[k] = max(top, progress)
+        sure = (abs(x - fork_x[k]) < half) & (abs(y - fork_y[k]) < half)
+        held = 1.0 if sure else IF_NEAREST
+        holds[k] = held if inside else 0.0
+
+
+@jit_inline
+def _look_who_moves(block: Kept, growth: Floats, now: float, least: float, still2: float) -> None:
+    """Find who of the first cars of a block was still, by squared metres, and who lingers; keep how far they are.
+
+    `growth` (K,) holds the greatest progress `linger_time` ago, and then the present one. Who has made less than
+    `least` metres lingers.
+    """
+    here_x, here_y, then_x, then_y = block.here_x, block.here_y, block.then_x, block.then_y
+    tops, tops_then, lingers_from = block.top_so_far, block.top_then, block.lingers_from
+    was_lingering, was_still = block.was_lingering, block.was_still
+    for k in range(growth.shape[0]):
+        rx = here_x[k] - then_x[k]
+        ry = here_y[k] - then_y[k]
+        top = tops[k]
+        then = growth[k]
+        growth[k] = top
+        tops_then[k] = then
+        little = (now >= lingers_from[k]) & (top - then < least)
+        was_lingering[k] = 1.0 if little else 0.0
+        was_still[k] = 1.0 if rx * rx + ry * ry <= still2 else 0.0
+
+
+@jit_inline
+def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
     """Put where the cars are, and where they were `stand_time` ago, beside what is kept of them."""
-    depth, places = memory.trail.shape[1], memory.trail.shape[3]
+    depth, places = memory.trail_x.shape[1], memory.trail_x.shape[2]
     now = tick % depth
-    then = (now + depth - rules.whole[b, STAND_TICKS]) % depth
-    memory.head[b, 0, NOW] = now
-    kept = memory.kept[b]
-    x, y, present, past = state.x[b], state.y[b], memory.trail[b, now], memory.trail[b, then]
-    if places % TOGETHER == 0:
-        for n in range(0, places, TOGETHER):
-            k = place(n)
-            _copy(past[0], n, kept, k + BLOCK * THEN_X)
-            _copy(past[1], n, kept, k + BLOCK * THEN_Y)
-            _copy(x, n, kept, k + BLOCK * HERE_X)
-            _copy(y, n, kept, k + BLOCK * HERE_Y)
-            _copy(x, n, present[0], n)
-            _copy(y, n, present[1], n)
-        return
-    for n in range(places):
-        k = place(n)
-        kept[k + BLOCK * THEN_X] = past[0, n]
-        kept[k + BLOCK * THEN_Y] = past[1, n]
-        kept[k + BLOCK * HERE_X] = present[0, n] = x[n]
-        kept[k + BLOCK * HERE_Y] = present[1, n] = y[n]
+    then = (now + depth - own.stand_ticks) % depth
+    x, y, now_x, now_y = state.x[b], state.y[b], memory.trail_x[b, now], memory.trail_y[b, now]
+    past_x, past_y = memory.trail_x[b, then], memory.trail_y[b, then]
+    for first in range(0, places, BLOCK):
+        block = memory.kept[b, first // BLOCK]
+        here_x, here_y, then_x, then_y = block.here_x, block.here_y, block.then_x, block.then_y
+        last = min(places - first, BLOCK)
+        if places % TOGETHER == 0:
+            for k in range(0, last, TOGETHER):
+                n = first + k
+                _copy(past_x, n, then_x, k)
+                _copy(past_y, n, then_y, k)
+                _copy(x, n, here_x, k)
+                _copy(y, n, here_y, k)
+                _copy(x, n, now_x, n)
+                _copy(y, n, now_y, n)
+            continue
+        for k in range(last):
+            n = first + k
+            then_x[k] = past_x[n]
+            then_y[k] = past_y[n]
+            here_x[k] = now_x[n] = x[n]
+            here_y[k] = now_y[n] = y[n]
 
 
 @jit_inline
-def growth_row(b: int, tick: int, rules: RuleTable) -> int:
+def growth_row(tick: int, own: TrialRules) -> int:
     """Return the row of `Memory.growth` that holds what was `linger_time` ago, until it holds what is now."""
-    return tick % max(rules.whole[b, LINGER_TICKS], 1)
+    return tick % max(own.linger_ticks, 1)
 
 
 @jit_inline
@@ -201,139 +172,144 @@ def _copy(source: Floats, n: int, target: Floats, k: int) -> None:
 
 
 @jit_inline
-def still(b: int, n: int, memory: Memory) -> int:
-    """Return STILL if car n is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
-    return STILL if memory.kept[b, place(n) + BLOCK * WAS_STILL] != 0.0 else 0
+def still(block: Kept, n: int) -> int:
+    """Return STILL if car n, of this block, is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
+    return STILL if block.was_still[n & (BLOCK - 1)] != 0.0 else 0
 
 
 @jit_inline
-def lingers(b: int, n: int, memory: Memory) -> int:
-    """Return LINGERS if car n lingers, else 0; after `look_who_holds`, or `note_growth` for who doesn't hold on."""
-    return LINGERS if memory.kept[b, place(n) + BLOCK * WAS_LINGERING] != 0.0 else 0
+def lingers(block: Kept, n: int) -> int:
+    """Return LINGERS if car n, of this block, lingers, else 0.
 
-
-@jit_inline
-def note_growth(
-    b: int, n: int, tick: int, lane: int, fresh: bool, top: float, rules: RuleTable, memory: Memory
-) -> None:
-    """Find whether a car lingers that has been located in `lane` (-1: none), which was set in this frame if `fresh`."""
-    kept = memory.kept[b]
-    k = place(n)
-    if lane < 0:
-        kept[k + BLOCK * LINGERS_FROM] = NEVER_AGAIN
-    elif fresh:
-        kept[k + BLOCK * LINGERS_FROM] = float(tick + rules.whole[b, LINGER_TICKS])
-    long = tick >= kept[k + BLOCK * LINGERS_FROM]
-    little = top - kept[k + BLOCK * TOP_THEN] < rules.real[b, LINGER_GROWTH]
-    kept[k + BLOCK * WAS_LINGERING] = 1.0 if long and little else 0.0
-    memory.growth[b, growth_row(b, tick, rules), n] = top
-
-
-@jit_inline
-def holds_on(b: int, n: int, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory) -> bool:
-    """Label a car of which it is known that all is as in the frame before but what changes with every metre.
-
-    Returns False, and does nothing that matters, where it is not known. After `look_who_holds`.
+    After `look_who_holds`, or `note_growth` for who doesn't hold on.
     """
-    kept = memory.kept[b]
-    k = place(n)
-    holds = kept[k + BLOCK * HOLDS]
+    return LINGERS if block.was_lingering[n & (BLOCK - 1)] != 0.0 else 0
+
+
+@jit_inline
+def note_growth(block: Kept, n: int, tick: int, lane: int, fresh: bool, top: float, own: TrialRules) -> None:
+    """Find whether a car lingers that has been located in `lane` (-1: none), which was set in this frame if `fresh`.
+
+    `top` is its greatest progress, metres, which the caller has to write to `Memory.growth`.
+    """
+    k = n & (BLOCK - 1)
+    if lane < 0:
+        block.lingers_from[k] = NEVER_AGAIN
+    elif fresh:
+        block.lingers_from[k] = float(tick + own.linger_ticks)
+    long = tick >= block.lingers_from[k]
+    little = top - block.top_then[k] < own.linger_growth
+    block.was_lingering[k] = 1.0 if long and little else 0.0
+
+
+@jit_inline
+def holds_on(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memory: Memory) -> bool:
+    """Relabel car n of trial b if its cached labels are valid: update progress and flags only.
+
+    Returns False, and does nothing that matters, where that is not known. After `look_who_holds`.
+    """
+    block = memory.kept[b, n // BLOCK]
+    k = n & (BLOCK - 1)
+    holds = block.holds[k]
     if holds == 0.0:
         return False
     if holds == IF_NEAREST:
-        x, y = kept[k + BLOCK * HERE_X], kept[k + BLOCK * HERE_Y]
-        segment, _, surely = nearest_arm(
-            t, rules.whole[b, NET], int(memory.valid_cell[b, n, VALID_CELL_VERTEX]), x, y
-        )
+        x, y = block.here_x[k], block.here_y[k]
+        segment, _, surely = nearest_arm(t, own.net, memory.cell[b, n].vertex, x, y)
         if segment != labels.segment[b, n]:
             return False
-        trust_fork(n, x, y, surely, kept)
-    measure = memory.measure[b, n]
-    measure[TOP] = kept[k + BLOCK * TOP_SO_FAR]
-    measure[PROGRESS] = kept[k + BLOCK * WAY_SO_FAR]
-    if memory.mark[b, n, ZONE] != 0:
-        measure[GAP2] = kept[k + BLOCK * AWAY2]
-    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(b, n, memory) | lingers(b, n, memory)
+        trust_fork(block, n, x, y, surely)
+    car = memory.car[b, n]
+    car.top = block.top_so_far[k]
+    car.progress = block.way_so_far[k]
+    if car.zone != 0:
+        car.gap2 = block.away2[k]
+    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(block, n) | lingers(block, n)
     return True
 
 
 @jit_inline
 def hold(
-    b: int, n: int, x: float, y: float, away2: float, lane: int, spare: float, t: RoadTable, rules: RuleTable,
-    memory: Memory,
-) -> None:  # fmt: skip
-    """Keep where a car that has been located is sure to hold on to its labels.
+    block: Kept, n: int, away2: float, spare: float, cell: ValidCell, car: CarMemory, own: TrialRules
+) -> None:
+    """Keep where car n, which has been located, is sure to hold on to its labels, as far as its lane is not asked.
 
-    It does while it is less than `spare` metres from (x, y), in the valid_cell, where the squared distance from its
-    vertex compares with all radii that matter as `away2` does, the nearest road is the same, and it is no farther
-    aside in its lane than `_keep_strip` says.
+    It does while it is less than `spare` metres from where it is, in its valid cell, and where the squared distance
+    from its vertex compares with all radii that matter as `away2` does. After `keep_vertex`, and with `keep_lane`.
     """
-    net: int = rules.whole[b, NET]
-    row = memory.valid_cell[b, n]
-    kept = memory.kept[b]
-    k = place(n)
+    k = n & (BLOCK - 1)
+    x, y = block.here_x[k], block.here_y[k]
     half = 0.7 * spare - CERTAIN
-    kept[k + BLOCK * VALID_LOW_X] = max(row[VALID_CELL_LOW_X], x - half)
-    kept[k + BLOCK * VALID_HIGH_X] = min(row[VALID_CELL_HIGH_X], x + half)
-    kept[k + BLOCK * VALID_LOW_Y] = max(row[VALID_CELL_LOW_Y], y - half)
-    kept[k + BLOCK * VALID_HIGH_Y] = min(row[VALID_CELL_HIGH_Y], y + half)
-    vertex = t.vert_off[net] + int(row[VALID_CELL_VERTEX])
-    kept[k + BLOCK * VERTEX_X] = float(t.vert[vertex, 0])
-    kept[k + BLOCK * VERTEX_Y] = float(t.vert[vertex, 1])
-    _keep_ring(k, away2, rules.real[b], kept)
-    _keep_axis(k, net, lane, t, kept)
-    _keep_strip(b, n, lane, t, rules, memory)
-    kept[k + BLOCK * TOP_SO_FAR] = memory.measure[b, n, TOP]
+    block.valid_low_x[k] = max(cell.low_x, x - half)
+    block.valid_high_x[k] = min(cell.high_x, x + half)
+    block.valid_low_y[k] = max(cell.low_y, y - half)
+    block.valid_high_y[k] = min(cell.high_y, y + half)
+    block.top_so_far[k] = car.top
+    _keep_ring(block, k, away2, own)
 
 
 @jit_inline
-def trust_fork(n: int, x: float, y: float, surely: float, kept: Floats) -> None:
-    """Keep that the nearest road is the same up to `surely` metres from (x, y), along x and along y."""
-    k = place(n)
-    kept[k + BLOCK * FORK_X] = x
-    kept[k + BLOCK * FORK_Y] = y
-    kept[k + BLOCK * FORK_SURE] = surely
+def trust_fork(block: Kept, n: int, x: float, y: float, surely: float) -> None:
+    """Keep that the nearest road of car n is the same up to `surely` metres from (x, y), along x and along y."""
+    k = n & (BLOCK - 1)
+    block.fork_x[k] = x
+    block.fork_y[k] = y
+    block.fork_sure[k] = surely
 
 
 @jit_inline
-def _keep_ring(k: int, away2: float, real: Floats, kept: Floats) -> None:
+def _keep_ring(block: Kept, k: int, away2: float, own: TrialRules) -> None:
     """Keep between which squared distances of its vertex a car is at `away2`: of its discs, and who approaches it."""
     low = -1.0
     high = FARTHEST * FARTHEST
-    outer2 = max(real[STOP2], real[QUEUE2])
-    for edge2 in (real[RADIUS] * real[RADIUS], real[CROSS2], outer2):
+    outer2 = max(own.stop2, own.queue2)
+    for edge2 in (own.radius * own.radius, own.cross2, outer2):
         if edge2 <= away2:
             low = max(low, edge2)
         else:
             high = min(high, edge2)
-    kept[k + BLOCK * RING_LOW] = low
-    kept[k + BLOCK * RING_HIGH] = high
+    block.ring_low[k] = low
+    block.ring_high[k] = high
 
 
 @jit_inline
-def _keep_axis(k: int, net: int, lane: int, t: RoadTable, kept: Floats) -> None:
-    """Keep the segment along which a car makes progress, as `roads.lookup.lane_coordinates` measures it."""
+def keep_lane(
+    block: Kept, n: int, lane: int, vertex: int, lateral: float, t: RoadTable, own: TrialRules
+) -> None:
+    """Keep the vertex of car n, the segment along which it makes progress, and how far aside its labels are the same.
+
+    `lateral` is its lateral offset in `lane` (-1: none), metres. Progress is measured as
+    `roads.lookup.lane_coordinates` does.
+    """
+    k = n & (BLOCK - 1)
+    net = own.net
+    place = t.vert_off[net] + vertex
+    block.vertex_x[k] = float(t.vert[place, 0])
+    block.vertex_y[k] = float(t.vert[place, 1])
     row = t.seg_off[net] + (max(lane, 0) >> 1)
+    length = t.seg[row, 4]
     back = lane >= 0 and lane & 1 != 0
-    kept[k + BLOCK * FROM_X] = t.seg[row, 0]
-    kept[k + BLOCK * FROM_Y] = t.seg[row, 1]
-    kept[k + BLOCK * AXIS_X] = t.seg[row, 2]
-    kept[k + BLOCK * AXIS_Y] = t.seg[row, 3]
-    kept[k + BLOCK * BASE] = t.seg[row, 4] if back else 0.0
-    kept[k + BLOCK * SIGN] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    block.from_x[k] = t.seg[row, 0]
+    block.from_y[k] = t.seg[row, 1]
+    block.axis_x[k] = t.seg[row, 2]
+    block.axis_y[k] = t.seg[row, 3]
+    block.base[k] = length if back else 0.0
+    block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    _keep_strip(block, k, lane, lateral, length, t.half_width[net], own)
 
 
 @jit_inline
-def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memory: Memory) -> None:
-    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds."""
-    net: int = rules.whole[b, NET]
-    kept = memory.kept[b]
+def _keep_strip(
+    block: Kept, k: int, lane: int, lateral: float, length: float, half: float, own: TrialRules
+) -> None:
+    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds.
+
+    The segment is `length` metres long and its road reaches `half` metres to each side.
+    """
     low = begin = -HUGE
     high = end = HUGE
     if lane >= 0:
-        half = t.half_width[net]
         back = lane & 1 != 0
-        lateral = memory.measure[b, n, LATERAL]
         aside = -lateral if back else lateral
         if abs(aside) <= half:
             low = CERTAIN - half
@@ -342,7 +318,7 @@ def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memor
             low = half + CERTAIN
         else:
             high = -half - CERTAIN
-        most = rules.real[b, LEFT_SET] - rules.real[b, ROUNDING] - CERTAIN
+        most = own.left_set - own.rounding - CERTAIN
         if lateral >= most:
             low = high
         elif back:
@@ -350,9 +326,8 @@ def _keep_strip(b: int, n: int, lane: int, t: RoadTable, rules: RuleTable, memor
         else:
             high = min(high, most)
         begin = CERTAIN
-        end = t.seg[t.seg_off[net] + (lane >> 1), 4] - CERTAIN
-    k = place(n)
-    kept[k + BLOCK * ASIDE_LOW] = low
-    kept[k + BLOCK * ASIDE_HIGH] = high
-    kept[k + BLOCK * ALONG_LOW] = begin
-    kept[k + BLOCK * ALONG_HIGH] = end
+        end = length - CERTAIN
+    block.aside_low[k] = low
+    block.aside_high[k] = high
+    block.along_low[k] = begin
+    block.along_high[k] = end

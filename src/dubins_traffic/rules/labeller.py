@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from dubins_traffic.cars.state import NONE, Contact, Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.table import RoadTable, pack_distinct
 from dubins_traffic.rules.fault import with_fault
@@ -19,22 +18,7 @@ from dubins_traffic.rules.judged import Judged, Posed, kinds_of
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import STOPPED
-from dubins_traffic.rules.tables import (
-    FORFEITS,
-    JUDGED3,
-    LATERAL,
-    LINGER_TICKS,
-    NET,
-    PROGRESS,
-    RANK,
-    REACH,
-    STAND_TICKS,
-    STOP_TICKS,
-    TICKET,
-    Memory,
-    RuleTable,
-    pack_rules,
-)
+from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules, pack_rules, spread
 
 SLACK = 1e-9
 """Metres by which rounding may fall short of a demand on the roads."""
@@ -68,25 +52,20 @@ class Labeller:
         self._roads, nets = pack_distinct(networks, [problem.car.lane_width for problem in problems])
         kinds, index = kinds_of(problems)
         parameters = [RuleParameters.from_mapping(problem.rules) for problem in kinds]
-        table = pack_rules(
+        rules = pack_rules(
             parameters,
             [problem.intersection_radius for problem in kinds],
             [problem.rate for problem in kinds],
             pack_cars([problem.car for problem in kinds]),
         )
-        self._rules = RuleTable(table.real[index], table.whole[index])
-        self._rules.whole[:, NET] = nets
-        self._rules.whole[:, JUDGED3] = _judged3(problems, parameters, index)
+        self._rules = spread(rules, index)
+        self._rules["net"][:] = nets
+        self._rules["judged3"][:] = _judged3(problems, parameters, index)
         obstacles = pack_obstacles([problem.obstacles for problem in problems])
         self._obstacles = place_obstacles(obstacles, self._roads, nets)
         self._heads = max(2 * len(network.segments) + len(network.points) for network in networks)
         self._tick = -1
-        self._state: State | None = None
-        self._call: Callable[[int], object] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the call that is bound to these arrays: a copy binds its own."""
-        return {**vars(self), "_state": None, "_call": None}
+        self._tables: LabelTables | None = None
 
     def reset(self, state: State) -> Labels:
         """Label frame 0; the returned labels are the labeller's own, updated in place by `update`."""
@@ -97,12 +76,11 @@ class Labeller:
 
     def begin(self, trials: int, cars: int) -> None:
         """Forget everything: labels and memory are as before the first frame of `trials` x `cars` cars."""
-        depth = int(self._rules.whole[:, [STOP_TICKS, STAND_TICKS]].max()) + 1
-        linger = max(1, int(self._rules.whole[:, LINGER_TICKS].max()))
+        depth = int(max(self._rules["stop_ticks"].max(), self._rules["stand_ticks"].max())) + 1
+        linger = max(1, int(self._rules["linger_ticks"].max()))
         self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
         self.labels = Labels.zeros(trials, cars)
-        self._arrays = (*self._roads, *self._obstacles, *self._rules, *self.labels, *self.memory)
-        self._state = None
+        self._tables = None
         self._tick = -1
 
     def update(
@@ -128,46 +106,48 @@ class Labeller:
         return judged
 
     @property
-    def tables(self) -> tuple[RoadTable, ObstacleLanes, RuleTable]:
+    def tables(self) -> tuple[RoadTable, ObstacleLanes, Rows[TrialRules]]:
         """The roads, obstacles and rules of the batch, as the kernels of this room read them."""
         return self._roads, self._obstacles, self._rules
 
     @property
     def progress(self) -> Floats:
         """s: progress of the centres along their lane states, metres, (B, N); 0 without lane state."""
-        return self.memory.measure[:, :, PROGRESS]
+        return self.memory.car["progress"]
 
     @property
     def lateral(self) -> Floats:
         """l: lateral offset of the centres, left positive, metres, (B, N); 0 without lane state."""
-        return self.memory.measure[:, :, LATERAL]
+        return self.memory.car["lateral"]
 
     @property
     def reach(self) -> Floats:
         """Largest lateral coordinate of the bodies, metres, (B, N); 0 without lane state."""
-        return self.memory.measure[:, :, REACH]
+        return self.memory.car["reach"]
 
     @property
     def tickets(self) -> Ints:
         """Ticks of the cars' tickets, (B, N); -1 for a car that has not stopped at a crossing."""
-        return np.where(self.labels.bits & STOPPED, self.memory.mark[:, :, TICKET], NONE)
+        return np.where(self.labels.bits & STOPPED, self.memory.car["ticket"], NONE)
 
     @property
     def forfeits(self) -> Ints:
         """New tickets of the cars in their present wait, (B, N)."""
-        return np.where(self.labels.bits & STOPPED, self.memory.mark[:, :, FORFEITS], 0)
+        return np.where(self.labels.bits & STOPPED, self.memory.car["forfeits"], 0)
 
     @property
     def places(self) -> Ints:
         """Places of the cars in the order of the crossing ahead, 0 first, (B, N); -1 without a ticket."""
-        return self.memory.mark[:, :, RANK]
+        return self.memory.car["rank"]
+
+    def seeing(self, state: State) -> LabelTables:
+        """Return all that `label_frame` takes, of a batch in this state."""
+        if self._tables is None or self._tables.state is not state:
+            self._tables = LabelTables(state, *self.tables, self.labels, self.memory)
+        return self._tables
 
     def _label(self, state: State) -> None:
-        call = self._call
-        if call is None or state is not self._state:
-            self._state = state
-            call = self._call = bound(label_frame, (0,), (*state, *self._arrays))
-        call(self._tick)
+        label_frame(self._tick, self.seeing(state))
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction
 from dubins_traffic.roads.table import RoadTable
@@ -31,20 +32,38 @@ def lane_away(t: RoadTable, net: int, v: int, x: float, y: float) -> int:
 
 
 @jit_inline
-def lane_state(
-    t: RoadTable,
-    net: int,
-    at: int,
-    at_before: int,
-    lane: int,
-    top: float,
-    segment: int,
-    off2: float,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    turn_back: float,
+def lane_here(
+    t: RoadTable, net: int, at_before: int, lane: int, segment: int, off2: float, pose: Pose
+) -> tuple[int, bool]:
+    """Return the lane that a car outside the discs is on, and whether its lane state is set anew by that.
+
+    Parameters
+    ----------
+    t, net
+        The roads.
+    at_before
+        Vertex whose disc held the centre in the frame before; -1 for none.
+    lane
+        Lane state of the frame before (-1: none). At the start neither `at_before` nor `lane` is set.
+    segment, off2
+        Nearest segment, and the squared distance from it, square metres.
+    pose
+        Where the car is.
+    """
+    if at_before >= 0:
+        return lane_away(t, net, at_before, pose.x, pose.y), True
+    if lane < 0:
+        return lane_by_heading(t, net, segment, pose.c, pose.s), True
+    half2 = t.half_width[net] * t.half_width[net]
+    elsewhere = segment != lane // 2 and off2 <= half2
+    if elsewhere and distance2(t, net, lane // 2, pose.x, pose.y) > half2:
+        return lane_by_heading(t, net, segment, pose.c, pose.s), True
+    return lane, False
+
+
+@jit_inline
+def along_lane(
+    t: RoadTable, net: int, lane: int, fresh: bool, top: float, turn_back: float, pose: Pose
 ) -> tuple[int, float, float, float, bool]:
     """Return the new lane state: (lane, greatest progress, progress, lateral offset, whether it flipped).
 
@@ -52,37 +71,20 @@ def lane_state(
     ----------
     t, net
         The roads.
-    at, at_before
-        Vertices whose discs hold the centre in this frame and the one before; -1 for none.
-    lane, top
-        Lane state of the frame before (-1: none) and the greatest progress since it was set. At the start neither
-        `at_before` nor `lane` is set.
-    segment, off2
-        Nearest segment, and the squared distance from it.
-    x, y, c, s
-        The pose.
+    lane, fresh
+        As `lane_here` returns them.
+    top
+        The greatest progress since the lane state was set, metres.
     turn_back
         Metres of progress lost that make a turn.
+    pose
+        Where the car is.
     """
-    if at >= 0:
-        return -1, 0.0, 0.0, 0.0, False
-    fresh = True
-    if at_before >= 0:
-        lane = lane_away(t, net, at_before, x, y)
-    elif lane < 0:
-        lane = lane_by_heading(t, net, segment, c, s)
-    else:
-        half2 = t.half_width[net] * t.half_width[net]
-        elsewhere = segment != lane // 2 and off2 <= half2
-        if elsewhere and distance2(t, net, lane // 2, x, y) > half2:
-            lane = lane_by_heading(t, net, segment, c, s)
-        else:
-            fresh = False
-    progress, lateral = lane_coordinates(t, net, lane, x, y)
+    progress, lateral = lane_coordinates(t, net, lane, pose.x, pose.y)
     if fresh or progress > top:
         return lane, progress, progress, lateral, False
     if top - progress < turn_back:
         return lane, top, progress, lateral, False
     lane = lane ^ 1
-    progress, lateral = lane_coordinates(t, net, lane, x, y)
+    progress, lateral = lane_coordinates(t, net, lane, pose.x, pose.y)
     return lane, progress, progress, lateral, True

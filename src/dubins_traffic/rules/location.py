@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
+    ValidCell,
     distance2,
     lane_direction,
     lane_end,
@@ -22,8 +24,18 @@ from dubins_traffic.roads.lookup import (
     vertex_distance2,
 )
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.label_cache import FARTHEST, KEPT, hold, lingers, note_growth, still, trust_fork
-from dubins_traffic.rules.lane_state import lane_state
+from dubins_traffic.rules.label_cache import (
+    FARTHEST,
+    KEPT,
+    growth_row,
+    hold,
+    keep_lane,
+    lingers,
+    note_growth,
+    still,
+    trust_fork,
+)
+from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import (
     AHEAD,
     BREACH3,
@@ -36,214 +48,148 @@ from dubins_traffic.rules.propositions import (
     TURNED,
 )
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
-from dubins_traffic.rules.tables import (
-    APPROACH_SINCE,
-    CROSS2,
-    CROSSERS,
-    CROSSING_DEGREE,
-    GAP2,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    JUDGED3,
-    LANE,
-    LATERAL,
-    NET,
-    NEXT_IN_LANE,
-    NOW,
-    PROGRESS,
-    QUEUE2,
-    RADIUS,
-    REACH,
-    ROUNDING,
-    STOP2,
-    TOP,
-    TURN_BACK,
-    VALID_CELL_HIGH_X,
-    VALID_CELL_HIGH_Y,
-    VALID_CELL_LOW_X,
-    VALID_CELL_LOW_Y,
-    VALID_CELL_SEGMENT,
-    VALID_CELL_VERTEX,
-    WAIT_SINCE,
-    ZONE,
-    Memory,
-    RuleTable,
-)
+from dubins_traffic.rules.tables import CarMemory, Heads, LabelTables, Memory, TrialRules
 
 RULE3 = STOPPED | CLEAR | AHEAD
 
 
 @jit_inline
-def locate(
-    b: int, n: int, tick: int, state: State, t: RoadTable, rules: RuleTable, labels: Labels, memory: Memory
-) -> bool:
-    """Find segment, disc and lane state of a car, whether it was still and lingers; enter it in the lists.
+def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
+    """Find segment, disc and lane state of car n of trial b, whether it was still and lingers; enter it in the lists.
 
     Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them. Tells whether the car
     crosses another vertex than before, or one or none for the first time.
     """
-    real = rules.real
-    net: int = rules.whole[b, NET]
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    half_length, half_width = real[b, HALF_LENGTH], real[b, HALF_WIDTH]
-    v, segment, off2, surely = _look_up(
-        net, x, y, sqrt(real[b, CROSS2]) + half_length + half_width, t, memory.valid_cell[b, n]
-    )
-    away2 = vertex_distance2(t, net, v, x, y)
-    at = v if away2 < real[b, RADIUS] * real[b, RADIUS] else -1
-    round_body = half_length + half_width == 0.0
-    body2 = away2
-    if not round_body:
-        body2 = distance2_to_vertex(t, net, v, x, y, c, s, half_length, half_width)
-    crosses = v if body2 < real[b, CROSS2] else -1
+    state, t, labels, memory = tables.state, tables.roads, tables.labels, tables.memory
+    own, car, cell, block = tables.rules[b], memory.car[b, n], memory.cell[b, n], memory.kept[b, n // BLOCK]
+    net = own.net
+    pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
+    half_road = t.half_width[net]
+    segment, off2, surely = _look_up(pose.x, pose.y, t, own, cell)
+    v = cell.vertex
+    away2 = vertex_distance2(t, net, v, pose.x, pose.y)
+    at = v if away2 < own.radius * own.radius else -1
+    round_body = own.half_length + own.half_width == 0.0
+    body2 = away2 if round_body else _distance2_to_vertex(t, own, v, pose)
+    crosses = v if body2 < own.cross2 else -1
 
     before = np.int64(labels.bits[b, n])
-    bits = before & KEPT
-    lane_before = labels.lane[b, n]
-    lane, top, progress, lateral, turned = lane_state(
-        t,
-        net,
-        at,
-        labels.at[b, n],
-        lane_before,
-        memory.measure[b, n, TOP],
-        segment,
-        off2,
-        x,
-        y,
-        c,
-        s,
-        real[b, TURN_BACK],
-    )
-    bits = _entry(b, tick, t, rules, crosses, labels.crosses[b, n], lane_before, before, bits)
-    if off2 <= t.half_width[net] * t.half_width[net]:
+    lane_before, crossed = labels.lane[b, n], labels.crosses[b, n]
+    lane = -1
+    turned = False
+    if at >= 0:
+        car.top = car.progress = car.lateral = 0.0
+    else:
+        lane, fresh = lane_here(t, net, labels.at[b, n], lane_before, segment, off2, pose)
+        lane, car.top, car.progress, car.lateral, turned = along_lane(
+            t, net, lane, fresh, car.top, own.turn_back, pose
+        )
+    bits = _entry(tick, t, own, crosses, crossed, lane_before, before)
+    if off2 <= half_road * half_road:
         bits |= ON_ROAD
     if turned:
         bits |= TURNED
     if lane != lane_before:
         bits &= ~STOPPED
-        memory.mark[b, n, APPROACH_SINCE] = -1
-        memory.mark[b, n, WAIT_SINCE] = -1
-        _change_lists(b, n, lane_before, lane, memory)
-    stirs = _change_crossing(b, int(labels.crosses[b, n]), crosses, memory)
+        car.approach_since = -1
+        car.wait_since = -1
+        _change_lists(n, lane_before, lane, memory.car[b], memory.head[b])
     labels.segment[b, n] = segment
     labels.at[b, n] = at
     labels.crosses[b, n] = crosses
     labels.lane[b, n] = lane
-    note_growth(b, n, tick, lane, lane != lane_before, top, rules, memory)
-    labels.bits[b, n] = bits | still(b, n, memory) | lingers(b, n, memory)
+    note_growth(block, n, tick, lane, lane != lane_before, car.top, own)
+    memory.growth[b, growth_row(tick, own), n] = car.top
+    labels.bits[b, n] = bits | still(block, n) | lingers(block, n)
 
-    measure = memory.measure[b, n]
-    measure[TOP] = top
-    measure[PROGRESS] = progress
-    measure[LATERAL] = lateral
-    spare = _reach(b, n, x, y, c, s, v, lane, lateral, t, rules, memory)
+    spare = _reach(car, pose, v, lane, t, own)
     if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
     if lane < 0:
-        spare = min(spare, abs(sqrt(off2) - t.half_width[net]))
-    hold(b, n, x, y, away2, lane, spare, t, rules, memory)
-    trust_fork(n, x, y, surely, memory.kept[b])
-    return stirs
+        spare = min(spare, abs(sqrt(off2) - half_road))
+    keep_lane(block, n, lane, v, car.lateral, t, own)
+    hold(block, n, away2, spare, cell, car, own)
+    trust_fork(block, n, pose.x, pose.y, surely)
+    return _change_crossing(crossed, crosses, memory.head[b])
 
 
 @jit_inline
-def _look_up(
-    net: int, x: float, y: float, radius: float, t: RoadTable, row: Floats
-) -> tuple[int, int, float, float]:
-    """Return (vertex, segment, off2, surely): the nearest of each, by the valid_cell in `row`, which is renewed if
-    need be.
+def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell) -> tuple[int, float, float]:
+    """Return (segment, off2, surely) of the nearest segment, by `cell`, which is renewed if need be.
 
-    The vertex is the nearest one if any is within `radius` metres. off2 is the squared distance from the segment, which
-    is the nearest for `surely` metres along x and along y, as long as the valid_cell holds.
+    `cell.vertex` is the nearest vertex if the body, or the disc about it, may meet its disc. off2 is the squared
+    distance from the segment, which is the nearest for `surely` metres along x and along y, as long as `cell` holds.
     """
-    if not (
-        row[VALID_CELL_LOW_X] < x < row[VALID_CELL_HIGH_X]
-        and row[VALID_CELL_LOW_Y] < y < row[VALID_CELL_HIGH_Y]
-    ):
-        valid_cell(t, net, x, y, radius, row)
-    v = int(row[VALID_CELL_VERTEX])
-    segment = int(row[VALID_CELL_SEGMENT])
+    net = own.net
+    if not (cell.low_x < x < cell.high_x and cell.low_y < y < cell.high_y):
+        valid_cell(t, net, x, y, sqrt(own.cross2) + own.half_length + own.half_width, cell)
+    segment = cell.segment
     if segment >= 0:
-        return v, segment, distance2(t, net, segment, x, y), FARTHEST
-    segment, off2, surely = nearest_arm(t, net, v, x, y)
-    return v, segment, off2, surely
+        return segment, distance2(t, net, segment, x, y), FARTHEST
+    return nearest_arm(t, net, cell.vertex, x, y)
 
 
 @jit_inline
-def _reach(
-    b: int, n: int, x: float, y: float, c: float, s: float, v: int, lane: int, lateral: float, t: RoadTable,
-    rules: RuleTable, memory: Memory,
-) -> float:  # fmt: skip
+def _reach(car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: TrialRules) -> float:
     """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
 
     Returns metres that a round body may move before it comes to where cars approach and queue, if the crossing is not
     v, the nearest vertex; 0 where it is there.
     """
-    net: int = rules.whole[b, NET]
-    real = rules.real[b]
-    half_length, half_width = real[HALF_LENGTH], real[HALF_WIDTH]
-    round_body = half_length + half_width == 0.0
+    net = own.net
+    round_body = own.half_length + own.half_width == 0.0
     reach = 0.0
     gap2 = -1.0
     zone = 0
     spare = FARTHEST
     if lane >= 0:
-        half = real[ROUNDING]
+        half = own.rounding
         if not round_body:
             tx, ty = lane_direction(t, net, lane)
-            half = half_extent(tx, ty, c, s, half_length, half_width, half)
-        reach = lateral + half
+            half = half_extent(tx, ty, pose.c, pose.s, own.half_length, own.half_width, half)
+        reach = car.lateral + half
         end = lane_end(t, net, lane)
-        if t.degree[t.vert_off[net] + end] >= rules.whole[b, CROSSING_DEGREE]:
-            gap2 = vertex_distance2(t, net, end, x, y)
+        if t.degree[t.vert_off[net] + end] >= own.crossing_degree:
+            gap2 = vertex_distance2(t, net, end, pose.x, pose.y)
             if not round_body:
-                gap2 = distance2_to_vertex(t, net, end, x, y, c, s, half_length, half_width)
-            outer2 = max(real[STOP2], real[QUEUE2])
+                gap2 = _distance2_to_vertex(t, own, end, pose)
+            outer2 = max(own.stop2, own.queue2)
             if end != v:
                 spare = max(sqrt(gap2) - sqrt(outer2), 0.0)
-            zone = 1 if real[CROSS2] <= gap2 <= outer2 else 0
-    memory.measure[b, n, REACH] = reach
-    memory.measure[b, n, GAP2] = gap2
-    memory.mark[b, n, ZONE] = zone
+            zone = 1 if own.cross2 <= gap2 <= outer2 else 0
+    car.reach = reach
+    car.gap2 = gap2
+    car.zone = zone
     return spare
 
 
 @jit_inline
-def distance2_to_vertex(
-    t: RoadTable, net: int, v: int, x: float, y: float, c: float, s: float, half_length: float, half_width: float
-) -> float:  # fmt: skip
+def _distance2_to_vertex(t: RoadTable, own: TrialRules, v: int, pose: Pose) -> float:
     """Return the squared distance of an intersection from a body without its rounding."""
-    row = t.vert_off[net] + v
-    return distance2_to_body(
-        float(t.vert[row, 0]), float(t.vert[row, 1]), x, y, c, s, half_length, half_width
-    )
+    row = t.vert_off[own.net] + v
+    px, py = float(t.vert[row, 0]), float(t.vert[row, 1])
+    return distance2_to_body(px, py, pose.x, pose.y, pose.c, pose.s, own.half_length, own.half_width)
 
 
 @jit_inline
 def _entry(
-    b: int,
-    tick: int,
-    t: RoadTable,
-    rules: RuleTable,
-    crosses: int,
-    crossed: int,
-    lane_before: int,
-    before: Any,
-    bits: Any,
+    tick: int, t: RoadTable, own: TrialRules, crosses: int, crossed: int, lane_before: int, before: Any
 ) -> Any:
-    """Return `bits` with the flags of the disc that the body meets; an entry is judged on the flags `before`."""
+    """Return the flags that hold on of those of the frame `before`, and those of the disc that the body meets.
+
+    The body meets the disc of vertex `crosses` and met that of `crossed`, -1 for none; an entry is judged by `before`.
+    """
+    bits = before & KEPT
     if crosses < 0:
         return bits & ~BREACH3
-    net: int = rules.whole[b, NET]
-    crossing = t.degree[t.vert_off[net] + crosses] >= rules.whole[b, CROSSING_DEGREE]
+    crossing = t.degree[t.vert_off[own.net] + crosses] >= own.crossing_degree
     if crosses != crossed:
         bits &= ~BREACH3
         if tick > 0:
             bits |= ENTERED
-        if crossing and tick > 0 and rules.whole[b, JUDGED3] != 0:
+        if crossing and tick > 0 and own.judged3 != 0:
             rightly = before & RULE3 == STOPPED | CLEAR
-            if not (rightly and lane_end(t, net, lane_before) == crosses):
+            if not (rightly and lane_end(t, own.net, lane_before) == crosses):
                 bits |= BREACH3
     if crossing:
         bits |= IN_CROSSING
@@ -251,71 +197,67 @@ def _entry(
 
 
 @jit_inline
-def moved2(b: int, n: int, tick: int, x: float, y: float, ago: int, memory: Memory) -> float:
+def moved2(b: int, n: int, tick: int, ago: int, x: float, y: float, memory: Memory) -> float:
     """Return the squared distance of the centre (x, y) from where it was `ago` ticks before; huge before that."""
     if tick < ago:
         return 1e300
-    trail = memory.trail
-    then = memory.head[b, 0, NOW] - ago
-    if then < 0:
-        then += trail.shape[1]
-    dx = x - trail[b, then, 0, n]
-    dy = y - trail[b, then, 1, n]
+    then = (tick - ago) % memory.trail_x.shape[1]
+    dx = x - memory.trail_x[b, then, n]
+    dy = y - memory.trail_y[b, then, n]
     return dx * dx + dy * dy
 
 
 @jit_inline
-def _change_crossing(b: int, crossed: int, crosses: int, memory: Memory) -> bool:
+def _change_crossing(crossed: int, crosses: int, head: Rows[Heads]) -> bool:
     """Count a car that crosses another vertex, or one or none for the first time; tell whether it does."""
     if crosses == crossed:
         return False
     if crossed >= 0:
-        memory.head[b, crossed, CROSSERS] -= 1
+        head[crossed].crossers -= 1
     if crosses >= 0:
-        memory.head[b, crosses, CROSSERS] += 1
+        head[crosses].crossers += 1
     return True
 
 
 @jit
-def _change_lists(b: int, n: int, before: int, lane: int, memory: Memory) -> None:
+def _change_lists(n: int, before: int, lane: int, cars: Rows[CarMemory], head: Rows[Heads]) -> None:
     """Take car n from the list of the lane `before` to that of `lane`; -1 for none."""
-    link = memory.link[b]
     if before >= 0:
-        other = memory.head[b, before, LANE]
+        other = head[before].lane
         if other == n:
-            memory.head[b, before, LANE] = link[n, NEXT_IN_LANE]
+            head[before].lane = cars[n].next_in_lane
         else:
-            while link[other, NEXT_IN_LANE] != n:
-                other = link[other, NEXT_IN_LANE]
-            link[other, NEXT_IN_LANE] = link[n, NEXT_IN_LANE]
+            while cars[other].next_in_lane != n:
+                other = cars[other].next_in_lane
+            cars[other].next_in_lane = cars[n].next_in_lane
     if lane >= 0:
-        link[n, NEXT_IN_LANE] = memory.head[b, lane, LANE]
-        memory.head[b, lane, LANE] = n
+        cars[n].next_in_lane = head[lane].lane
+        head[lane].lane = n
 
 
 @jit
-def put_in_order(b: int, lane: int, memory: Memory) -> None:
-    """Bring the list of the cars of a lane into order, foremost first."""
-    n = memory.head[b, lane, LANE]
-    memory.head[b, lane, LANE] = -1
+def put_in_order(first: Heads, cars: Rows[CarMemory]) -> None:
+    """Bring the list of the cars (N,) of a lane that begins with `first.lane` into order, foremost first."""
+    n = first.lane
+    first.lane = -1
     while n >= 0:
-        following = memory.link[b, n, NEXT_IN_LANE]
-        _enter_in_lane(b, n, lane, memory)
+        following = cars[n].next_in_lane
+        _enter_in_lane(n, first, cars)
         n = following
 
 
 @jit_inline
-def _enter_in_lane(b: int, n: int, lane: int, memory: Memory) -> None:
+def _enter_in_lane(n: int, first: Heads, cars: Rows[CarMemory]) -> None:
     """Put car n into the list of its lane, foremost first."""
-    link, measure = memory.link[b], memory.measure[b]
-    progress = measure[n, PROGRESS]
-    behind = memory.head[b, lane, LANE]
+    car = cars[n]
+    progress = car.progress
+    behind = first.lane
     ahead = -1
-    while behind >= 0 and measure[behind, PROGRESS] > progress:
+    while behind >= 0 and cars[behind].progress > progress:
         ahead = behind
-        behind = link[behind, NEXT_IN_LANE]
-    link[n, NEXT_IN_LANE] = behind
+        behind = cars[behind].next_in_lane
+    car.next_in_lane = behind
     if ahead < 0:
-        memory.head[b, lane, LANE] = n
+        first.lane = n
     else:
-        link[ahead, NEXT_IN_LANE] = n
+        cars[ahead].next_in_lane = n

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, cast
 
 import numpy as np
-import numpy.typing as npt
 
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 
 
-class ObstacleLanes(NamedTuple):
+@record
+class ObstaclePart:
+    """A part of an obstacle beside a segment: the line between two ends, grown by a rounding; metres."""
+
+    s0: float
+    l0: float
+    s1: float
+    l1: float
+    """Metres along the segment, in its first direction, and to the left of its centre line, of the two ends."""
+    rounding: float
+    owner: int
+    """Number of the obstacle."""
+
+
+class ObstacleLanes(Tables):
     """Parts of obstacles by segment.
 
     Attributes
@@ -21,66 +36,61 @@ class ObstacleLanes(NamedTuple):
         Where the segments of trial b begin in `start`; -1 for a trial without obstacles.
     start : int64
         Parts of segment s of trial b are those from start[base[b] + s] to start[base[b] + s + 1] - 1.
-    part : (P, 5) float64
-        Ends (s0, l0), (s1, l1) in the segment's first direction, and rounding; metres. Parts of one obstacle
-        follow each other.
-    owner : (P,) int64
-        Number of the obstacle.
+    part : (P,) ObstaclePart
+        Parts of one obstacle follow each other.
     """
 
     base: Ints
     start: Ints
-    part: Floats
-    owner: Ints
+    part: Rows[ObstaclePart]
 
 
-def place_obstacles(table: ObstacleTable, roads: RoadTable, nets: Ints) -> ObstacleLanes:
-    """Return the parts of obstacles beside each segment, of those obstacles that reach 2w of its centre line."""
-    if not len(table.part):
+def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> ObstacleLanes:
+    """Return the parts of obstacles beside each segment, of those obstacles that reach 2w of its centre line.
+
+    `nets` (B,) are the numbers of the trials' road networks.
+    """
+    if not len(obstacles.part):
         none = np.full(len(nets), -1, dtype=np.int64)
-        return ObstacleLanes(none, np.zeros(1, np.int64), np.zeros((0, 5)), np.zeros(0, np.int64))
+        return ObstacleLanes(none, np.zeros(1, np.int64), table(ObstaclePart, 0))
     base: list[int] = []
     start: list[int] = [0]
-    parts: list[Floats] = []
-    owners: list[Ints] = []
+    parts: list[Any] = []
     for b, net in enumerate(nets):
-        own = slice(int(table.off[b]), int(table.off[b + 1]))
+        own = slice(int(obstacles.off[b]), int(obstacles.off[b + 1]))
         if own.start == own.stop:
             base.append(-1)
             continue
         base.append(len(start) - 1)
         for segment in roads.seg[roads.seg_off[net] : roads.seg_off[net + 1]]:
             part, reaches = _on_segment(
-                table.part[own], table.owner[own], segment, float(roads.half_width[net])
+                obstacles.part[own], obstacles.owner[own], segment, float(roads.half_width[net])
             )
             parts.append(part[reaches])
-            owners.append(table.owner[own][reaches])
             start.append(start[-1] + int(reaches.sum()))
-    return ObstacleLanes(
-        np.array(base, dtype=np.int64),
-        np.array(start, dtype=np.int64),
-        np.concatenate([np.zeros((0, 5)), *parts]),
-        np.concatenate([np.zeros(0, dtype=np.int64), *owners]),
-    )
+    rows = table(ObstaclePart, start[-1])
+    cast(Any, rows)[:] = np.concatenate(parts)
+    return ObstacleLanes(np.array(base, dtype=np.int64), np.array(start, dtype=np.int64), rows)
 
 
-def _on_segment(
-    part: Floats, owner: Ints, segment: Floats, half_width: float
-) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _on_segment(part: Floats, owner: Ints, segment: Floats, half_width: float) -> tuple[Any, Any]:
+    """Return the parts (P,) in the coordinates of a segment, and which of them are beside it."""
     x, y, c, s, half_length, _, rounding, _ = part.T
     ax, ay, tx, ty, length = segment[:5]
-    rows = np.empty((len(part), 5))
-    for column, sign in ((0, -1.0), (2, 1.0)):
+    rows: Any = table(ObstaclePart, len(part))
+    for along, left, sign in (("s0", "l0", -1.0), ("s1", "l1", 1.0)):
         px = x + sign * half_length * c - ax
         py = y + sign * half_length * s - ay
-        rows[:, column] = px * tx + py * ty
-        rows[:, column + 1] = py * tx - px * ty
-    rows[:, 4] = rounding
-    along = np.minimum(rows[:, 0], rows[:, 2]) - rounding, np.maximum(rows[:, 0], rows[:, 2]) + rounding
-    across = np.minimum(rows[:, 1], rows[:, 3]) - rounding, np.maximum(rows[:, 1], rows[:, 3]) + rounding
-    reaches = (along[1] >= 0.0) & (along[0] <= length)
+        rows[along] = px * tx + py * ty
+        rows[left] = py * tx - px * ty
+    rows["rounding"] = rounding
+    rows["owner"] = owner
+    ends = np.stack([rows["s0"], rows["s1"]]), np.stack([rows["l0"], rows["l1"]])
+    begin, end = ends[0].min(axis=0) - rounding, ends[0].max(axis=0) + rounding
+    right, left = ends[1].min(axis=0) - rounding, ends[1].max(axis=0) + rounding
+    reaches = (end >= 0.0) & (begin <= length)
     for number in np.unique(owner[reaches]):
         own = reaches & (owner == number)
-        if across[1][own].max() <= -half_width or across[0][own].min() >= half_width:
+        if left[own].max() <= -half_width or right[own].min() >= half_width:
             reaches[own] = False
     return rows, reaches

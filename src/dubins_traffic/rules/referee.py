@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -15,26 +14,15 @@ from dubins_traffic.cars.near import unknown
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
+from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
-    AT_TICK,
-    AT_VERTEX,
     COLLISION,
-    EXIT_COUNTS,
-    EXIT_PAUSED,
-    EXIT_SINCE,
-    EXIT_TICKS,
     FAULT,
-    FIRST_SINCE,
-    LEFT_SINCE,
-    OF_CAR,
-    OF_RULE,
-    OF_TRIAL,
-    ON_LANE,
-    REST_SINCE,
     RULES,
-    SINCE_TICK,
     BreachLog,
+    FoundBreach,
     RefereeParameters,
+    RefereeTables,
     pack_terms,
 )
 from dubins_traffic.rules.duties import find_ways
@@ -43,9 +31,15 @@ from dubins_traffic.rules.judged import Judged, Posed, kinds_of
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
+from dubins_traffic.rules.tables import spread
 
-_PENDING = (("2.return", LEFT_SINCE), ("E3.enter", FIRST_SINCE), ("E4", EXIT_COUNTS), ("E5", REST_SINCE))
-_CLOCKS = [clock for _, clock in _PENDING]
+_PENDING = (
+    ("2.return", "left_since"),
+    ("E3.enter", "first_since"),
+    ("E4", "exit_counts"),
+    ("E5", "rest_since"),
+)
+"""Rules that will be broken if all stays as it is, and the clocks of `JudgedCar` that run then."""
 _ROOMY = 64
 """For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
 
@@ -114,18 +108,20 @@ class Referee:
         problems = [instance.problem for instance in instances]
         self._own = labeller is None
         self._labeller = labeller or Labeller(instances)
-        self._terms = terms_of(problems)
+        self._terms, self._goals = terms_of(problems)
         self._judged = [bool(problem.rules) for problem in problems]
         self._roads, self._obstacles, self._rules = self._labeller.tables
         self._state: State | None = None
+        self._tables: RefereeTables | None = None
 
     def reset(self, state: State) -> Sequence[Sequence[Breach]]:
         """Judge frame 0; return the breaches of each trial, in order."""
         if self._own:
             self._labeller.reset(state)
         trials, cars = state.x.shape
-        self._docket = BreachLog.empty(trials, cars, len(self._terms.goal))
+        self._log = BreachLog.empty(trials, cars, self._goals)
         self._spacing = unknown(trials, cars)
+        self._tables = None
         self._judge(0, state)
         return self._collect(state, [()] * trials)
 
@@ -177,7 +173,7 @@ class Referee:
     @property
     def running(self) -> Sequence[Pending]:
         """What hangs over the cars of each trial."""
-        return running(np.arange(len(self._judged)), self._terms, self._docket)
+        return running(np.arange(len(self._judged)), self._terms, self._log)
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:
@@ -185,56 +181,41 @@ class Referee:
 
         Of shape (B, N).
         """
-        return self._docket.clock[:, :, EXIT_COUNTS] >= 0
+        return self._log.car["exit_counts"] >= 0
 
     @property
     def stays(self) -> npt.NDArray[np.bool_]:
         """Which e-agents have been in a disc with a free exit for longer than they may (E4), (B, N)."""
-        clock = self._docket.clock
-        long = self._tick - clock[:, :, EXIT_SINCE] - clock[:, :, EXIT_PAUSED]
-        return (clock[:, :, EXIT_SINCE] >= 0) & (long >= self._terms.whole[:, EXIT_TICKS, None])
+        since, paused = self._log.car["exit_since"], self._log.car["exit_paused"]
+        return (since >= 0) & (self._tick - since - paused >= self._terms["exit_ticks"][:, None])
 
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, of these poses."""
         found = np.zeros(state.x.shape, dtype=np.bool_)
-        own = self._labeller
-        find_ways(
-            self._tick,
-            self._spacing,
-            state,
-            self._roads,
-            self._obstacles,
-            self._rules,
-            self._terms,
-            own.labels,
-            own.memory,
-            self._docket,
-            found,
-        )
+        find_ways(self._tick, self._seeing(state), found)
         return found
+
+    def _seeing(self, state: State) -> RefereeTables:
+        if self._tables is None or self._tables.state is not state:
+            own = self._labeller
+            self._tables = RefereeTables(
+                state, self._roads, self._obstacles, self._rules, self._terms, own.labels, own.memory, self._log,
+                self._spacing,
+            )  # fmt: skip
+        return self._tables
 
     def _judge(self, tick: int, state: State) -> None:
         self._tick = tick
-        own = self._labeller
-        tables = (
-            self._roads,
-            self._obstacles,
-            self._rules,
-            self._terms,
-            own.labels,
-            own.memory,
-            self._docket,
-            self._spacing,
-        )
-        judge_frame(tick, *state, *chain.from_iterable(tables))
+        judge_frame(tick, self._seeing(state))
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
-        if not self._docket.filled[0] and not any(contacts):
+        if not self._log.filled[0] and not any(contacts):
             return [()] * len(self._judged)
         by_trial: dict[int, list[Breach]] = {}
-        for row in self._found():
-            b, n = row[OF_TRIAL], row[OF_CAR]
+        for row in self._log.found():
+            b, n = int(row.trial), int(row.car)
             by_trial.setdefault(b, []).append(breach_of(row, float(state.x[b, n]), float(state.y[b, n])))
+        self._log.filled[0] = 0
         for b, own in enumerate(contacts):
             if own and self._judged[b]:
                 by_trial.setdefault(b, []).extend(accused(own))
@@ -249,74 +230,58 @@ class Referee:
         own = self._labeller
         if frames.first == 0:
             self._state = State.zeros(1, cars)
-            self._docket = BreachLog.empty(1, cars, len(self._terms.goal), _ROOMY)
+            self._log = BreachLog.empty(1, cars, self._goals, _ROOMY)
             self._spacing = unknown(1, cars)
             self._next = 0
             own.begin(1, cars)
+            self._tables = None
         if self._state is None or frames.first != self._next:
             raise ValueError(f"frames must follow one another: got {frames.first}, and none before it")
         self._next += len(frames)
-        poses = np.stack([frames.x, frames.y, frames.c, frames.s])
+        columns = (frames.x, frames.y, frames.c, frames.s, frames.speed, frames.yaw_rate)
+        x, y, c, s, speed, yaw_rate = (np.ascontiguousarray(column) for column in columns)
+        poses = State(x, y, c, s, speed, yaw_rate, self._state.count)
         before = own.labels.bits[0].copy()
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []
-        room = self._docket.room_of_a_frame
+        room = self._log.room_of_a_frame
+        labelling, judging = own.seeing(self._state), self._seeing(self._state)
         done = 0
         while done < len(frames):
-            done = judge_frames(
-                frames.first,
-                done,
-                room,
-                poses,
-                bits,
-                self._state,
-                self._roads,
-                self._obstacles,
-                self._rules,
-                self._terms,
-                own.labels,
-                own.memory,
-                self._docket,
-                self._spacing,
-            )
-            for row in self._found():
-                f, n = row[AT_TICK] - frames.first, row[OF_CAR]
+            done = judge_frames(frames.first, done, room, poses, bits, labelling, judging)
+            for row in self._log.found():
+                f, n = int(row.tick) - frames.first, int(row.car)
                 breaches.append(breach_of(row, float(frames.x[f, n]), float(frames.y[f, n])))
+            self._log.filled[0] = 0
         return before, bits, breaches
 
-    def _found(self) -> list[list[int]]:
-        """Empty the breach_log; return the rows that were in it."""
-        breach_log = self._docket
-        rows: list[list[int]] = breach_log.row[: breach_log.filled[0]].tolist()
-        breach_log.filled[0] = 0
-        return rows
 
-
-def terms_of(problems: Sequence[WithGoals]) -> RefereeParameters:
-    """Return the terms by which the trials of some problems are judged."""
+def terms_of(problems: Sequence[WithGoals]) -> tuple[Rows[RefereeParameters], Ints]:
+    """Return the terms by which the trials of some problems are judged, (B,), and the vertices of their goals, (G,)."""
     kinds, index = kinds_of(problems)
-    real, whole = pack_terms(
+    kind_terms = pack_terms(
         [RuleParameters.from_mapping(problem.rules) for problem in kinds],
         [bool(problem.rules) for problem in kinds],
         [problem.intersection_radius for problem in kinds],
         [problem.rate for problem in kinds],
         pack_cars([problem.car for problem in kinds]),
     )
-    goal_off, goal = [0], list[int]()
+    terms = spread(kind_terms, index)
+    ends, goals = [0], list[int]()
     for problem in problems:
-        goal += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
-        goal_off.append(len(goal))
-    return RefereeParameters(
-        real[index], whole[index], np.array(goal_off, dtype=np.int64), np.array(goal, dtype=np.int64)
-    )
+        goals += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
+        ends.append(len(goals))
+    terms["goals_begin"][:] = ends[:-1]
+    terms["goals_end"][:] = ends[1:]
+    return terms, np.array(goals, dtype=np.int64)
 
 
-def running(trials: Ints, terms: RefereeParameters, breach_log: BreachLog) -> list[Pending]:
+def running(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog) -> list[Pending]:
     """Return what hangs over the cars of some trials."""
-    runs = breach_log.clock[trials][:, :, _CLOCKS] >= 0
-    goal: list[bool] = (breach_log.goal_clock >= 0).tolist()
-    off: list[int] = terms.goal_off.tolist()
-    taken = [any(goal[off[b] : off[b + 1]]) for b in trials.tolist()]
+    runs = np.stack([breach_log.car[clock][trials] >= 0 for _, clock in _PENDING], axis=-1)
+    goal: list[bool] = (breach_log.goal["since"] >= 0).tolist()
+    begins, ends = terms["goals_begin"].tolist(), terms["goals_end"].tolist()
+    taken = [any(goal[begins[b] : ends[b]]) for b in trials.tolist()]
     egos: list[list[bool]] = runs[:, EGO].tolist()
     others: list[list[bool]] = np.logical_or.reduce(runs[:, EGO + 1 :], axis=1).tolist()
     return [
@@ -335,11 +300,10 @@ def _named(runs: Sequence[bool]) -> frozenset[str]:
     return frozenset(rule for (rule, _), run in zip(_PENDING, runs, strict=True) if run)
 
 
-def breach_of(row: Sequence[int], x: float, y: float) -> Breach:
-    """Return the breach in a row of the breach_log, of a car at (x, y)."""
-    return Breach(
-        RULES[row[OF_RULE]], row[OF_CAR], row[AT_TICK], row[SINCE_TICK], x, y, row[AT_VERTEX], row[ON_LANE]
-    )
+def breach_of(found: FoundBreach, x: float, y: float) -> Breach:
+    """Return a breach of the log, of a car at (x, y)."""
+    car, tick, since = int(found.car), int(found.tick), int(found.since)
+    return Breach(RULES[found.rule], car, tick, since, x, y, int(found.vertex), int(found.lane))
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:

@@ -4,93 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
+from dubins_traffic.kernels.columns import columns
+from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.lookup import ValidCell
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.obstacles import ObstacleLanes
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.parameters import RuleParameters
 
-RADIUS: Final = 0
-HALF_LENGTH: Final = 1
-HALF_WIDTH: Final = 2
-ROUNDING: Final = 3
-LANE_WIDTH: Final = 4
-FREE_NEEDED: Final = 5
-TURN_BACK: Final = 6
-LEFT_SET: Final = 7
-LEFT_RELEASE: Final = 8
-CROSS2: Final = 9
-APPROACH2: Final = 10
-QUEUE2: Final = 11
-STOP_MOVE2: Final = 12
-STAND_MOVE2: Final = 13
-EXCUSE: Final = 14
-BLOCKED_AHEAD: Final = 15
-OVERTAKING_BEHIND: Final = 16
-OVERTAKING_AHEAD: Final = 17
-STOP2: Final = 18
-LINGER_GROWTH: Final = 19
-REALS: Final = 20
-
-NET: Final = 0
-STOP_TICKS: Final = 1
-STAND_TICKS: Final = 2
-GROUP_TICKS: Final = 3
-FORFEIT_TICKS: Final = 4
-CROSSING_DEGREE: Final = 5
-JUDGED3: Final = 6
-LINGER_TICKS: Final = 7
-WHOLES: Final = 8
-
-TOP: Final = 0
-PROGRESS: Final = 1
-LATERAL: Final = 2
-REACH: Final = 3
-GAP2: Final = 4
-MEASURES: Final = 5
-
-APPROACH_SINCE: Final = 0
-TICKET: Final = 1
-FORFEITS: Final = 2
-FIRST_SINCE: Final = 3
-RANK: Final = 4
-ZONE: Final = 5
-WAIT_SINCE: Final = 6
-MARKS: Final = 7
-
-NEXT_IN_LANE: Final = 0
-NEXT_ON_SEGMENT: Final = 1
-NEXT_IN_QUEUE: Final = 2
-MEMBER: Final = 3
-GROUP: Final = 4
-DUE: Final = 5
-LINKS: Final = 6
-
-LANE: Final = 0
-SEGMENT: Final = 1
-QUEUE: Final = 2
-CROSSERS: Final = 3
-NOW: Final = 4
-HEADS: Final = 5
-
-VALID_CELL_LOW_X: Final = 0
-VALID_CELL_HIGH_X: Final = 1
-VALID_CELL_LOW_Y: Final = 2
-VALID_CELL_HIGH_Y: Final = 3
-VALID_CELL_SEGMENT: Final = 4
-VALID_CELL_VERTEX: Final = 5
-VALID_CELL: Final = 6
-
-VALID_LOW_X, VALID_HIGH_X, VALID_LOW_Y, VALID_HIGH_Y, VERTEX_X, VERTEX_Y, RING_LOW, RING_HIGH = range(8)
-FROM_X, FROM_Y, AXIS_X, AXIS_Y, BASE, SIGN, TOP_SO_FAR, FORK_X, FORK_Y, FORK_SURE = range(8, 18)
-ASIDE_LOW, ASIDE_HIGH, ALONG_LOW, ALONG_HIGH = range(18, 22)
-HERE_X, HERE_Y, THEN_X, THEN_Y, AWAY2, WAY_SO_FAR, HOLDS, WAS_STILL = range(22, 30)
-TOP_THEN, LINGERS_FROM, WAS_LINGERING = range(30, 33)
-CALM: Final = 33
+R = TypeVar("R")
 
 GRAIN = 1e-9
 """Metres by which limits that a judgement compares are eased for the car that would be in breach.
@@ -102,89 +33,220 @@ NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
 
 
-class RuleTable(NamedTuple):
-    """The rules of each trial: `real` (B, REALS) float64 and `whole` (B, WHOLES) int64, columns as named above.
+@record
+class TrialRules:
+    """The rules of one trial: metres, but for those that end in 2, square metres, and those that end in ticks."""
 
-    `CROSS2`, `APPROACH2`, `STOP2` and `QUEUE2` are squared distances of the body, without its rounding, from a vertex:
-    nearer it meets the disc, and up to there it approaches, may stop, or keeps its place.
+    radius: float
+    """R, of the intersections' discs."""
+    half_length: float
+    half_width: float
+    rounding: float
+    """With the two before: the body of the cars, a rounded box."""
+    lane_width: float
+    free_needed: float
+    """How much of a right lane must be free for it not to be blocked."""
+    turn_back: float
+    """How far progress falls before a lane state flips."""
+    left_set: float
+    left_release: float
+    cross2: float
+    """Squared distance of the body, without its rounding, from a vertex, nearer than which it meets the disc."""
+    approach2: float
+    """As `cross2`: up to there it approaches."""
+    stop2: float
+    """As `cross2`: up to there it may stop."""
+    queue2: float
+    """As `cross2`: up to there it keeps its place."""
+    stop_move2: float
+    """Squared distance up to which a car has moved that has stopped."""
+    stand_move2: float
+    """Squared distance up to which a car has moved that is still."""
+    excuse: float
+    blocked_ahead: float
+    overtaking_behind: float
+    overtaking_ahead: float
+    linger_growth: float
+    """A car whose greatest progress has grown by less in `linger_ticks` lingers."""
+    net: int
+    """Number of the trial's roads in the table of the batch."""
+    stop_ticks: int
+    stand_ticks: int
+    group_ticks: int
+    forfeit_ticks: int
+    linger_ticks: int
+    crossing_degree: int
+    """Least degree of a vertex that is a crossing."""
+    judged3: int
+    """Whether entries against rule 3 count."""
+
+
+@record
+class CarMemory:
+    """What the propositions remember of one car: metres in its lane state, 0 without one; ticks, -1: there is none."""
+
+    top: float
+    """Greatest progress since the lane state was set."""
+    progress: float
+    """s, of the centre."""
+    lateral: float
+    """l, of the centre, left positive."""
+    reach: float
+    """Largest lateral coordinate of the body."""
+    gap2: float
+    """Squared distance of the body, without its rounding, from the crossing ahead, -1 if there is none."""
+    approach_since: int = -1
+    """First tick of the present run of approach."""
+    ticket: int = -1
+    """Tick of the ticket."""
+    forfeits: int = 0
+    """New tickets in this wait."""
+    first_since: int = -1
+    """First tick of the present run of being first at a clear crossing."""
+    wait_since: int = -1
+    """Tick of the first stop in this wait."""
+    rank: int = -1
+    """Place in the order of the crossing ahead, 0 first; -1 without a ticket."""
+    zone: int = -1
+    """Whether it is where cars approach and queue, 0 or 1; -1 before the first frame."""
+    next_in_lane: int = -1
+    next_on_segment: int = -1
+    next_in_queue: int = -1
+    """The car after this one in the list of its lane, its segment, its queue; -1: none. All but the first: scratch."""
+    in_group: int = 0
+    """Scratch: whether its ticket has come into a group while a queue is put in order."""
+
+
+@record
+class Heads:
+    """The first cars of lists, -1: none. Row k: of lane k, of segment k, of the queue at vertex k."""
+
+    lane: int = -1
+    segment: int = -1
+    """Scratch."""
+    queue: int = -1
+    """Scratch."""
+    crossers: int = 0
+    """How many cars cross vertex k."""
+
+
+@columns(BLOCK)
+class Kept:
+    """Of BLOCK cars, number by number: where what a car's place says is the same, and what is found of it in a frame.
+
+    The loop over the cars of `rules.label_cache.look_who_holds` reads and writes these columns several cars at once.
     """
 
-    real: Floats
-    whole: Ints
+    valid_low_x: Floats
+    valid_high_x: Floats
+    valid_low_y: Floats
+    valid_high_y: Floats
+    """A rectangle in which labels are the same, as far as the nearest segment is."""
+    vertex_x: Floats
+    vertex_y: Floats
+    ring_low: Floats
+    ring_high: Floats
+    """They are so, too, at squared distances from a vertex between these two only."""
+    from_x: Floats
+    from_y: Floats
+    axis_x: Floats
+    axis_y: Floats
+    base: Floats
+    sign: Floats
+    """How far a car is in its lane: `base` and `sign` times the metres from a point along an axis."""
+    top_so_far: Floats
+    """The most of that so far."""
+    fork_x: Floats
+    fork_y: Floats
+    fork_sure: Floats
+    """Where the nearest road is the same: up to so many metres from a point, along x and along y."""
+    aside_low: Floats
+    aside_high: Floats
+    along_low: Floats
+    along_high: Floats
+    """Between which metres to the left of the axis, and along it, a car is on the road and not left as it is now."""
+    here_x: Floats
+    here_y: Floats
+    then_x: Floats
+    then_y: Floats
+    """Where it is in this frame and where it was `stand_time` ago."""
+    away2: Floats
+    """Its squared distance from the vertex."""
+    way_so_far: Floats
+    """Its progress."""
+    holds: Floats
+    """Whether it holds on to its labels: 0, 1, or `rules.label_cache.IF_NEAREST`."""
+    was_still: Floats
+    top_then: Floats
+    """The greatest progress `linger_time` ago."""
+    lingers_from: Floats
+    """The tick from which on that says whether the car lingers."""
+    was_lingering: Floats
 
 
-class Memory(NamedTuple):
+class Memory(Tables):
     """What the propositions remember, all of it explicit.
 
     Attributes
     ----------
-    measure : (B, N, MEASURES) float64
-        Greatest progress since the lane state was set (`TOP`), progress s and lateral offset l of the centre
-        (`PROGRESS`, `LATERAL`), largest lateral coordinate of the body (`REACH`), all metres in the lane state
-        and 0 without one; squared distance of the body, without its rounding, from the crossing ahead (`GAP2`,
-        -1 if there is none).
-    mark : (B, N, MARKS) int64
-        First tick of the present run of approach (`APPROACH_SINCE`), tick of the ticket (`TICKET`), new tickets
-        in this wait (`FORFEITS`), first tick of the present run of being first at a clear crossing
-        (`FIRST_SINCE`) and place in the order (`RANK`, 0 first); -1 (forfeits: 0) where there is none;
-        whether it is where cars approach and queue (`ZONE`, else 0); tick of the first stop in this wait
-        (`WAIT_SINCE`, -1: none).
-    valid_cell : (B, N, VALID_CELL) float64
-        A rectangle about the place where the centre was last looked up, in which nearest segment (-1: one of those
-        that meet in the nearest vertex) and vertex (`VALID_CELL_SEGMENT`, `VALID_CELL_VERTEX`) are the same for
-        certain; empty before.
-    kept : (B, C) float64
-        Columns of BLOCK cars each, see `rules.label_cache.place`. Where all that a place says is the same, as far as
-        the nearest segment is: within a rectangle (`VALID_LOW_X` to `VALID_HIGH_Y`), and at squared distances from a
-        vertex (`VERTEX_X`, `VERTEX_Y`) between `RING_LOW` and `RING_HIGH`. How far a car is in its lane: `BASE` and
-        `SIGN` times the metres from (`FROM_X`, `FROM_Y`) along (`AXIS_X`, `AXIS_Y`), and the most of that so far;
-        between which metres to the left of that axis, and along it, it is on the road and not left as it is now.
-        Where the nearest road is the same: up to `FORK_SURE` metres from (`FORK_X`, `FORK_Y`), along x and along y.
-        Of this frame: where the car is and was `stand_time` ago, its squared distance from the vertex, its progress,
-        whether it holds on to its labels, and whether it was still. The greatest progress `linger_time` ago
-        (`TOP_THEN`), the tick from which on that says whether the car lingers (`LINGERS_FROM`), and whether it does.
-    trail : (B, M, 2, N) float64
-        Positions at the last M ticks, tick k in row k mod M.
+    car : (B, N) CarMemory
+        What is remembered of each car.
+    cell : (B, N) ValidCell
+        A rectangle about the place where the centre was last looked up, in which nearest segment and vertex are the
+        same for certain.
+    kept : (B, ceil(N / BLOCK)) Kept
+        Where labels are the same for certain, in columns: car n is number n % BLOCK of block n // BLOCK.
+    trail_x, trail_y : (B, M, N) float64
+        Positions at the last M ticks, metres, tick k in row k mod M.
     growth : (B, L, P) float64
-        `TOP` of the cars, in P places, a multiple of WIDE, at the last ticks, as many as `linger_time` has in the
+        `top` of the cars, in P places, a multiple of WIDE, at the last ticks, as many as `linger_time` has in the
         trial: tick k in row k mod that number.
-    link : (B, N, LINKS) int64
-        The cars of one lane, in any order, segment and queue as linked lists; members and groups of a queue; which cars
-        are to be looked at in this frame, in order (`DUE`). All but the lists of the lanes is scratch.
-    head : (B, H, HEADS) int64
-        The first car of each lane, segment, queue (-1: none), and how many cars cross a vertex; in the first row, which
-        row of `trail` is the present one (`NOW`). Segments and queues are scratch.
+    head : (B, H) Heads
+        Where the lists of cars begin.
+    due : (B, N) int64
+        Scratch: which cars are to be looked at in this frame, in order.
+    member : (B, N) int64
+        Scratch: the members of a queue, lowest index first.
     """
 
-    measure: Floats
-    mark: Ints
-    valid_cell: Floats
-    kept: Floats
-    trail: Floats
+    car: Grid[CarMemory]
+    cell: Grid[ValidCell]
+    kept: Grid[Kept]
+    trail_x: Floats
+    trail_y: Floats
     growth: Floats
-    link: Ints
-    head: Ints
+    head: Grid[Heads]
+    due: Ints
+    member: Ints
 
     @staticmethod
     def empty(trials: int, cars: int, depth: int, heads: int, linger: int) -> Memory:
         """Return the memory of `trials` x `cars` cars before their first frame.
 
-        `depth` and `linger` are the rows of `trail` and `growth`, `heads` those of `head`.
+        `depth` and `linger` are the rows of `trail_x` and `growth`, `heads` those of `head`.
         """
-        mark = np.full((trials, cars, MARKS), -1, dtype=np.int64)
-        mark[:, :, FORFEITS] = 0
-        head = np.full((trials, heads, HEADS), -1, dtype=np.int64)
-        head[:, :, CROSSERS] = 0
         return Memory(
-            np.zeros((trials, cars, MEASURES)),
-            mark,
-            np.zeros((trials, cars, VALID_CELL)),
-            np.zeros((trials, -(-cars // BLOCK) * BLOCK * CALM)),
-            np.zeros((trials, depth, 2, cars)),
-            np.zeros((trials, linger, -(-cars // WIDE) * WIDE)),
-            np.full((trials, cars, LINKS), -1, dtype=np.int64),
-            head,
+            car=table(CarMemory, (trials, cars)),
+            cell=table(ValidCell, (trials, cars)),
+            kept=table(Kept, (trials, -(-cars // BLOCK))),
+            trail_x=np.zeros((trials, depth, cars)),
+            trail_y=np.zeros((trials, depth, cars)),
+            growth=np.zeros((trials, linger, -(-cars // WIDE) * WIDE)),
+            head=table(Heads, (trials, heads)),
+            due=np.zeros((trials, cars), dtype=np.int64),
+            member=np.zeros((trials, cars), dtype=np.int64),
         )
+
+
+class LabelTables(Tables):
+    """All that labels of a batch are found from, and the labels: what `rules.frame.label_frame` takes."""
+
+    state: State
+    roads: RoadTable
+    obstacles: ObstacleLanes
+    rules: Rows[TrialRules]
+    labels: Labels
+    memory: Memory
 
 
 def ticks(duration: float, rate: float) -> int:
@@ -192,13 +254,18 @@ def ticks(duration: float, rate: float) -> int:
     return math.ceil(duration * rate - 1e-9)
 
 
+def spread(rows: Rows[R], index: Ints) -> Rows[R]:
+    """Return the rows of these numbers, (B,), as a table of their own."""
+    return cast(Any, rows)[index]
+
+
 def pack_rules(
     parameters: Sequence[RuleParameters],
     radii: Sequence[float],
     rates: Sequence[float],
     cars: CarTable,
-) -> RuleTable:
-    """Return the rules of each trial as a table; `NET` and `JUDGED3` are left to fill in.
+) -> Rows[TrialRules]:
+    """Return the rules of each trial as a table; `net` and `judged3` are left to fill in.
 
     Parameters
     ----------
@@ -207,41 +274,41 @@ def pack_rules(
     cars
         The car of each trial.
     """
-    real = np.zeros((len(parameters), REALS))
-    whole = np.zeros((len(parameters), WHOLES), dtype=np.int64)
-    for b, (own, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
+    rules = table(TrialRules, len(parameters))
+    for b, (given, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
+        own = rules[b]
         rounding = float(cars.rounding[b])
         width = 2.0 * (float(cars.half_width[b]) + rounding)
         cross = radius + rounding
-        approach = cross + own.approach_distance
-        queue = cross + own.queue_distance + GRAIN
-        stop = own.still_speed * own.stop_time + GRAIN
-        stand = own.still_speed * own.stand_time + GRAIN
-        linger = ticks(own.linger_time, rate)
-        real[b, RADIUS] = radius
-        real[b, HALF_LENGTH] = cars.half_length[b]
-        real[b, HALF_WIDTH] = cars.half_width[b]
-        real[b, ROUNDING] = rounding
-        real[b, LANE_WIDTH] = 2.0 * cars.w[b]
-        real[b, FREE_NEEDED] = width + own.blocked_gap
-        real[b, TURN_BACK] = own.turn_back
-        real[b, LEFT_SET] = own.left_set
-        real[b, LEFT_RELEASE] = own.left_release
-        real[b, CROSS2] = cross * cross
-        real[b, APPROACH2] = approach * approach
-        real[b, STOP2] = (approach + GRAIN) * (approach + GRAIN)
-        real[b, QUEUE2] = queue * queue
-        real[b, STOP_MOVE2] = stop * stop
-        real[b, STAND_MOVE2] = stand * stand
-        real[b, EXCUSE] = own.excuse_distance
-        real[b, BLOCKED_AHEAD] = own.blocked_ahead
-        real[b, OVERTAKING_BEHIND] = own.overtaking_behind
-        real[b, OVERTAKING_AHEAD] = own.overtaking_ahead
-        real[b, LINGER_GROWTH] = (own.linger_distance - GRAIN) * (1.0 if linger > 0 else NEVER_AGAIN)
-        whole[b, STOP_TICKS] = ticks(own.stop_time, rate)
-        whole[b, STAND_TICKS] = ticks(own.stand_time, rate)
-        whole[b, GROUP_TICKS] = ticks(own.group_time, rate)
-        whole[b, FORFEIT_TICKS] = ticks(own.forfeit_time, rate)
-        whole[b, CROSSING_DEGREE] = own.crossing_degree
-        whole[b, LINGER_TICKS] = linger
-    return RuleTable(real, whole)
+        approach = cross + given.approach_distance
+        queue = cross + given.queue_distance + GRAIN
+        stop = given.still_speed * given.stop_time + GRAIN
+        stand = given.still_speed * given.stand_time + GRAIN
+        linger = ticks(given.linger_time, rate)
+        own.radius = radius
+        own.half_length = float(cars.half_length[b])
+        own.half_width = float(cars.half_width[b])
+        own.rounding = rounding
+        own.lane_width = 2.0 * float(cars.w[b])
+        own.free_needed = width + given.blocked_gap
+        own.turn_back = given.turn_back
+        own.left_set = given.left_set
+        own.left_release = given.left_release
+        own.cross2 = cross * cross
+        own.approach2 = approach * approach
+        own.stop2 = (approach + GRAIN) * (approach + GRAIN)
+        own.queue2 = queue * queue
+        own.stop_move2 = stop * stop
+        own.stand_move2 = stand * stand
+        own.excuse = given.excuse_distance
+        own.blocked_ahead = given.blocked_ahead
+        own.overtaking_behind = given.overtaking_behind
+        own.overtaking_ahead = given.overtaking_ahead
+        own.linger_growth = (given.linger_distance - GRAIN) * (1.0 if linger > 0 else NEVER_AGAIN)
+        own.stop_ticks = ticks(given.stop_time, rate)
+        own.stand_ticks = ticks(given.stand_time, rate)
+        own.group_ticks = ticks(given.group_time, rate)
+        own.forfeit_ticks = ticks(given.forfeit_time, rate)
+        own.linger_ticks = linger
+        own.crossing_degree = given.crossing_degree
+    return rules

@@ -11,6 +11,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
@@ -18,7 +19,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.clearance import Clearance
 
 MEASURED: Final = ("1.road", "2.left", "2.return")
-"""The rules whose margins `find_margins` finds, in the order of its columns."""
+"""The rules whose margins `find_margins` finds, in the order of `EgoMargins`."""
 
 
 class Margins:
@@ -59,27 +60,31 @@ class Margins:
         if not count:
             return margins_by_rule(gap, [math.inf] * len(MEASURED))
         # compiles; only where there is something to measure
-        from dubins_traffic.scoring.margins_kernel import find_margins, margin_table
+        from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginTables, find_margins, margin_rules
 
         problem = self._problem
         rules = RuleParameters.from_mapping(problem.rules)
-        found = np.empty((1, len(MEASURED)))
+        found = table(EgoMargins, 1)
         only = np.zeros(1, dtype=np.int64)
+        tables = MarginTables(
+            rules=margin_rules([rules], [problem.period], only),
+            roads=pack([problem.network], [problem.car.lane_width]),
+            cars=pack_cars([problem.car]),
+            signal=np.zeros(count),
+        )
         find_margins(
             only,
             np.array([count]),
             np.concatenate(self._poses)[None],
             np.concatenate(self._marks)[None],
             only,
-            pack([problem.network], [problem.car.lane_width]),
-            pack_cars([problem.car]),
-            margin_table([rules], [problem.period], only, count),
+            tables,
             found,
         )
-        return margins_by_rule(gap, found[0].tolist())
+        return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back])
 
 
 def margins_by_rule(gap: float | None, found: Sequence[float]) -> dict[str, float | None]:
-    """Return the margins by the rules' names, given the smallest gap and a row of what `find_margins` finds."""
+    """Return the margins by the rules' names, given the smallest gap and what `find_margins` finds, in order."""
     named = zip(MEASURED, found, strict=True)
     return {"1.collision": gap} | {rule: value if math.isfinite(value) else None for rule, value in named}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
 from dubins_traffic.roads.table import RoadTable
@@ -17,75 +18,88 @@ from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dubins_traffic.cars.tables import CarTable
     from dubins_traffic.rules.parameters import RuleParameters
 
 INFINITE = float("inf")
-LEFT_SET, LEFT_RELEASE = 0, 1
-ROAD: Final = 0
-LINE: Final = 1
-RETURN: Final = 2
-MARGINS: Final = 3
-"""Columns of what is found: the margins of 1.road, 2.left and 2.return."""
 
 
-class MarginTable(NamedTuple):
-    """What the margins of each trial depend on.
+@record
+class MarginRules:
+    """What the margins of one trial depend on."""
 
-    `line` (B, 2): where `left` rises and where it falls, metres; `window` (B,): ticks within which the ego must be
-    back; `signal` (F,): scratch for the longest trial.
-    """
+    left_set: float
+    left_release: float
+    """Where `left` rises and where it falls, metres."""
+    window: int
+    """Ticks within which the ego must be back."""
 
-    line: Floats
-    window: Ints
+
+@record
+class EgoMargins:
+    """What is found of one trial, metres; infinite where nothing could break the rule."""
+
+    road: float
+    line: float
+    back: float
+    """The margins of 1.road, 2.left and 2.return."""
+
+
+class MarginTables(Tables):
+    """What the margins of a batch are found from: `rules` (B,), `roads` and `cars`; `signal` (F,) is scratch."""
+
+    rules: Rows[MarginRules]
+    roads: RoadTable
+    cars: CarTable
     signal: Floats
 
 
-def margin_table(
-    rules: Sequence[RuleParameters], periods: Sequence[float], index: Ints, frames: int
-) -> MarginTable:
-    """Return the table of trials of up to `frames` frames; trial b has the rules and the period of number index[b]."""
-    line = np.array([(own.left_set, own.left_release) for own in rules], dtype=np.float64)
-    window = [ticks(own.left_time, period) for own, period in zip(rules, periods, strict=True)]
-    return MarginTable(
-        line[index],
-        np.array(window, dtype=np.int64)[index],
-        np.zeros(frames),
-    )
+def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], index: Ints) -> Rows[MarginRules]:
+    """Return what the margins of trials depend on; trial b has the rules and the period (s) of number index[b]."""
+    found: Any = table(MarginRules, len(index))
+    numbers: list[int] = index.tolist()
+    found["left_set"] = [rules[k].left_set for k in numbers]
+    found["left_release"] = [rules[k].left_release for k in numbers]
+    found["window"] = [ticks(rules[k].left_time, periods[k]) for k in numbers]
+    return found
 
 
 @jit
 def find_margins(
-    trials: Ints, frames: Ints, pose: Floats, mark: Ints, nets: Ints, roads: RoadTable, cars: CarTable,
-    table: MarginTable, found: Floats,
-) -> None:  # fmt: skip
-    """Write the margins of some trials into `found` (B, MARGINS); infinite where nothing could break a rule.
+    trials: Ints,
+    frames: Ints,
+    pose: Floats,
+    mark: Ints,
+    nets: Ints,
+    tables: MarginTables,
+    found: Rows[EgoMargins],
+) -> None:
+    """Write the margins of some trials into `found` (B,).
 
     Parameters
     ----------
     trials, frames : (K,)
         Which trials, and how many frames each has.
     pose : (B, F, 4)
-        x, y, cosine and sine of the ego.
+        x, y, cosine and sine of the ego; metres.
     mark : (B, F, 2)
         Its flags and lane state.
     nets : (B,)
         Number of each trial's road network.
-    roads, cars, table
-        The tables of all trials.
-    found : (B, MARGINS)
+    tables
+        The tables of all trials; `signal` has room for the frames of any.
+    found : (B,)
         Written to.
     """
     for k in range(trials.shape[0]):
-        b = trials[k]
-        _find_margin(b, frames[k], pose[b], mark[b], nets[b], roads, cars, table, found[b])
+        b: int = trials[k]
+        _find_margin(b, frames[k], pose[b], mark[b], nets[b], tables, found[b])
 
 
 @jit
 def _find_margin(
-    b: Any, frames: Any, pose: Floats, mark: Ints, net: Any, roads: RoadTable, cars: CarTable, table: MarginTable,
-    found: Floats,
-) -> None:  # fmt: skip
+    b: int, frames: Any, pose: Floats, mark: Ints, net: Any, tables: MarginTables, found: EgoMargins
+) -> None:
+    roads, signal = tables.roads, tables.signal
     half_road = roads.half_width[net]
     begun = False
     line = INFINITE
@@ -99,20 +113,19 @@ def _find_margin(
         if begun and distance2(roads, net, segment, x, y) > farthest:
             segment, square = nearest_segment(roads, net, x, y)
             farthest = max(farthest, square)
-        right = -_beyond(b, pose[f], mark[f], net, roads, cars, table)
-        table.signal[f] = right
+        right = -_beyond(b, pose[f], mark[f], net, tables)
+        signal[f] = right
         if bits & OVERTAKING == 0:
             line = min(line, right)
-    found[ROAD] = half_road - sqrt(farthest) if begun else INFINITE
-    found[LINE] = line
-    found[RETURN] = _least_of_greatest(table.signal, frames, table.window[b])
+    found.road = float(half_road) - sqrt(farthest) if begun else INFINITE
+    found.line = line
+    found.back = _least_of_greatest(signal, frames, tables.rules[b].window)
 
 
 @jit
-def _beyond(
-    b: Any, pose: Floats, mark: Ints, net: Any, roads: RoadTable, cars: CarTable, table: MarginTable
-) -> Any:
+def _beyond(b: int, pose: Floats, mark: Ints, net: Any, tables: MarginTables) -> Any:
     """Return how far the body reaches over the line that `left` looks at, metres; -inf without a lane state."""
+    roads, cars, own = tables.roads, tables.cars, tables.rules[b]
     lane = mark[1]
     if lane < 0:
         return -INFINITE
@@ -121,7 +134,7 @@ def _beyond(
     half = abs(c * ty - s * tx) * cars.half_length[b] + abs(c * tx + s * ty) * cars.half_width[b]
     _, lateral = lane_coordinates(roads, net, lane, pose[0], pose[1])
     risen = mark[0] & LEFT != 0
-    return lateral + (half + cars.rounding[b]) - table.line[b, LEFT_RELEASE if risen else LEFT_SET]
+    return lateral + (half + cars.rounding[b]) - (own.left_release if risen else own.left_set)
 
 
 @jit

@@ -11,6 +11,7 @@ import numpy as np
 from dubins_traffic.cars.state import Contact
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.parameters import RuleParameters
@@ -21,7 +22,7 @@ from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_w
 from dubins_traffic.scoring.goals import GoalVisits, Visits
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import margins_by_rule
-from dubins_traffic.scoring.margins_kernel import MARGINS, MarginTable, find_margins
+from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
 from dubins_traffic.scoring.paper import paper_score
 from dubins_traffic.scoring.score import Score, is_clean
 from dubins_traffic.scoring.tally import (
@@ -55,19 +56,28 @@ class BatchScores:
     trials, frames : (K,)
         Which trials of the batch, and how many frames each has.
     tally, margins
-        What has been counted of the batch, and the tables of `scoring.margins_kernel`.
+        What has been counted of the batch, and what its margins depend on (`scoring.margins_kernel`).
     roads, cars
         The roads and the cars of the batch.
     """
 
     def __init__(
-        self, trials: Ints, frames: Ints, tally: Tally, margins: MarginTable, roads: RoadTable, cars: CarTable
+        self,
+        trials: Ints,
+        frames: Ints,
+        tally: Tally,
+        margins: Rows[MarginRules],
+        roads: RoadTable,
+        cars: CarTable,
     ) -> None:
-        found = np.empty((len(tally.ints), MARGINS))
+        found = table(EgoMargins, len(tally.ints))
+        tables = MarginTables(margins, roads, cars, np.zeros(int(tally.pose.shape[1])))
         nets = np.ascontiguousarray(tally.ints[:, NET])
-        find_margins(trials, frames, tally.pose, tally.mark, nets, roads, cars, margins, found)
-        self._row = {b: k for k, b in enumerate(trials.tolist())}
-        self._margins: list[list[float]] = found[trials].tolist()
+        find_margins(trials, frames, tally.pose, tally.mark, nets, tables, found)
+        numbers: list[int] = trials.tolist()
+        self._row = {b: k for k, b in enumerate(numbers)}
+        margin = [found[b] for b in numbers]
+        self._margins = [(own.road, own.line, own.back) for own in margin]
         self._ints: list[list[int]] = tally.ints[trials].tolist()
         self._floats: list[list[float]] = tally.floats[trials].tolist()
         self._first: list[int] = tally.goal_off[trials].tolist()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
@@ -56,7 +57,7 @@ FARTHEST = 100.0
 """Metres beyond which it does not matter how far something is."""
 
 
-class Tally(NamedTuple):
+class Tally(Tables):
     """What is counted of each trial.
 
     `ints` (B, INTS), `floats` (B, FLOATS); `goal_off` (B,) and `goal` (G, GOAL_INTS): the goals of trial b from row

@@ -2,30 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
-from dubins_traffic.policies.rules.tables import (
-    DEGREE,
-    DISC,
-    FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    OVER,
-    PERIOD,
-    REACH,
-    ROUNDING,
-    SLOWEST,
-    TIGHTEST,
-    YAW_MOST,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD, may_hit, motion_is_safe
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
@@ -34,8 +16,7 @@ from dubins_traffic.roads.lookup import (
     nearest_segment,
     nearest_vertex,
 )
-from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.lane_state import lane_state
+from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.tables import (
@@ -43,15 +24,12 @@ from dubins_traffic.shield.tables import (
     CONTACT,
     EGO,
     LANE,
-    LEFT_RELEASE,
     NOTHING,
     ORDER,
     RETURN,
     ROAD,
     STOP,
-    TOP,
     TURN,
-    TURN_BACK,
     Guards,
 )
 
@@ -64,28 +42,28 @@ TURNING = 0.01
 
 
 @jit_inline
-def bounded(speed: float, yaw_rate: float, build: Any) -> tuple[float, float]:
+def bounded(speed: float, yaw_rate: float, vehicle: Vehicle) -> tuple[float, float]:
     """Return a command as the simulator clips it."""
-    speed = min(max(speed, build[SLOWEST]), build[FASTEST])
-    most = build[YAW_MOST]
-    if build[TIGHTEST] > 0.0:
-        most = min(most, abs(speed) / build[TIGHTEST])
+    speed = min(max(speed, vehicle.slowest), vehicle.fastest)
+    most = vehicle.yaw_most
+    if vehicle.tightest > 0.0:
+        most = min(most, abs(speed) / vehicle.tightest)
     return speed, min(max(yaw_rate, -most), most)
 
 
 @jit_inline
-def travel_of(build: Any) -> float:
+def travel_of(vehicle: Vehicle) -> float:
     """Return how far any point of a car may get in a tick, metres."""
-    travel = max(build[FASTEST], -build[SLOWEST]) * build[PERIOD]
-    if build[HALF_LENGTH] > 0.0:
-        travel += build[YAW_MOST] * build[REACH] * build[PERIOD]
+    travel = max(vehicle.fastest, -vehicle.slowest) * vehicle.period
+    if vehicle.half_length > 0.0:
+        travel += vehicle.yaw_most * vehicle.reach * vehicle.period
     return travel
 
 
 @jit_inline
-def gather_close(b: int, state: State, sight2: float, build: Any, scratch: Scratch) -> int:
+def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch: Scratch) -> int:
     """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
-    far = 2.0 * (build[REACH] + 1.2 * travel_of(build)) + GUARD
+    far = 2.0 * (vehicle.reach + 1.2 * travel_of(vehicle)) + GUARD
     far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
     count = 0
     for n in range(1, state.count[b]):
@@ -98,19 +76,17 @@ def gather_close(b: int, state: State, sight2: float, build: Any, scratch: Scrat
 
 
 @jit
-def may_touch(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, obstacles: ObstacleTable, build: Any,
-    scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
     """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
 
     `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
     """
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
-    p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
-    period = build[PERIOD]
-    travel = travel_of(build)
+    p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach
+    period = vehicle.period
+    travel = travel_of(vehicle)
     own = (abs(speed) + (abs(yaw_rate) * reach if p > 0.0 else 0.0)) * period
     between = max(own / 8.0 - GUARD, 0.0)
     for k in range(near):
@@ -127,23 +103,21 @@ def may_touch(
 
 
 @jit
-def refusal(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> int:  # fmt: skip
+def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards) -> int:
     """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
 
     NOTHING if it does not: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
     the road, and has touched nothing, whatever the others did.
     """
-    build = drivers.build[b]
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, EGO])
-    turns = yaw_rate != 0.0 and build[HALF_LENGTH] > 0.0
+    turns = yaw_rate != 0.0 and vehicle.half_length > 0.0
     if speed == 0.0 and not turns:
         return RETURN if bits & LEFT != 0 else NOTHING
     net = drivers.net[b]
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
-    nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
+    nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
     segment, off2 = nearest_segment(roads, net, nx, ny)
     edge = float(roads.half_width[net]) - VERGE
     if off2 > edge * edge:
@@ -151,32 +125,28 @@ def refusal(
         if off2 >= before2:
             return ROAD
     v, away2 = nearest_vertex(roads, net, nx, ny)
-    found = _enters(b, v, nx, ny, nc, ns, state, labels, roads, drivers)
+    found = _enters(b, v, nx, ny, nc, ns, traffic)
     if found != NOTHING:
         return found
-    at = v if away2 < build[DISC] * build[DISC] else -1
-    found = _leaves_lane(
-        b, at, segment, off2, nx, ny, nc, ns, state, labels, roads, drivers, guards,
-    )  # fmt: skip
+    at = v if away2 < vehicle.disc * vehicle.disc else -1
+    found = _leaves_lane(b, at, segment, off2, nx, ny, nc, ns, traffic, guards)
     if found != NOTHING:
         return found
-    return CONTACT if may_touch(b, speed, yaw_rate, near, state, obstacles, build, scratch) else NOTHING
+    return CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else NOTHING
 
 
 @jit
-def _enters(
-    b: int, v: int, x: float, y: float, c: float, s: float, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers,
-) -> int:  # fmt: skip
+def _enters(b: int, v: int, x: float, y: float, c: float, s: float, traffic: Traffic) -> int:
     """Return which part of rule 3 an ego that goes to a pose breaks; the nearest intersection to that is v."""
-    build = drivers.build[b]
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    vehicle = drivers.vehicle[b]
     net = drivers.net[b]
     row = roads.vert_off[net] + v
-    if labels.crosses[b, EGO] == v or roads.degree[row] < build[DEGREE]:
+    if labels.crosses[b, EGO] == v or roads.degree[row] < vehicle.degree:
         return NOTHING
     vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
-    half_length, half_width = build[HALF_LENGTH], build[HALF_WIDTH]
-    edge = build[DISC] + build[ROUNDING] + BRINK
+    half_length, half_width = vehicle.half_length, vehicle.half_width
+    edge = vehicle.disc + vehicle.rounding + BRINK
     after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)
     if after2 >= edge * edge:
         return NOTHING
@@ -196,19 +166,30 @@ def _enters(
 
 @jit
 def _leaves_lane(
-    b: int, at: int, segment: int, off2: float, x: float, y: float, c: float, s: float, state: State,
-    labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards,
-) -> int:  # fmt: skip
+    b: int,
+    at: int,
+    segment: int,
+    off2: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    traffic: Traffic,
+    guards: Guards,
+) -> int:
     """Return whether an ego that goes to a pose, in the disc of `at` (-1: none), is left there or turns round."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
-    build = drivers.build[b]
+    vehicle = drivers.vehicle[b]
     lane = labels.lane[b, EGO]
-    back = guards.limit[b, TURN_BACK]
-    after, top, progress, lateral, turned = lane_state(
-        roads, net, at, labels.at[b, EGO], lane, guards.memory[b, TOP], segment, off2, x, y, c, s, back
-    )
-    if after < 0:
+    back = guards.ego[b].turn_back
+    if at >= 0:
         return NOTHING
+    pose = Pose(x, y, c, s)
+    after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
+    after, top, progress, lateral, turned = along_lane(
+        roads, net, after, fresh, guards.ego[b].top, back, pose
+    )
     if turned:
         return TURN
     if after == lane and top - progress > back - TURNING:
@@ -216,22 +197,23 @@ def _leaves_lane(
         if progress < before:
             return TURN
     tx, ty = lane_direction(roads, net, after)
-    half = half_extent(tx, ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
+    half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & LEFT != 0 and labels.at[b, EGO] < 0:
-        return RETURN if reach >= guards.limit[b, LEFT_RELEASE] else NOTHING
-    if reach <= build[OVER] - BRINK:
+        return RETURN if reach >= guards.ego[b].left_release else NOTHING
+    if reach <= vehicle.over - BRINK:
         return NOTHING
-    return NOTHING if reach < min(build[OVER], _reach(b, after, state, labels, roads, net, build)) else LANE
+    return NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else LANE
 
 
 @jit
-def _reach(b: int, lane: int, state: State, labels: Labels, roads: RoadTable, net: int, build: Any) -> float:
+def _reach(b: int, lane: int, traffic: Traffic, net: int, vehicle: Vehicle) -> float:
     """Return the largest lateral coordinate of the ego's body in `lane`, if that is its lane state."""
+    state, labels, roads = traffic.state, traffic.labels, traffic.roads
     if labels.lane[b, EGO] != lane:
         return 0.0
     tx, ty = lane_direction(roads, net, lane)
     _, lateral = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
     return lateral + half_extent(
-        tx, ty, state.c[b, EGO], state.s[b, EGO], build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING]
+        tx, ty, state.c[b, EGO], state.s[b, EGO], vehicle.half_length, vehicle.half_width, vehicle.rounding
     )

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
-from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.policies.rules.tables import Drivers, Scratch, scratch
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.policies.rules.tables import Traffic, scratch
+from dubins_traffic.roads.table import pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
-    REASON,
     REASONS,
     Guards,
     Overtakes,
@@ -72,12 +71,15 @@ class ShieldFilter:
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
         self._command = np.zeros((1, cars, 2))
-        self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
-        self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
-        net = np.zeros(1, dtype=np.int64)
-        self._drivers: Drivers = egos([problem], cars, net)
-        self._guards: Guards = guards([problem], self._roads, net, overtakes=self._overtakes)
+        self._traffic = Traffic(
+            self._state,
+            self._labels,
+            pack([problem.network], [problem.car.lane_width]),
+            pack_obstacles([problem.obstacles]),
+            egos([problem], cars, np.zeros(1, dtype=np.int64)),
+            scratch(cars, len(problem.network.segments)),
+        )
+        self._guards: Guards = guards([problem], self._traffic, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
         self._shield()  # compiles, so that nobody waits for that in the first tick
 
@@ -97,7 +99,7 @@ class ShieldFilter:
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
         self._shield()
-        reason = int(self._guards.mark[0, REASON])
+        reason = int(self._guards.ego[0].reason)
         given = Command(*self._command[0, EGO].tolist())
         self.intervention = None
         if reason:
@@ -106,7 +108,4 @@ class ShieldFilter:
         return given
 
     def _shield(self) -> None:
-        shield(
-            self._tick, True, self._state, self._labels, self._roads, self._obstacles, self._drivers,
-            self._guards, self._scratch, self._command,
-        )  # fmt: skip
+        shield(self._tick, True, self._traffic, self._guards, self._command)

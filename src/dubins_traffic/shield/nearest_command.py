@@ -13,53 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
 from dubins_traffic.policies.rules.passing import BACK, TURNING, along, find_way_past
 from dubins_traffic.policies.rules.policy import list_cars, unlist_cars
-from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    DISC,
-    FASTEST,
-    FIRST,
-    LANE,
-    LAST,
-    MIDDLE,
-    NEXT,
-    PLACE,
-    SLOWEST,
-    UNTIL,
-    WAITED,
-    YAW_MOST,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.roads.lookup import lane_coordinates
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.propositions import LEFT
 from dubins_traffic.shield.checks import bounded, gather_close, may_touch, refusal
 from dubins_traffic.shield.tables import (
-    AIMED,
     EGO,
-    KEPT,
-    LAST_AT,
-    LAST_LANE,
-    LAST_TICK,
     LAW,
-    LEFT_TIME,
-    MODE,
     NEVER,
     NOTHING,
     NUMBER,
-    REASON,
-    SIGHT2,
-    STRAYED,
-    TOP,
-    TURN_BACK,
     Guards,
 )
 from dubins_traffic.shield.tables import LANE as LEAVES_LANE
@@ -74,10 +43,7 @@ STEPS = 4
 
 
 @jit
-def shield(
-    tick: Any, sighted: bool, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def shield(tick: Any, sighted: bool, traffic: Traffic, guards: Guards, commands: Floats) -> None:
     """Put what each ego does in place of what it was asked to do, `commands[:, 0]`.
 
     Parameters
@@ -91,42 +57,36 @@ def shield(
     drivers, guards, scratch
         `tables.egos`, what the shield remembers, and room to work in.
     commands : (B, N, 2)
-        Speed and yaw rate of every car; `guards.mark[:, REASON]` tells why the shield stepped in.
+        Speed and yaw rate of every car; `guards.ego["reason"]` tells why the shield stepped in.
     """
     for b in range(tick.shape[0]):
         if tick[b] >= 0:
-            sight2 = -1.0 if sighted else guards.limit[b, SIGHT2]
-            shield_trial(
-                b, tick[b], sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
-            )
+            sight2 = -1.0 if sighted else guards.ego[b].sight2
+            shield_trial(b, tick[b], sight2, traffic, guards, commands)
 
 
 @jit_inner
 def shield_trial(
-    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+    b: int, tick: int, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
+) -> None:
     """Put what the ego of trial b does in place of what it was asked to do."""
-    build = drivers.build[b]
+    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
-    _remember(b, tick, state, labels, roads, drivers, guards)
+    _remember(b, tick, traffic, guards)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0
-    law, law_yaw = _law(
-        b, tick, left, sight2, state, labels, roads, obstacles, drivers, guards, scratch, commands
-    )  # fmt: skip
+    law, law_yaw = _law(b, tick, left, sight2, traffic, guards, commands)
     if not left:
-        guards.mark[b, KEPT] = 0
-    near = gather_close(b, state, sight2, build, scratch)
-    obeys = _may_obey(
-        b, tick, left, sight2, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch
-    )
-    near = gather_close(b, state, sight2, build, scratch)
+        guards.ego[b].kept = 0
+    near = gather_close(b, state, sight2, vehicle, scratch)
+    obeys = _may_obey(b, tick, left, sight2, law, law_yaw, near, traffic, guards)
+    near = gather_close(b, state, sight2, vehicle, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
-    speed, yaw_rate = bounded(asked, asked_yaw, build) if finite else (0.0, 0.0)
+    speed, yaw_rate = bounded(asked, asked_yaw, vehicle) if finite else (0.0, 0.0)
     reason = NOTHING if finite else NUMBER
     if finite and not (obeys and speed == law and yaw_rate == law_yaw):
-        reason = refusal(b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch)
-    guards.mark[b, REASON] = reason
+        reason = refusal(b, speed, yaw_rate, near, traffic, guards)
+    guards.ego[b].reason = reason
     if reason == NOTHING:
         commands[b, EGO, 0] = asked
         commands[b, EGO, 1] = asked_yaw
@@ -134,143 +94,152 @@ def shield_trial(
         if left:
             speed, yaw_rate = (law, law_yaw) if obeys else (0.0, 0.0)
         else:
-            speed, yaw_rate = _nearest(
-                b, speed, yaw_rate, obeys, law, law_yaw, near, state, labels, roads, obstacles, drivers,
-                guards, scratch,
-            )  # fmt: skip
+            speed, yaw_rate = _nearest(b, speed, yaw_rate, obeys, law, law_yaw, near, traffic, guards)
         commands[b, EGO, 0] = speed
         commands[b, EGO, 1] = yaw_rate
     obeyed = speed == law and yaw_rate == law_yaw
-    passes = drivers.floats[b, EGO, ASIDE] != 0.0 and not left
-    guards.mark[b, STRAYED] = 1 if passes and (guards.mark[b, STRAYED] != 0 or not obeyed) else 0
+    passes = drivers.car[b, EGO].aside != 0.0 and not left
+    guards.ego[b].strayed = 1 if passes and (guards.ego[b].strayed != 0 or not obeyed) else 0
     if not left and not obeyed:
-        guards.mark[b, KEPT] = 0
+        guards.ego[b].kept = 0
 
 
 @jit_inline
 def _law(
-    b: int, tick: int, left: bool, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch, commands: Floats,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
+) -> tuple[float, float]:
     """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
-    if left and guards.mark[b, KEPT] != 0:
-        copy_memory(b, drivers, guards.alone)
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    if left and guards.ego[b].kept != 0:
+        copy_memory(b, drivers, guards.alone.traffic.drivers)
         law, law_yaw = drive_alone(
-            b, tick, labels.lane[b, EGO], state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO],
-            roads, obstacles, drivers, guards, scratch,
-        )  # fmt: skip
-        copy_memory(b, guards.alone, drivers)
+            b,
+            tick,
+            labels.lane[b, EGO],
+            state.x[b, EGO],
+            state.y[b, EGO],
+            state.c[b, EGO],
+            state.s[b, EGO],
+            traffic,
+            guards,
+        )
+        copy_memory(b, guards.alone.traffic.drivers, drivers)
         return law, law_yaw
-    drive_by_law(b, tick, sight2, state, labels, roads, obstacles, drivers, scratch, commands)
-    return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.build[b])
+    drive_by_law(b, tick, sight2, traffic, commands)
+    return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
-def _remember(
-    b: int, tick: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards
-) -> None:
+def _remember(b: int, tick: int, traffic: Traffic, guards: Guards) -> None:
     """Keep the greatest progress as the referee does, and let the law begin with the goal nearest to the start."""
-    mark = guards.mark[b]
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    ego = guards.ego[b]
     lane = labels.lane[b, EGO]
     if lane >= 0:
         progress, _ = lane_coordinates(roads, drivers.net[b], lane, state.x[b, EGO], state.y[b, EGO])
-        top = guards.memory[b, TOP]
-        if mark[LAST_TICK] != tick - 1 and tick > 0:
-            guards.memory[b, TOP] = progress + guards.limit[b, TURN_BACK]
-            mark[KEPT] = 0
-        elif tick == 0 or lane != mark[LAST_LANE] or mark[LAST_AT] >= 0 or progress > top:
-            guards.memory[b, TOP] = progress
-    mark[LAST_TICK] = tick
-    mark[LAST_LANE] = lane
-    mark[LAST_AT] = labels.at[b, EGO]
-    if mark[AIMED] == 0:
-        mark[AIMED] = 1
-        own = drivers.ints[b, EGO]
-        own[PLACE] = nearest_stage(
-            drivers.distance, own[FIRST], own[LAST], lane, labels.segment[b, EGO]
+        top = ego.top
+        if ego.last_tick != tick - 1 and tick > 0:
+            ego.top = progress + ego.turn_back
+            ego.kept = 0
+        elif tick == 0 or lane != ego.last_lane or ego.last_at >= 0 or progress > top:
+            ego.top = progress
+    ego.last_tick = tick
+    ego.last_lane = lane
+    ego.last_at = labels.at[b, EGO]
+    if ego.aimed == 0:
+        ego.aimed = 1
+        car = drivers.car[b, EGO]
+        car.place = nearest_stage(
+            drivers.distance, car.first, car.last, lane, labels.segment[b, EGO]
         )  # fmt: skip
 
 
 @jit_inline
 def _may_obey(
-    b: int, tick: int, left: bool, sight2: float, law: float, law_yaw: float, near: int, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int,
+    tick: int,
+    left: bool,
+    sight2: float,
+    law: float,
+    law_yaw: float,
+    near: int,
+    traffic: Traffic,
+    guards: Guards,
+) -> bool:
     """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
-    if may_touch(b, law, law_yaw, near, state, obstacles, drivers.build[b], scratch):
+    drivers = traffic.drivers
+    if may_touch(b, law, law_yaw, near, traffic, drivers.vehicle[b]):
         return False
     if left:
         return True
-    found = refusal(b, law, law_yaw, near, state, labels, roads, obstacles, drivers, guards, scratch)
+    found = refusal(b, law, law_yaw, near, traffic, guards)
     if found != LEAVES_LANE:
         return found == NOTHING
-    mode = guards.setting[b, MODE]
-    if drivers.floats[b, EGO, ASIDE] == 0.0 or mode == NEVER:
+    mode = guards.ego[b].mode
+    if drivers.car[b, EGO].aside == 0.0 or mode == NEVER:
         return False
     if mode == LAW:
-        return _has_way_back(b, sight2, state, labels, roads, obstacles, drivers, guards, scratch)
-    sure = surely_returns(
-        b, tick, law, law_yaw, sight2, state, labels, roads, obstacles, drivers, guards, scratch
-    )  # fmt: skip
-    guards.mark[b, KEPT] = 1 if sure else 0
+        return _has_way_back(b, sight2, traffic, guards)
+    sure = surely_returns(b, tick, law, law_yaw, sight2, traffic, guards)
+    guards.ego[b].kept = 1 if sure else 0
     return sure
 
 
 @jit_inline
-def _has_way_back(
-    b: int, sight2: float, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: Guards) -> bool:
     """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
-    floats = drivers.floats[b, EGO]
-    ints = drivers.ints[b, EGO]
-    build = drivers.build[b]
-    way = way_between(roads, drivers.net[b], ints[LANE], ints[NEXT], build[MIDDLE], build[DISC])
-    if guards.mark[b, STRAYED] != 0:
-        waited = ints[WAITED]
-        floats[ASIDE] = 0.0
-        list_cars(b, sight2, state, labels, scratch)
-        find_way_past(b, EGO, way, -1, state, labels, roads, obstacles, drivers, scratch)
-        unlist_cars(b, state, labels, scratch)
-        ints[WAITED] = waited
-        if floats[ASIDE] == 0.0:
+    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
+    car = drivers.car[b, EGO]
+    vehicle = drivers.vehicle[b]
+    way = way_between(roads, drivers.net[b], car.lane, car.next_lane, vehicle.middle, vehicle.disc)
+    if guards.ego[b].strayed != 0:
+        waited = car.waited
+        car.aside = 0.0
+        list_cars(b, sight2, traffic)
+        find_way_past(b, EGO, way, -1, traffic)
+        unlist_cars(b, traffic)
+        car.waited = waited
+        if car.aside == 0.0:
             return False
-    to_go = floats[UNTIL] + BACK - along(way, state.x[b, EGO], state.y[b, EGO])
-    return to_go / (0.8 * build[FASTEST]) + TURNING <= guards.limit[b, LEFT_TIME]
+    to_go = car.until + BACK - along(way, state.x[b, EGO], state.y[b, EGO])
+    return to_go / (0.8 * vehicle.fastest) + TURNING <= guards.ego[b].left_time
 
 
 @jit_inline
 def _nearest(
-    b: int, speed: float, yaw_rate: float, obeys: bool, law: float, law_yaw: float, near: int, state: State,
-    labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    speed: float,
+    yaw_rate: float,
+    obeys: bool,
+    law: float,
+    law_yaw: float,
+    near: int,
+    traffic: Traffic,
+    guards: Guards,
+) -> tuple[float, float]:
     """Return the command nearest to one that is refused, of those that are looked at, for an ego that is not left.
 
     Distance is that of (speed, yaw rate) in units of the largest speed and yaw rate. To stand is always possible.
     """
-    build = drivers.build[b]
-    fastest = max(build[FASTEST], -build[SLOWEST])
-    best, best_yaw = _slower(
-        b, speed, yaw_rate, near, state, labels, roads, obstacles, drivers, guards, scratch
-    )
-    least = _apart(speed, yaw_rate, best, best_yaw, fastest, build)
-    if obeys and _apart(speed, yaw_rate, law, law_yaw, fastest, build) < least:
+    drivers = traffic.drivers
+    vehicle = drivers.vehicle[b]
+    fastest = max(vehicle.fastest, -vehicle.slowest)
+    best, best_yaw = _slower(b, speed, yaw_rate, near, traffic, guards)
+    least = _apart(speed, yaw_rate, best, best_yaw, fastest, vehicle)
+    if obeys and _apart(speed, yaw_rate, law, law_yaw, fastest, vehicle) < least:
         best, best_yaw = law, law_yaw
-        least = _apart(speed, yaw_rate, law, law_yaw, fastest, build)
-    shift = build[YAW_MOST]
+        least = _apart(speed, yaw_rate, law, law_yaw, fastest, vehicle)
+    shift = vehicle.yaw_most
     for _ in range(SHIFTS):
         shift *= 0.5
         for side in range(2):
             for k in range(STEPS):
                 wanted = yaw_rate + shift if side == 0 else yaw_rate - shift
-                u, w = bounded(speed * (1.0 - 0.25 * k), wanted, build)
-                far = _apart(speed, yaw_rate, u, w, fastest, build)
+                u, w = bounded(speed * (1.0 - 0.25 * k), wanted, vehicle)
+                far = _apart(speed, yaw_rate, u, w, fastest, vehicle)
                 if far >= least:
                     break
-                if (
-                    refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch)
-                    == NOTHING
-                ):
+                if refusal(b, u, w, near, traffic, guards) == NOTHING:
                     best, best_yaw, least = u, w, far
                     break
     return best, best_yaw
@@ -278,17 +247,17 @@ def _nearest(
 
 @jit_inline
 def _slower(
-    b: int, speed: float, yaw_rate: float, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards
+) -> tuple[float, float]:
     """Return the command with the greatest share of a speed that is refused; (0, 0) if none will do."""
-    build = drivers.build[b]
+    drivers = traffic.drivers
+    vehicle = drivers.vehicle[b]
     best, best_yaw = 0.0, 0.0
     low, high = 0.0, 1.0
     share = 0.0
     for _ in range(HALVINGS + 1):
-        u, w = bounded(share * speed, yaw_rate, build)
-        if refusal(b, u, w, near, state, labels, roads, obstacles, drivers, guards, scratch) == NOTHING:
+        u, w = bounded(share * speed, yaw_rate, vehicle)
+        if refusal(b, u, w, near, traffic, guards) == NOTHING:
             best, best_yaw = u, w
             low = share
         else:
@@ -298,8 +267,8 @@ def _slower(
 
 
 @jit_inline
-def _apart(u: float, w: float, v: float, z: float, fastest: float, build: Any) -> float:
+def _apart(u: float, w: float, v: float, z: float, fastest: float, vehicle: Vehicle) -> float:
     """Return the squared distance of two commands in units of the car's bounds."""
     du = (u - v) / fastest
-    dw = (w - z) / build[YAW_MOST]
+    dw = (w - z) / vehicle.yaw_most
     return du * du + dw * dw

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
@@ -11,22 +11,9 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.policies.rules.tables import (
-    FIRST,
-    FLOATS,
-    INTS,
-    KIND,
-    LAST,
-    PLACE,
-    ROUND,
-    SPEED,
-    WAYS,
-    Drivers,
-    blank,
-    build_of,
-    no_ways,
-)
-from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, KeptPath, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
@@ -52,54 +39,59 @@ REASONS: Final = (
 """Why a command was not let through, by number: what it would have broken, in the names of the referee; `2.turn` is
 turning round outside a disc."""
 
-TOP: Final = 0
-MEMORY: Final = 1
-"""Columns of `Guards.memory`. TOP: greatest progress of the ego since its lane state was set, metres."""
-
-LAST_TICK, LAST_LANE, LAST_AT, STRAYED, AIMED, REASON, KEPT = range(7)
-MARKS: Final = 7
-"""Columns of `Guards.mark`. LAST_TICK, LAST_LANE, LAST_AT: tick, lane state and disc of the ego when it was last
-looked at, LAST_TICK -2 before the first time. STRAYED: 1 if the ego has not done as the law since the law began to pass
-something. AIMED: 1 once the law knows its first goal. REASON: why the shield stepped in in this tick, NOTHING if it did
-not. KEPT: 1 if the ego, while it is left, does what has been rehearsed.
-"""
-
-LEFT_RELEASE, TURN_BACK, LEFT_TIME, SIGHT2, BLOCKED_AHEAD = range(5)
-LIMITS: Final = 5
-"""Columns of `Guards.limit`: a car that is left is so until its body is below this, metres; progress lost that makes a
-turn, metres; for how long an ego may be left, s; square of the sensing radius, metres squared; how far ahead what
-stands blocks the lane, metres."""
-
 Overtakes = Literal["sure", "law", "never"]
 """When the ego may cross the centre line: where its return is sure, where the law of the road would, or never."""
 SURE, LAW, NEVER = range(3)
-MODE, CARS = range(2)
-SETTINGS: Final = 2
-"""Columns of `Guards.setting`: SURE, LAW or NEVER; how many cars there are."""
 
 
-class Alone(NamedTuple):
+@record
+class Ego:
+    """What the shield knows of the ego of a trial, and what it remembers."""
+
+    mode: int
+    """SURE, LAW or NEVER."""
+    cars: int
+    """How many cars there are in the trial."""
+    left_release: float
+    """A car that is left is so until its body is below this, metres."""
+    turn_back: float
+    """Progress lost that makes a turn, metres."""
+    left_time: float
+    """For how long an ego may be left, seconds."""
+    sight2: float
+    """Square of the sensing radius, metres squared."""
+    blocked_ahead: float
+    """How far ahead what stands blocks the lane, metres."""
+    top: float
+    """Greatest progress of the ego since its lane state was set, metres."""
+    last_tick: int = -2
+    """When the ego was last looked at, -2 before the first time."""
+    last_lane: int
+    """Its lane state then."""
+    last_at: int
+    """Its disc then."""
+    strayed: int
+    """1 if the ego has not done as the law since the law began to pass something."""
+    aimed: int
+    """1 once the law knows its first goal."""
+    reason: int
+    """Why the shield stepped in in this tick, NOTHING if it did not."""
+    kept: int
+    """1 if the ego, while it is left, does what has been rehearsed."""
+
+
+class Alone(Tables):
     """An ego that sees no other car: tables of one car per trial, and what the law that drives it remembers."""
 
-    state: State
-    labels: Labels
-    ints: Ints
-    floats: Floats
-    way: Floats
+    traffic: Traffic
     commands: Floats
 
 
-class Guards(NamedTuple):
-    """What the shield knows of each trial, `limit` (B, LIMITS), `setting` (B, SETTINGS) and the `obstacles` in lanes.
+class Guards(Tables):
+    """What the shield knows and remembers of each trial's `ego` (B,), `obstacles` in lanes, and the ego `alone`."""
 
-    What it remembers, `memory` and `mark` (B, MARKS); and the ego as it would drive `alone`.
-    """
-
-    limit: Floats
-    setting: Ints
+    ego: Rows[Ego]
     obstacles: ObstacleLanes
-    memory: Floats
-    mark: Ints
     alone: Alone
 
 
@@ -113,40 +105,39 @@ def check_overtakes(value: object) -> Overtakes:
     )
 
 
-def guards(
-    problems: Sequence[Problem], roads: RoadTable, net: Ints, *, overtakes: Overtakes = "sure"
-) -> Guards:
+def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> Guards:
     """Return what the shield knows of trials that have not begun.
 
     Parameters
     ----------
     problems
         One per trial.
-    roads, net : (B,)
-        The road networks, and the number of each trial's.
+    traffic
+        The egos as the law drives them, see `egos`.
     overtakes
-        When their egos may cross the centre line.
+        When they may cross the centre line.
     """
     trials = len(problems)
-    rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
-    limit = [
-        (own.left_release, own.turn_back, own.left_time, problem.sensing_radius**2, own.blocked_ahead)
-        for own, problem in zip(rules, problems, strict=True)
-    ]
-    mode = get_args(Overtakes).index(overtakes)
-    setting = np.array([(mode, 1 + len(problem.e_agents)) for problem in problems], dtype=np.int64)
-    mark = np.zeros((trials, MARKS), dtype=np.int64)
-    mark[:, LAST_TICK] = -2
-    obstacles = place_obstacles(pack_obstacles([problem.obstacles for problem in problems]), roads, net)
-    alone = Alone(
-        State.zeros(trials, 1),
-        Labels.zeros(trials, 1),
-        np.zeros((trials, 1, INTS), dtype=np.int64),
-        np.zeros((trials, 1, FLOATS)),
-        np.zeros((trials, 1, WAYS)),
-        np.zeros((trials, 1, 2)),
+    known = table(Ego, trials)
+    for b, problem in enumerate(problems):
+        own, rules = known[b], RuleParameters.from_mapping(problem.rules)
+        own.mode = get_args(Overtakes).index(overtakes)
+        own.cars = 1 + len(problem.e_agents)
+        own.left_release = rules.left_release
+        own.turn_back = rules.turn_back
+        own.left_time = rules.left_time
+        own.sight2 = problem.sensing_radius**2
+        own.blocked_ahead = rules.blocked_ahead
+    drivers = traffic.drivers
+    parts = pack_obstacles([problem.obstacles for problem in problems])
+    obstacles = place_obstacles(parts, traffic.roads, drivers.net)
+    unseen = traffic.replace(
+        state=State.zeros(trials, 1),
+        labels=Labels.zeros(trials, 1),
+        drivers=drivers.replace(car=table(Driver, (trials, 1)), way=table(KeptPath, (trials, 1))),
     )
-    return Guards(np.array(limit), setting, obstacles, np.zeros((trials, MEMORY)), mark, alone)
+    alone = Alone(unseen, np.zeros((trials, 1, 2)))
+    return Guards(known, obstacles, alone)
 
 
 def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
@@ -161,17 +152,16 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
     net : (B,)
         Number of each trial's road network.
     """
-    whole, real = blank(cars)
     trials = len(problems)
-    ints, floats = np.repeat(whole[None], trials, axis=0), np.repeat(real[None], trials, axis=0)
+    rows = table(Driver, (trials, cars))
     rounds = [stages(problem) for problem in problems]
     lanes = max((far.shape[1] for _, far in rounds), default=0)
     stage: list[int] = []
     distance = np.full((sum(len(own) for own, _ in rounds), lanes), np.inf)
     for b, ((own, far), problem) in enumerate(zip(rounds, problems, strict=True)):
-        ints[b, EGO, [KIND, FIRST, LAST]] = ROUND, len(stage), len(stage) + len(own)
-        ints[b, EGO, PLACE] = -1
-        floats[b, EGO, SPEED] = problem.car.bounds.speed
+        ego = rows[b, EGO]
+        ego.kind, ego.first, ego.last = ROUND, len(stage), len(stage) + len(own)
+        ego.speed = problem.car.bounds.speed
         distance[len(stage) : len(stage) + len(own), : far.shape[1]] = far
         stage += own.tolist()
     return Drivers(
@@ -179,10 +169,9 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
         net=net,
         seed=np.zeros(trials, dtype=np.uint64),
         trial=np.zeros(trials, dtype=np.int64),
-        build=build_of(problems),
-        ints=ints,
-        floats=floats,
-        way=no_ways(trials, cars),
+        vehicle=vehicles_of(problems),
+        car=rows,
+        way=table(KeptPath, (trials, cars)),
         stage=np.array(stage, dtype=np.int64),
         distance=distance,
     )

@@ -9,49 +9,22 @@ it saw no other car. What is passed is an obstacle, which is sure to stand.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit_inline, jit_inner
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.policy import decide_trial
-from dubins_traffic.policies.rules.tables import (
-    BEHIND,
-    DISC,
-    FASTEST,
-    FLOATS,
-    FORE,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    INTS,
-    MIDDLE,
-    NEEDED,
-    PERIOD,
-    REACH,
-    ROUNDING,
-    SLOWEST,
-    WAYS,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.blocking import obstacle_narrows
+from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch, travel_of
 from dubins_traffic.shield.tables import (
-    BLOCKED_AHEAD,
-    CARS,
     EGO,
-    LEFT_RELEASE,
-    LEFT_TIME,
-    SIGHT2,
-    TOP,
-    TURN_BACK,
     Guards,
 )
 
@@ -62,107 +35,90 @@ ROUNDED = 1e-6
 
 
 @jit_inner
-def drive_by_law(
-    b: int, tick: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
     """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
-    decide_trial(
-        b, tick, sight2, scratch.apart, 0.0, state, labels, roads, obstacles, drivers, scratch, commands
-    )
+    scratch = traffic.scratch
+    decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
 
 @jit_inner
 def drive_alone(
-    b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, traffic: Traffic, guards: Guards
+) -> tuple[float, float]:
     """Return the command, within bounds, by which the law drives an ego that is left and sees no other car.
 
     What the law remembers is that in `guards.alone`.
     """
-    alone = guards.alone
+    roads, drivers = traffic.roads, traffic.drivers
+    alone, commands = guards.alone.traffic, guards.alone.commands
     alone.state.x[b, EGO], alone.state.y[b, EGO] = x, y
     alone.state.c[b, EGO], alone.state.s[b, EGO] = c, s
     bits = LEFT | OVERTAKING
     own, _ = lane_coordinates(roads, drivers.net[b], lane, x, y)
-    if _blocks(b, lane, own, own + guards.limit[b, BLOCKED_AHEAD], roads, drivers, guards):
+    if _blocks(b, lane, own, own + guards.ego[b].blocked_ahead, roads, drivers, guards):
         bits |= BLOCKED
     alone.labels.bits[b, EGO] = bits
     alone.labels.lane[b, EGO] = lane
     alone.labels.segment[b, EGO] = lane >> 1
-    memory = Drivers(
-        drivers.active, drivers.net, drivers.seed, drivers.trial, drivers.build, alone.ints, alone.floats,
-        alone.way, drivers.stage, drivers.distance,
-    )  # fmt: skip
-    drive_by_law(
-        b, tick, -1.0, alone.state, alone.labels, roads, obstacles, memory, scratch, alone.commands
-    )  # fmt: skip
-    return bounded(alone.commands[b, EGO, 0], alone.commands[b, EGO, 1], drivers.build[b])
+    drive_by_law(b, tick, -1.0, alone, commands)
+    return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
-def copy_memory(b: int, source: Any, to: Any) -> None:
-    """Let the law remember in `to` what it does in `source`: `Drivers` or `guards.alone`."""
-    for k in range(INTS):
-        to.ints[b, EGO, k] = source.ints[b, EGO, k]
-    for k in range(FLOATS):
-        to.floats[b, EGO, k] = source.floats[b, EGO, k]
-    for k in range(WAYS):
-        to.way[b, EGO, k] = source.way[b, EGO, k]
+def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
+    """Let the law remember in `to` what it does in `source`."""
+    to.car[b, EGO] = source.car[b, EGO]
+    to.way[b, EGO] = source.way[b, EGO]
 
 
 @jit_inner
 def surely_returns(
-    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, guards: Guards, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: Guards
+) -> bool:
     """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time."""
-    build = drivers.build[b]
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    vehicle = drivers.vehicle[b]
     net = drivers.net[b]
     lane = labels.lane[b, EGO]
     if lane < 0:
         return False
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     before, _ = lane_coordinates(roads, net, lane, x, y)
-    top = guards.memory[b, TOP]
-    last = int(min(guards.limit[b, LEFT_TIME], LONGEST) / build[PERIOD])
-    copy_memory(b, drivers, guards.alone)
+    top = guards.ego[b].top
+    last = int(min(guards.ego[b].left_time, LONGEST) / vehicle.period)
+    copy_memory(b, drivers, guards.alone.traffic.drivers)
     for k in range(1, last + 1):
-        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.state, obstacles, build, scratch):
+        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.traffic, vehicle):
             return False
-        x, y, c, s = advance(x, y, c, s, speed, yaw_rate, build[PERIOD])
+        x, y, c, s = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
         progress, lateral = lane_coordinates(roads, net, lane, x, y)
         top = max(top, progress)
-        if progress < before and top - progress > guards.limit[b, TURN_BACK] - TURNING:
+        if progress < before and top - progress > guards.ego[b].turn_back - TURNING:
             return False
-        if k == 1 and not _overtakes(b, lane, progress, labels, roads, drivers, guards):
+        if k == 1 and not _overtakes(b, lane, progress, traffic, guards):
             return False
-        if _leaves(lane, x, y, c, s, roads, net, build) or _may_come(
-            b, k, x, y, sight2, state, guards, build
+        if _leaves(lane, x, y, c, s, roads, net, vehicle) or _may_come(
+            b, k, x, y, sight2, state, guards, vehicle
         ):
             return False
         tx, ty = lane_direction(roads, net, lane)
-        half = half_extent(tx, ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
-        if lateral + half < guards.limit[b, LEFT_RELEASE]:
+        half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+        if lateral + half < guards.ego[b].left_release:
             return True
         before = progress
-        speed, yaw_rate = drive_alone(
-            b, tick + k, lane, x, y, c, s, roads, obstacles, drivers, guards, scratch
-        )
+        speed, yaw_rate = drive_alone(b, tick + k, lane, x, y, c, s, traffic, guards)
     return False
 
 
 @jit_inline
-def _overtakes(
-    b: int, lane: int, progress: float, labels: Labels, roads: RoadTable, drivers: Drivers, guards: Guards
-) -> bool:
+def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Guards) -> bool:
     """Tell whether an ego overtakes in the next frame, with `progress` then, for the sake of an obstacle."""
-    build = drivers.build[b]
-    if _blocks(b, lane, progress, progress + guards.limit[b, BLOCKED_AHEAD], roads, drivers, guards):
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    if _blocks(b, lane, progress, progress + guards.ego[b].blocked_ahead, roads, drivers, guards):
         return True
     return labels.bits[b, EGO] & OVERTAKING != 0 and _blocks(
-        b, lane, progress - build[BEHIND], progress + build[FORE], roads, drivers, guards
+        b, lane, progress - vehicle.behind, progress + vehicle.fore, roads, drivers, guards
     )
 
 
@@ -171,17 +127,16 @@ def _blocks(
     b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, guards: Guards
 ) -> bool:
     """Tell whether an obstacle blocks a lane where its progress is in [near, far]."""
-    build = drivers.build[b]
+    vehicle = drivers.vehicle[b]
     length = roads.seg[roads.seg_off[drivers.net[b]] + (lane >> 1), 4]
-    return obstacle_narrows(
-        guards.obstacles, b, lane, length, near + ROUNDED, far - ROUNDED, 2.0 * build[MIDDLE],
-        build[NEEDED] - ROUNDED,
-    )  # fmt: skip
+    place = RightLane(b, lane, length, 2.0 * vehicle.middle)
+    needed = vehicle.needed - ROUNDED
+    return obstacle_narrows(guards.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
 
 
 @jit_inline
 def _leaves(
-    lane: int, x: float, y: float, c: float, s: float, roads: RoadTable, net: int, build: Any
+    lane: int, x: float, y: float, c: float, s: float, roads: RoadTable, net: int, vehicle: Vehicle
 ) -> bool:
     """Tell whether an ego at a pose is off the road of its lane, or its body meets a disc."""
     segment, off2 = nearest_segment(roads, net, x, y)
@@ -191,19 +146,19 @@ def _leaves(
     v, _ = nearest_vertex(roads, net, x, y)
     row = roads.vert_off[net] + v
     vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
-    rim = build[DISC] + build[ROUNDING] + BRINK
-    return distance2_to_body(vx, vy, x, y, c, s, build[HALF_LENGTH], build[HALF_WIDTH]) < rim * rim
+    rim = vehicle.disc + vehicle.rounding + BRINK
+    return distance2_to_body(vx, vy, x, y, c, s, vehicle.half_length, vehicle.half_width) < rim * rim
 
 
 @jit_inline
 def _may_come(
-    b: int, ticks: int, x: float, y: float, sight2: float, state: State, guards: Guards, build: Any
+    b: int, ticks: int, x: float, y: float, sight2: float, state: State, guards: Guards, vehicle: Vehicle
 ) -> bool:
     """Tell whether in `ticks` ticks a car, seen or unseen, could be so near to (x, y) that it might touch the ego."""
-    near = 2.0 * build[REACH] + 2.0 * travel_of(build) + GUARD
-    far = near + max(build[FASTEST], -build[SLOWEST]) * build[PERIOD] * ticks
+    near = 2.0 * vehicle.reach + 2.0 * travel_of(vehicle) + GUARD
+    far = near + max(vehicle.fastest, -vehicle.slowest) * vehicle.period * ticks
     ex, ey = state.x[b, EGO], state.y[b, EGO]
-    unseen = guards.setting[b, CARS] - 1
+    unseen = guards.ego[b].cars - 1
     for n in range(1, state.count[b]):
         ox, oy = state.x[b, n], state.y[b, n]
         if sight2 >= 0.0 and (ox - ex) * (ox - ex) + (oy - ey) * (oy - ey) > sight2:
@@ -214,4 +169,4 @@ def _may_come(
     if unseen <= 0:
         return False
     gone = sqrt((x - ex) * (x - ex) + (y - ey) * (y - ey))
-    return gone + far >= sqrt(guards.limit[b, SIGHT2])
+    return gone + far >= sqrt(guards.ego[b].sight2)

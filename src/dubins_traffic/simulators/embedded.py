@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.protocols import Capabilities
 
 if TYPE_CHECKING:
@@ -62,7 +61,6 @@ class Embedded:
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
         self._rows = rows(self._cars, places, 1.0 / self._rate)
         self._tick = 0
-        self._call: Callable[..., int] | None = None
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -75,17 +73,14 @@ class Embedded:
         trials = len(self._none)
         contacts: list[tuple[Contact, ...]] = self._none
         self._tick += 1
-        call = self._call or self._bind(commands)
         done = 0
         while done < trials:
-            reached = call(done, 1.0 / self._rate, commands)
+            reached = step(done, 1.0 / self._rate, commands, self.state, *self.tables)
             if self._work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
                 self._work = enlarged(self._work)
-                call = self._bind(commands)
-        self._call = call
         return contacts
 
     @property
@@ -95,14 +90,6 @@ class Embedded:
 
     def close(self) -> None:
         """Nothing is held outside memory."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the call that is bound to these arrays: a copy binds its own."""
-        return {**vars(self), "_call": None}
-
-    def _bind(self, commands: Floats) -> Callable[..., int]:
-        arrays = (*self.state, *self._cars, *self._obstacles, *self._rows, *self._work)
-        return bound(step, (0, 0.0, commands), arrays)
 
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)
@@ -130,4 +117,4 @@ def contact_of(row: Sequence[float], tick: int, rate: float) -> Contact:
 def enlarged(work: Workspace) -> Workspace:
     """Return the workspace with more room for pairs."""
     pairs = 4 * len(work.when)
-    return work._replace(pair=np.zeros((pairs, 2), dtype=np.int64), when=np.zeros(pairs))
+    return work.replace(pair=np.zeros((pairs, 2), dtype=np.int64), when=np.zeros(pairs))

@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import Labels, State
 
 def kept(state: State, labels: Labels) -> tuple[State, Labels]:
     """Return copies of what is its makers' own and changes with the next tick."""
-    return State._make(column.copy() for column in state), Labels._make(row.copy() for row in labels)
+    return State(*(column.copy() for column in state)), Labels(*(row.copy() for row in labels))
 
 
 def between(before: State, after: State, share: float) -> State:

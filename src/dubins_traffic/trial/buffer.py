@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import STATE_END, Contact, Event, Frames, Labels, State
+from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
-from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.protocols import Ending, Forks, Sink
 
@@ -18,13 +17,13 @@ if TYPE_CHECKING:
 
 
 @jit
-def keep(f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, *arrays: Any) -> None:
+def keep(
+    f: int, reals: Floats, whole: Ints, bits: Bits, commands: Floats, state: State, labels: Labels
+) -> None:
     """Copy trial 0 of the arrays of State and Labels, and its commands, into frame `f` (index) of a block.
 
     The block is `reals` (8, F, N): pose, twist and command, `whole` (4, F, N) and `bits` (F, N).
     """
-    state = State(*arrays[:STATE_END])
-    labels = Labels(*arrays[STATE_END:])
     for n in range(reals.shape[2]):
         reals[0, f, n] = state.x[0, n]
         reals[1, f, n] = state.y[0, n]
@@ -64,19 +63,14 @@ class FrameBuffer:
         self._cars = len(instance.starts)
         self._sinks = tuple(sinks)
         self._first = 0
-        self._state: State | None = None
-        self._labels: Labels | None = None
-        self._commands: Floats | None = None
-        self._keep: Callable[..., None] = keep
         for sink in self._sinks:
             sink.begin(instance)
         self._renew()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the sinks that stay behind, and the call that is bound to these arrays: a copy binds its own."""
+        """Leave out the sinks that stay behind."""
         carried = tuple(sink for sink in self._sinks if isinstance(sink, Forks) and sink.forks)
-        unbound = {"_state": None, "_labels": None, "_commands": None, "_keep": keep}
-        return {**vars(self), **unbound, "_sinks": carried}
+        return {**vars(self), "_sinks": carried}
 
     @property
     def sinks(self) -> tuple[Sink, ...]:
@@ -97,11 +91,7 @@ class FrameBuffer:
     ) -> None:
         """Take the frame just reached, the clipped commands that led to it, and what happened in its tick."""
         f = self._filled
-        if state is not self._state or labels is not self._labels or commands is not self._commands:
-            self._state, self._labels, self._commands = state, labels, commands
-            first = (0, self._reals, self._whole, self._bits, commands)
-            self._keep = bound(keep, first, (*state, *labels))
-        self._keep(f, self._reals, self._whole, self._bits, commands)
+        keep(f, self._reals, self._whole, self._bits, commands, state, labels)
         if contacts:
             self._contacts += contacts
         if events:

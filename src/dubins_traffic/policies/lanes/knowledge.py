@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 
 # These numbers are compiled into functions with @jit: the mark puts this file into the fingerprint of their cache.
 HALF_LENGTH, HALF_WIDTH, ROUNDING, REACH, SLOWEST, FASTEST, YAW_MOST, RADIUS, DISC, PERIOD, FOLLOW = range(11)
@@ -50,7 +49,7 @@ SHUTTLE = 10
 """Ticks of each stroke of a car that has to shuttle to turn round."""
 
 
-class Knowledge(NamedTuple):
+class Knowledge(Tables):
     """What the law knows and remembers of each trial of a batch.
 
     `path` (rows, paths.FIELDS): all trials' paths; `span` (B, 3): first row, end, and number of the row after the

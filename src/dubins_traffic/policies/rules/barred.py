@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
 from dubins_traffic.policies.rules.passing import BACK, BERTH, NARROWS, SLIP, TURNING, stop_line
 from dubins_traffic.policies.rules.seeing import OBSTACLE_GAP, QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import (
-    DISC,
-    FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LEFT_TIME,
-    MIDDLE,
-    REACH,
-    ROUNDING,
-    Drivers,
-)
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import on_way, way_between
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
-from dubins_traffic.roads.table import RoadTable
 
 LATE, LAST = 0.85, 0.82
 """From where on, in units of R, a car that comes out of a disc can pass an obstacle behind it within the lane: so that
@@ -30,104 +16,90 @@ it need not come close to it, and at all."""
 
 
 @jit
-def is_barred(
-    roads: RoadTable, net: int, lane: int, obstacles: ObstacleTable, first: int, last: int, build: Any
-) -> bool:
+def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehicle: Vehicle) -> bool:
     """Tell whether one of the obstacle parts `first` to `last` - 1 is in the way in a lane and can't be passed there.
 
     What `find_way_past` asks of cars that stand or come is left out: these go.
     """
+    roads, obstacles = traffic.roads, traffic.obstacles
     length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
-    wide = build[HALF_WIDTH] + build[ROUNDING]
+    wide = vehicle.half_width + vehicle.rounding
     done = 0.0
-    early = LATE * build[DISC] + build[REACH] + QUEUE_GAP
+    early = LATE * vehicle.disc + vehicle.reach + QUEUE_GAP
     for _ in range(last - first):
-        begin, end, offset = next_bar(roads, net, lane, done, early, obstacles, first, last, build)
+        begin, end, offset = next_bar(traffic, net, lane, done, early, first, last, vehicle)
         if begin >= length:
             return False
         done = end + 1e-6
-        if begin < nearest_bar(build):
+        if begin < nearest_bar(vehicle):
             return True
-        own = begin - build[REACH] - SLIP
-        back = end + SLIP + 2.0 * build[HALF_LENGTH] + BACK
+        own = begin - vehicle.reach - SLIP
+        back = end + SLIP + 2.0 * vehicle.half_length + BACK
         offset += BERTH + wide
-        aside = offset > 3.0 * build[MIDDLE] - EDGE
-        if aside or back > length + stop_line(build) or own < build[DISC] + build[REACH] + EDGE:
+        aside = offset > 3.0 * vehicle.middle - EDGE
+        if aside or back > length + stop_line(vehicle) or own < vehicle.disc + vehicle.reach + EDGE:
             return True
-        if (back - own) / (0.8 * build[FASTEST]) + TURNING > build[LEFT_TIME]:
+        if (back - own) / (0.8 * vehicle.fastest) + TURNING > vehicle.left_time:
             return True
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            far = build[REACH] + obstacles.part[p, 7]
-            beside = abs(left + build[MIDDLE] - offset) < wide + BESIDE + obstacles.part[p, 7]
-            if own - far < along < back + far and left + build[MIDDLE] > 0.0 and beside:
+            far = vehicle.reach + obstacles.part[p, 7]
+            beside = abs(left + vehicle.middle - offset) < wide + BESIDE + obstacles.part[p, 7]
+            if own - far < along < back + far and left + vehicle.middle > 0.0 and beside:
                 return True
     return False
 
 
 @jit_inline
-def nearest_bar(build: Any) -> float:
+def nearest_bar(vehicle: Vehicle) -> float:
     """Return from where on an obstacle in a lane leaves room before it for a car that comes out of the disc, metres."""
-    return build[DISC] + 2.0 * build[REACH] + EDGE + QUEUE_GAP
+    return vehicle.disc + 2.0 * vehicle.reach + EDGE + QUEUE_GAP
 
 
 @jit
-def has_place(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+def has_place(b: int, lane: int, traffic: Traffic) -> bool:
     """Tell whether a car can leave the disc at the beginning of a lane for all obstacles, though it gets no farther."""
-    net, build = drivers.net[b], drivers.build[b]
+    roads, obstacles, drivers = traffic.roads, traffic.obstacles, traffic.drivers
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
     first, last = obstacles.off[b], obstacles.off[b + 1]
-    early = LAST * build[DISC] + build[REACH] + OBSTACLE_GAP
-    begin, _, _ = next_bar(roads, net, lane, 0.0, early, obstacles, first, last, build)
-    return begin >= min(nearest_bar(build), roads.seg[roads.seg_off[net] + (lane >> 1), 4])
+    early = LAST * vehicle.disc + vehicle.reach + OBSTACLE_GAP
+    begin, _, _ = next_bar(traffic, net, lane, 0.0, early, first, last, vehicle)
+    return begin >= min(nearest_bar(vehicle), roads.seg[roads.seg_off[net] + (lane >> 1), 4])
 
 
 @jit
 def next_bar(
-    roads: RoadTable,
-    net: int,
-    lane: int,
-    done: float,
-    early: float,
-    obstacles: ObstacleTable,
-    first: int,
-    last: int,
-    build: Any,
+    traffic: Traffic, net: int, lane: int, done: float, early: float, first: int, last: int, vehicle: Vehicle
 ) -> tuple[float, float, float]:
     """Return what `next_narrow` does, of the next obstacles that can't be passed within the lane.
 
     None can that begins before `early`, metres along the lane.
     """
-    begin, end, offset = next_narrow(roads, net, lane, done, obstacles, first, last, build)
+    begin, end, offset = next_narrow(traffic, net, lane, done, first, last, vehicle)
     while begin != INFINITE:
-        within = offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) != 0.0
+        within = offset_in_lane(traffic, net, lane, begin, end, first, last, vehicle) != 0.0
         if begin < early or not within:
             break
-        begin, end, offset = next_narrow(roads, net, lane, end + 1e-6, obstacles, first, last, build)
+        begin, end, offset = next_narrow(traffic, net, lane, end + 1e-6, first, last, vehicle)
     return begin, end, offset
 
 
 @jit
 def next_narrow(
-    roads: RoadTable,
-    net: int,
-    lane: int,
-    done: float,
-    obstacles: ObstacleTable,
-    first: int,
-    last: int,
-    build: Any,
+    traffic: Traffic, net: int, lane: int, done: float, first: int, last: int, vehicle: Vehicle
 ) -> tuple[float, float, float]:
     """Return (begin, end, left) of the next obstacles in the way in a lane, none of which begins before `done`.
 
     Obstacles that are too near to one another for a car to return in between are passed as one; they reach
     to `left`, metres left of the middle of the lane. Without any, they begin at infinity.
     """
+    roads, obstacles = traffic.roads, traffic.obstacles
     begin = INFINITE
-    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
+    wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(first, last):
         along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
         size = obstacles.part[p, 7]
-        if abs(left + build[MIDDLE]) < wide + size and along - size >= done:
+        if abs(left + vehicle.middle) < wide + size and along - size >= done:
             begin = min(begin, along - size)
     end = begin
     offset = -1.0
@@ -137,62 +109,62 @@ def next_narrow(
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
             size = obstacles.part[p, 7]
-            in_way = abs(left + build[MIDDLE]) < wide + size and begin <= along - size <= end + NARROWS
+            in_way = abs(left + vehicle.middle) < wide + size and begin <= along - size <= end + NARROWS
             if in_way and along + size > end:
                 end = along + size
                 found = True
             if in_way:
-                offset = max(offset, left + build[MIDDLE] + size)
+                offset = max(offset, left + vehicle.middle + size)
     return begin, end, offset
 
 
 @jit
-def leads_nowhere(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+def leads_nowhere(b: int, lane: int, traffic: Traffic) -> bool:
     """Tell whether no way on from the end of a lane, nor from the end of the next, is free of what can't be passed."""
+    roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
     row = roads.vert_off[net] + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        if is_shut(b, lane, out, roads, obstacles, drivers) or ends_there(b, out, roads, obstacles, drivers):
+        if is_shut(b, lane, out, traffic) or ends_there(b, out, traffic):
             shut += 1
     return shut == roads.degree[row]
 
 
 @jit
-def ends_there(b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers) -> bool:
+def ends_there(b: int, lane: int, traffic: Traffic) -> bool:
     """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
+    roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
     row = roads.vert_off[net] + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
-        shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), roads, obstacles, drivers) else 0
+        shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), traffic) else 0
     return shut == roads.degree[row]
 
 
 @jit
-def is_shut(
-    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
-) -> bool:
+def is_shut(b: int, lane: int, out: int, traffic: Traffic) -> bool:
     """Tell whether an obstacle is in the way from a lane to the lane `out`, or can't be passed in that."""
-    net, build = drivers.net[b], drivers.build[b]
-    if is_barred(roads, net, out, obstacles, obstacles.off[b], obstacles.off[b + 1], build):
+    obstacles, drivers = traffic.obstacles, traffic.drivers
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    if is_barred(traffic, net, out, obstacles.off[b], obstacles.off[b + 1], vehicle):
         return True
-    return stands_in_disc(b, lane, out, roads, obstacles, drivers)
+    return stands_in_disc(b, lane, out, traffic)
 
 
 @jit
-def stands_in_disc(
-    b: int, lane: int, out: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
-) -> bool:
+def stands_in_disc(b: int, lane: int, out: int, traffic: Traffic) -> bool:
     """Tell whether an obstacle is in the way through the disc from a lane to the lane `out`."""
-    net, build = drivers.net[b], drivers.build[b]
-    way = way_between(roads, net, lane, out, build[MIDDLE], build[DISC])
-    wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE
+    roads, obstacles, drivers = traffic.roads, traffic.obstacles, traffic.drivers
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    way = way_between(roads, net, lane, out, vehicle.middle, vehicle.disc)
+    wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         dx, dy = row[0] - way.x, row[1] - way.y
-        far = build[DISC] + row[7]
+        far = vehicle.disc + row[7]
         _, _, left, _, _ = on_way(way, row[0], row[1])
         if dx * dx + dy * dy < far * far and abs(left) < wide + row[7]:
             return True

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, slowed, steer
 from dubins_traffic.policies.rules.tables import (
-    ASIDE,
     DUE,
-    KIND,
     LATE,
     LATE_BEND,
     LATE_C,
@@ -26,29 +22,18 @@ from dubins_traffic.policies.rules.tables import (
     LATE_X,
     LATE_Y,
     LATE_YAW,
-    PERIOD,
     ROUND,
-    TIGHTEST,
-    YAW_MOST,
-    Drivers,
-    Scratch,
+    Traffic,
 )
 from dubins_traffic.rules.propositions import LEFT
 
 
 @jit_inline
 def note(
-    b: int,
-    n: int,
-    speed: float,
-    left: float,
-    px: float,
-    py: float,
-    bend: float,
-    state: State,
-    scratch: Scratch,
+    b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, traffic: Traffic
 ) -> None:
     """Leave the command of a car to `decide_deferred`; its speed is one for the bend already (`steering.slowed`)."""
+    state, scratch = traffic.state, traffic.scratch
     late = scratch.late
     k = (n & -BLOCK) * LATE + (n & (BLOCK - 1))
     late[k + BLOCK * DUE] = 1.0
@@ -63,31 +48,40 @@ def note(
 
 @jit_inline
 def defer(
-    b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, close: bool, state: State,
-    labels: Labels, obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int,
+    n: int,
+    speed: float,
+    left: float,
+    px: float,
+    py: float,
+    bend: float,
+    close: bool,
+    traffic: Traffic,
+) -> bool:
     """Leave the command of a car with nothing close around it, that just drives on, to `decide_deferred`, if it is
     one.
     """
-    build = drivers.build[b]
-    free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.ints[b, n, KIND] != ROUND
-    bound = drivers.floats[b, n, ASIDE] != 0.0 or build[TIGHTEST] > 0.0
+    labels, obstacles, drivers = traffic.labels, traffic.obstacles, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    free = not close and obstacles.off[b] == obstacles.off[b + 1] and drivers.car[b, n].kind != ROUND
+    bound = drivers.car[b, n].aside != 0.0 or vehicle.tightest > 0.0
     astray = labels.lane[b, n] < 0 and left > ASTRAY
     if not free or bound or astray or np.int64(labels.bits[b, n]) & LEFT != 0:
         return False
-    note(b, n, slowed(speed, bend, build[YAW_MOST]), left, px, py, bend, state, scratch)
+    note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, traffic)
     return True
 
 
 @jit_inline
-def decide_deferred(b: int, state: State, drivers: Drivers, scratch: Scratch, commands: Floats) -> None:
+def decide_deferred(b: int, traffic: Traffic, commands: Floats) -> None:
     """Write the commands that have been put off.
 
     The columns of a block are a fixed number of cars apart, and nothing in the loop over its cars is a branch: so the
     compiler sees that several may be taken at once.
     """
-    build = drivers.build[b]
-    limit, period = build[YAW_MOST], build[PERIOD]
+    state, drivers, scratch = traffic.state, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
+    limit, period = vehicle.yaw_most, vehicle.period
     late = scratch.late
     for first in range(0, state.count[b], BLOCK):
         here = min(state.count[b] - first, BLOCK)

@@ -4,41 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import below, uniform
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
 from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    BLOCKS,
-    FIRST,
-    GOAL,
-    HOLD,
-    KEPT_OUT,
-    KIND,
-    LANE,
-    LAST,
     LEFT_SIDE,
-    LEFTS,
     LOOP,
     NEMESIS,
-    NEXT,
-    PARK_TIME,
-    PARKS,
-    PERIOD,
-    PLACE,
     PLACES,
     ROLLING,
-    ROLLS,
     ROUND,
-    TAILGATES,
     TAILGATING,
-    TURN,
-    VIOLATIONS,
-    WITHIN,
+    Driver,
     Drivers,
     Scratch,
+    Traffic,
+    Vehicle,
 )
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -60,55 +42,48 @@ BLOCK_TIME = 9.0
 
 
 @jit
-def take_lane(
-    b: int, n: int, tick: int, lane: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
     """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
+    car = drivers.car[b, n]
     seed = drivers.seed[b]
     trial = drivers.trial[b]
-    before = ints[LANE]
-    ints[LANE] = lane
-    ints[TURN] = 0
-    ints[KEPT_OUT] = 0
-    ints[WITHIN] = 0
-    floats[ASIDE] = 0.0
-    if ints[KIND] == LOOP:
-        following = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
-        if ints[PLACE] < 0 or before < 0 or drivers.stage[following] != lane:
-            following = place_of(lane, ints[FIRST], ints[LAST], drivers.stage)
-        ints[PLACE] = following
+    before = car.lane
+    car.lane = lane
+    car.turn = 0
+    car.kept_out = 0
+    car.within = 0
+    car.aside = 0.0
+    if car.kind == LOOP:
+        following = car.place + 1 if car.place + 1 < car.last else car.first
+        if car.place < 0 or before < 0 or drivers.stage[following] != lane:
+            following = place_of(lane, car.first, car.last, drivers.stage)
+        car.place = following
     v = lane_end(roads, drivers.net[b], lane)
     violations = 0
-    floats[HOLD] = 0.0
-    if floats[ROLLS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < floats[ROLLS]:
+    car.hold = 0.0
+    if car.rolls > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < car.rolls:
         violations |= ROLLING
-    if floats[LEFTS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < floats[LEFTS]:
+    if car.lefts > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < car.lefts:
         violations |= LEFT_SIDE
-    if floats[TAILGATES] > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < floats[TAILGATES]:
+    if car.tailgates > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < car.tailgates:
         violations |= TAILGATING
-    if floats[BLOCKS] > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < floats[BLOCKS]:
-        floats[HOLD] = BLOCK_TIME
-    if (
-        floats[PARKS] > 0.0
-        and is_goal(v, ints, drivers)
-        and uniform(seed, trial, n, tick, DRAW + 8) < floats[PARKS]
-    ):
-        floats[HOLD] = floats[PARK_TIME] * uniform(seed, trial, n, tick, DRAW + 9)
-    ints[VIOLATIONS] = violations
-    price_exits(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
-    ints[NEXT] = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
+    if car.blocks > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < car.blocks:
+        car.hold = BLOCK_TIME
+    if car.parks > 0.0 and is_goal(v, car, drivers) and uniform(seed, trial, n, tick, DRAW + 8) < car.parks:
+        car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW + 9)
+    car.violations = violations
+    price_exits(b, n, tick, traffic)
+    car.next_lane = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
 
 
 @jit_inline
-def is_goal(v: int, ints: Any, drivers: Drivers) -> bool:
+def is_goal(v: int, car: Driver, drivers: Drivers) -> bool:
     """Tell whether v is among the goals that the car knows."""
-    if ints[KIND] == LOOP:
+    if car.kind == LOOP:
         return False
     found = False
-    for k in range(ints[FIRST], ints[LAST]):
+    for k in range(car.first, car.last):
         found = found or drivers.stage[k] == v
     return found
 
@@ -124,29 +99,27 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scrat
 
 
 @jit
-def price_exits(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
     """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
+    roads, obstacles, drivers, scratch = traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    lane = ints[LANE]
+    car = drivers.car[b, n]
+    lane = car.lane
     v = lane_end(roads, net, lane)
     row = roads.vert_off[net] + v
-    kind = ints[KIND]
-    on_loop = kind == LOOP and ints[PLACE] >= 0
+    kind = car.kind
+    on_loop = kind == LOOP and car.place >= 0
     follow = -1
     if on_loop:
-        follow = drivers.stage[ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]]
-    known = aim(b, n, tick, v, state, labels, roads, drivers, scratch)
+        follow = drivers.stage[car.place + 1 if car.place + 1 < car.last else car.first]
+    known = aim(b, n, tick, v, traffic)
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
         cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
-        if kind == ROUND and ints[PLACE] >= 0:
-            place = ints[PLACE]
+        if kind == ROUND and car.place >= 0:
+            place = car.place
             if drivers.stage[place] == v:
-                place = place + 1 if place + 1 < ints[LAST] else ints[FIRST]
+                place = place + 1 if place + 1 < car.last else car.first
             cost = min(drivers.distance[place, out], UNREACHABLE)
         elif on_loop and out == follow:
             cost = -1.0
@@ -156,40 +129,37 @@ def price_exits(
             at_crossing = STEP if kind == NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
         if obstacles.off[b] != obstacles.off[b + 1] and (
-            is_shut(b, lane, int(out), roads, obstacles, drivers)
-            or leads_nowhere(b, int(out), roads, obstacles, drivers)
+            is_shut(b, lane, int(out), traffic) or leads_nowhere(b, int(out), traffic)
         ):
             cost += BARRED
         scratch.cost[k] = cost
 
 
 @jit
-def aim(
-    b: int, n: int, tick: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    scratch: Scratch,
-) -> bool:  # fmt: skip
+def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
     """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
+    roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     net = drivers.net[b]
-    ints = drivers.ints[b, n]
-    kind = ints[KIND]
-    if kind == PLACES and (ints[GOAL] < 0 or ints[GOAL] == v):
+    car = drivers.car[b, n]
+    kind = car.kind
+    if kind == PLACES and (car.goal < 0 or car.goal == v):
         count = roads.vert_off[net + 1] - roads.vert_off[net]
-        ints[GOAL] = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
+        car.goal = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
     elif kind == NEMESIS:
-        ints[GOAL] = foreseen(b, state, labels, roads, drivers, ints)
-    seeks_loop = kind == LOOP and ints[PLACE] < 0 and ints[LAST] > ints[FIRST]
-    if not seeks_loop and (kind not in (PLACES, NEMESIS) or ints[GOAL] < 0):
+        car.goal = foreseen(b, traffic, car)
+    seeks_loop = kind == LOOP and car.place < 0 and car.last > car.first
+    if not seeks_loop and (kind not in (PLACES, NEMESIS) or car.goal < 0):
         return False
     if seeks_loop:
         forget(net, roads, scratch)
         found = 0
-        for k in range(ints[FIRST], ints[LAST]):
+        for k in range(car.first, car.last):
             found = aim_for(drivers.stage[k], scratch.hops, scratch.queue, found)
         spread(roads, net, scratch.hops, scratch.queue, found)
         return True
-    seek(net, ints[GOAL], roads, scratch)
+    seek(net, car.goal, roads, scratch)
     if kind == NEMESIS:
-        seek_ego(b, net, labels, roads, scratch)
+        seek_ego(b, net, traffic)
     return True
 
 
@@ -212,8 +182,9 @@ def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
 
 
 @jit
-def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratch) -> None:
+def seek_ego(b: int, net: int, traffic: Traffic) -> None:
     """Turn hops to the ego's goal into hops to the next lanes on its way there."""
+    labels, roads, scratch = traffic.labels, traffic.roads, traffic.scratch
     lane = labels.lane[b, 0]
     v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
     count = 0
@@ -241,14 +212,15 @@ def seek_ego(b: int, net: int, labels: Labels, roads: RoadTable, scratch: Scratc
 
 
 @jit
-def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, ints: Any) -> int:
+def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
     """Return the goal to which the ego is nearest, but for the one it is at; -1 without goals."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     best = -1
     least = 1e300
-    for k in range(ints[FIRST], ints[LAST]):
+    for k in range(car.first, car.last):
         goal = drivers.stage[k]
-        if goal == labels.at[b, 0] or (goal == ints[PLACE] and ints[LAST] - ints[FIRST] > 1):
+        if goal == labels.at[b, 0] or (goal == car.place and car.last - car.first > 1):
             continue
         dx = roads.vert[roads.vert_off[net] + goal, 0] - state.x[b, 0]
         dy = roads.vert[roads.vert_off[net] + goal, 1] - state.y[b, 0]
@@ -261,21 +233,21 @@ def foreseen(b: int, state: State, labels: Labels, roads: RoadTable, drivers: Dr
 @jit_inline
 def watch_ego(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
     """A nemesis remembers in PLACE the goal at which the ego has been last."""
-    ints = drivers.ints[b, n]
+    car = drivers.car[b, n]
     at = labels.at[b, 0]
-    if at >= 0 and is_goal(at, ints, drivers):
-        ints[PLACE] = at
+    if at >= 0 and is_goal(at, car, drivers):
+        car.place = at
 
 
 @jit_inline
 def count_visit(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
     """A car on its round takes the next goal once it is at this one."""
-    ints = drivers.ints[b, n]
-    if ints[PLACE] >= 0 and labels.at[b, n] == drivers.stage[ints[PLACE]]:
-        ints[PLACE] = ints[PLACE] + 1 if ints[PLACE] + 1 < ints[LAST] else ints[FIRST]
+    car = drivers.car[b, n]
+    if car.place >= 0 and labels.at[b, n] == drivers.stage[car.place]:
+        car.place = car.place + 1 if car.place + 1 < car.last else car.first
 
 
 @jit_inline
-def ticks_of(seconds: float, build: Any) -> int:
+def ticks_of(seconds: float, vehicle: Vehicle) -> int:
     """Return a duration in whole ticks, rounded down."""
-    return int(seconds / build[PERIOD] + 1e-9)
+    return int(seconds / vehicle.period + 1e-9)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.policies.rules.tables import HALF_WIDTH, MIDDLE, REACH, ROUNDING
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction
-from dubins_traffic.roads.table import RoadTable
 
 BESIDE = 0.06
 """What a car keeps free beside an obstacle, metres."""
@@ -22,14 +19,14 @@ TINY = 0.002
 
 
 @jit
-def within_lane(offset: float, build: Any) -> bool:
+def within_lane(offset: float, vehicle: Vehicle) -> bool:
     """Tell whether a body so far left of the middle of the right lane does not reach over the centre line."""
-    return offset + build[HALF_WIDTH] + build[ROUNDING] <= build[MIDDLE]
+    return offset + vehicle.half_width + vehicle.rounding <= vehicle.middle
 
 
 @jit
 def offset_on_way(
-    b: int, way: ReferencePath, begin: float, end: float, obstacles: ObstacleTable, build: Any
+    b: int, way: ReferencePath, begin: float, end: float, obstacles: ObstacleTable, vehicle: Vehicle
 ) -> float:
     """Return `clear_offset` for the stretch from `begin` to `end` of the lane in which a way begins.
 
@@ -38,27 +35,27 @@ def offset_on_way(
     along = -(way.x * way.tx + way.y * way.ty)
     left = -(way.tx * way.y - way.ty * way.x) + way.middle
     return clear_offset(
-        along, left, way.tx, way.ty, begin, end, obstacles, obstacles.off[b], obstacles.off[b + 1], build
+        along, left, way.tx, way.ty, begin, end, obstacles, obstacles.off[b], obstacles.off[b + 1], vehicle
     )
 
 
 @jit
 def offset_in_lane(
-    roads: RoadTable, net: int, lane: int, begin: float, end: float, obstacles: ObstacleTable, first: int,
-    last: int, build: Any,
-) -> float:  # fmt: skip
+    traffic: Traffic, net: int, lane: int, begin: float, end: float, first: int, last: int, vehicle: Vehicle
+) -> float:
     """Return `clear_offset` for the stretch of a lane from `begin` to `end`, metres along it."""
+    roads, obstacles = traffic.roads, traffic.obstacles
     along, left = lane_coordinates(roads, net, lane, 0.0, 0.0)
     tx, ty = lane_direction(roads, net, lane)
     return clear_offset(
-        along, left + build[MIDDLE], float(tx), float(ty), begin, end, obstacles, first, last, build
+        along, left + vehicle.middle, float(tx), float(ty), begin, end, obstacles, first, last, vehicle
     )
 
 
 @jit
 def clear_offset(
     along: float, left: float, tx: float, ty: float, begin: float, end: float, obstacles: ObstacleTable,
-    first: int, last: int, build: Any,
+    first: int, last: int, vehicle: Vehicle,
 ) -> float:  # fmt: skip
     """Return how far left of the middle of its lane a car gets past all obstacles of a stretch, 0 if it can't.
 
@@ -66,21 +63,21 @@ def clear_offset(
     origin of the plane lies `along` metres along the lane, which has the direction (`tx`, `ty`), and `left` metres
     left of its middle.
     """
-    low, high = EDGE - build[MIDDLE], build[MIDDLE] - build[HALF_WIDTH] - build[ROUNDING]
+    low, high = EDGE - vehicle.middle, vehicle.middle - vehicle.half_width - vehicle.rounding
     best = INFINITE
     for tight in range(2):
-        wide = (SQUEEZED if tight == 1 else BESIDE) + build[HALF_WIDTH] + build[ROUNDING]
+        wide = (SQUEEZED if tight == 1 else BESIDE) + vehicle.half_width + vehicle.rounding
         for p in range(first, last):
             row = obstacles.part[p]
             key = along + tx * row[0] + ty * row[1]
-            if not begin - build[REACH] - row[7] < key < end + build[REACH] + row[7]:
+            if not begin - vehicle.reach - row[7] < key < end + vehicle.reach + row[7]:
                 continue
             its = left + tx * row[1] - ty * row[0]
             for side in range(2):
                 offset = its - row[7] - wide if side == 0 else its + row[7] + wide
                 near = abs(offset) < abs(best) and low <= offset <= high
                 if near and is_clear(
-                    along, left, tx, ty, begin, end, offset, wide, obstacles, first, last, build
+                    along, left, tx, ty, begin, end, offset, wide, obstacles, first, last, vehicle
                 ):
                     best = offset
         if best != INFINITE:
@@ -91,13 +88,13 @@ def clear_offset(
 @jit
 def is_clear(
     along: float, left: float, tx: float, ty: float, begin: float, end: float, offset: float, wide: float,
-    obstacles: ObstacleTable, first: int, last: int, build: Any,
+    obstacles: ObstacleTable, first: int, last: int, vehicle: Vehicle,
 ) -> bool:  # fmt: skip
     """Tell whether all obstacles of a stretch are `wide` beside a car `offset` left of the middle of its lane."""
     for p in range(first, last):
         row = obstacles.part[p]
         key = along + tx * row[0] + ty * row[1]
-        if not begin - build[REACH] - row[7] < key < end + build[REACH] + row[7]:
+        if not begin - vehicle.reach - row[7] < key < end + vehicle.reach + row[7]:
             continue
         if abs(left + tx * row[1] - ty * row[0] - offset) < wide + row[7] - 1e-9:
             return False

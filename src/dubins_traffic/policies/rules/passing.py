@@ -5,32 +5,13 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
-from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    BACKS_UP,
-    DISC,
-    FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LANE,
-    LEFT_TIME,
-    MIDDLE,
-    REACH,
-    ROUNDING,
-    SLOWEST,
-    TIGHTEST,
-    UNTIL,
-    WAITED,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING, STANDS
 from dubins_traffic.rules.shape import half_extent
 
@@ -71,125 +52,128 @@ def aside(way: ReferencePath, x: float, y: float) -> float:
 
 
 @jit
-def stop_line(build: Any) -> float:
+def stop_line(vehicle: Vehicle) -> float:
     """Return metres from the intersection, negative, to where a car on the right lane has to be back in it."""
-    edge = build[DISC] + build[REACH] + 0.03
-    return -sqrt(edge * edge - build[MIDDLE] * build[MIDDLE])
+    edge = vehicle.disc + vehicle.reach + 0.03
+    return -sqrt(edge * edge - vehicle.middle * vehicle.middle)
 
 
 @jit
-def half_width(b: int, j: Any, way: ReferencePath, state: State, build: Any) -> float:
+def half_width(b: int, j: Any, way: ReferencePath, state: State, vehicle: Vehicle) -> float:
     """Return half the extent of a car across the lane."""
     return half_extent(
         way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
-        build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING],
+        vehicle.half_length, vehicle.half_width, vehicle.rounding,
     )  # fmt: skip
 
 
 @jit
-def can_come_back(build: Any) -> bool:
+def can_come_back(vehicle: Vehicle) -> bool:
     """Tell whether a car that has begun to pull out can still stay in its lane: it turns in place, or backs up."""
-    return build[TIGHTEST] == 0.0 or build[SLOWEST] < 0.0
+    return vehicle.tightest == 0.0 or vehicle.slowest < 0.0
 
 
 @jit
-def find_way_past(
-    b: int, n: int, way: ReferencePath, who: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic) -> None:
     """Begin to pass what stands ahead, if there is room to return and the other lane is and stays free."""
-    build = drivers.build[b]
-    floats = drivers.floats[b, n]
-    reach = build[REACH]
-    own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, _ = extent(
-        b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], scratch
+    state, labels, roads, obstacles, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.obstacles,
+        traffic.drivers,
+        traffic.scratch,
     )
-    offset += BERTH + build[HALF_WIDTH] + build[ROUNDING]
-    line = stop_line(build)
-    until = end + SLIP + 2.0 * build[HALF_LENGTH]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
+    reach = vehicle.reach
+    own = along(way, state.x[b, n], state.y[b, n])
+    end, offset, _ = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
+    offset += BERTH + vehicle.half_width + vehicle.rounding
+    line = stop_line(vehicle)
+    until = end + SLIP + 2.0 * vehicle.half_length
     back = until + BACK
-    if end < own or offset > 3.0 * build[MIDDLE] - EDGE or back > line or not can_come_back(build):
+    if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
-    length = roads.seg[roads.seg_off[net] + (drivers.ints[b, n, LANE] >> 1), 4]
-    if length + own < build[DISC] + reach + EDGE:
+    length = roads.seg[roads.seg_off[net] + (drivers.car[b, n].lane >> 1), 4]
+    if length + own < vehicle.disc + reach + EDGE:
         return
-    if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, build):
+    if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, vehicle):
         return
-    if stands_beside(b, own, back, offset, way, obstacles, build):
+    if stands_beside(b, own, back, offset, way, obstacles, vehicle):
         return
-    crosses_over = not within_lane(offset, build)
+    crosses_over = not within_lane(offset, vehicle)
     if (
         n != EGO
         and crosses_over
-        and ego_is_beside(b, own, back, way, state, labels, drivers.ints[b, n, LANE], build)
+        and ego_is_beside(b, own, back, way, traffic, drivers.car[b, n].lane, vehicle)
     ):
         return
-    time = (back - own) / (0.8 * build[FASTEST]) + TURNING
-    if time > build[LEFT_TIME]:
+    time = (back - own) / (0.8 * vehicle.fastest) + TURNING
+    if time > vehicle.left_time:
         return
-    comes = max(COMES, build[FASTEST]) * time + SPARE
+    comes = max(COMES, vehicle.fastest) * time + SPARE
     room = line - back
-    j = scratch.head[drivers.ints[b, n, LANE] >> 1]
+    j = scratch.head[drivers.car[b, n].lane >> 1]
     while j >= 0:
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
         stands = labels.bits[b, j] & STANDS != 0
         passes = labels.bits[b, j] & LEFT != 0 and not stands
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
-            before = key > own or left > build[MIDDLE]
-            wide = half_width(b, j, way, state, build) + build[HALF_WIDTH] + build[ROUNDING] + 0.1
+            before = key > own or left > vehicle.middle
+            wide = half_width(b, j, way, state, vehicle) + vehicle.half_width + vehicle.rounding + 0.1
             if before and abs(left - offset) < wide and key < back + (0.5 if stands else comes):
                 return
-            if not stands and left < build[MIDDLE]:
+            if not stands and left < vehicle.middle:
                 if key < end:
                     return
                 room -= 2.0 * reach + BERTH
         j = scratch.link[j]
     if room < 0.0:
         return
-    if -line - reach - build[DISC] + (line - back) < comes and may_come(
-        b, n, who, comes, way, state, labels, roads, drivers, scratch
-    ):
+    if -line - reach - vehicle.disc + (line - back) < comes and may_come(b, n, who, comes, way, traffic):
         return
-    floats[ASIDE] = offset
-    floats[UNTIL] = until
-    drivers.ints[b, n, WAITED] = 0
+    car.aside = offset
+    car.until = until
+    drivers.car[b, n].waited = 0
 
 
 @jit
-def keep_off(
-    b: int, n: int, p: int, way: ReferencePath, state: State, labels: Labels, obstacles: ObstacleTable, drivers:
-    Drivers, scratch: Scratch,
-) -> None:  # fmt: skip
+def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> None:
     """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there.
 
     All that are near to one another are passed on one line, or else obstacle part p, the first of them, alone.
     """
-    build = drivers.build[b]
+    state, obstacles, drivers = traffic.state, traffic.obstacles, traffic.drivers
+    vehicle = drivers.vehicle[b]
     own = along(way, state.x[b, n], state.y[b, n])
-    end, _, low = extent(b, n, way, own, state, labels, obstacles, build, drivers.ints[b, n, LANE], scratch)
+    end, _, low = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
     offset = 0.0
     if end >= own and low > -INFINITE:
-        offset = offset_on_way(b, way, own, end + SLIP, obstacles, build)
+        offset = offset_on_way(b, way, own, end + SLIP, obstacles, vehicle)
     if offset == 0.0:
         row = obstacles.part[p]
-        end = along(way, row[0], row[1]) + row[7] - build[REACH]
-        offset = offset_on_way(b, way, own + build[REACH], end, obstacles, build)
+        end = along(way, row[0], row[1]) + row[7] - vehicle.reach
+        offset = offset_on_way(b, way, own + vehicle.reach, end, obstacles, vehicle)
     if end >= own and offset != 0.0:
-        drivers.floats[b, n, ASIDE] = offset
-        drivers.floats[b, n, UNTIL] = end + SLIP + 2.0 * build[HALF_LENGTH]
+        drivers.car[b, n].aside = offset
+        drivers.car[b, n].until = end + SLIP + 2.0 * vehicle.half_length
 
 
 @jit
-def may_come(
-    b: int, n: int, who: int, comes: float, way: ReferencePath, state: State, labels: Labels, roads: RoadTable,
-    drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car may come out of the next disc, from `comes` metres behind it at most."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
-    v = lane_end(roads, net, drivers.ints[b, n, LANE])
+    v = lane_end(roads, net, drivers.car[b, n].lane)
     row = roads.vert_off[net] + v
     for k in range(roads.degree[row]):
         j = scratch.head[roads.arms[row, k] >> 1]
@@ -198,7 +182,7 @@ def may_come(
             dy = state.y[b, j] - way.y
             if j != n and dx * dx + dy * dy < (comes + 1.0) * (comes + 1.0) and j != who:
                 inbound = labels.lane[b, j] < 0 or lane_end(roads, net, int(labels.lane[b, j])) == v
-                if inbound and labels.segment[b, j] != drivers.ints[b, n, LANE] >> 1:
+                if inbound and labels.segment[b, j] != drivers.car[b, n].lane >> 1:
                     return True
                 if labels.crosses[b, j] == v:
                     return True
@@ -208,29 +192,32 @@ def may_come(
 
 @jit_inline
 def ego_is_beside(
-    b: int, own: float, back: float, way: ReferencePath, state: State, labels: Labels, lane: int, build: Any
+    b: int, own: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
     """Tell whether the ego is in the lane where a car would pass: it might keep beside, or stop where that returns."""
+    state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
         return False
     key = along(way, state.x[b, EGO], state.y[b, EGO])
     left = aside(way, state.x[b, EGO], state.y[b, EGO])
-    return left < build[MIDDLE] and own - FOLLOWED < key < back + build[BACKS_UP] + 2.0 * build[REACH] + BERTH
+    return (
+        left < vehicle.middle and own - FOLLOWED < key < back + vehicle.backs_up + 2.0 * vehicle.reach + BERTH
+    )
 
 
 @jit
 def extent(
-    b: int, n: int, way: ReferencePath, own: float, state: State, labels: Labels, obstacles: ObstacleTable, build: Any,
-    lane: int, scratch: Scratch,
-) -> tuple[float, float, float]:  # fmt: skip
+    b: int, n: int, way: ReferencePath, own: float, traffic: Traffic, vehicle: Vehicle, lane: int
+) -> tuple[float, float, float]:
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
     Both are metres left of the middle of the lane; on the right nobody passes a car.
     """
+    state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     end = own - 1.0
     offset = -1.0
     low = INFINITE
-    reach = build[REACH]
+    reach = vehicle.reach
     before = end - 1.0
     while end > before:
         before = end
@@ -239,16 +226,16 @@ def extent(
         while j >= 0:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-            if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < build[MIDDLE]:
+            if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < vehicle.middle:
                 end = max(end, key)
-                offset = max(offset, left + half_width(b, j, way, state, build))
+                offset = max(offset, left + half_width(b, j, way, state, vehicle))
                 low = -INFINITE
             j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
             row = obstacles.part[p]
             key = along(way, row[0], row[1])
             left = aside(way, row[0], row[1])
-            if own < key <= horizon + row[7] and abs(left) - row[7] < build[MIDDLE]:
+            if own < key <= horizon + row[7] and abs(left) - row[7] < vehicle.middle:
                 end = max(end, key + row[7] - reach)
                 offset = max(offset, left + row[7])
                 low = min(low, left - row[7])
@@ -257,44 +244,54 @@ def extent(
 
 @jit
 def stands_beside(
-    b: int, own: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, build: Any
+    b: int,
+    own: float,
+    back: float,
+    offset: float,
+    way: ReferencePath,
+    obstacles: ObstacleTable,
+    vehicle: Vehicle,
 ) -> bool:
     """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
-    wide = build[HALF_WIDTH] + build[ROUNDING] + BESIDE
+    wide = vehicle.half_width + vehicle.rounding + BESIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         key = along(way, row[0], row[1])
         left = aside(way, row[0], row[1])
-        near = own - build[REACH] - row[7] < key < back + build[REACH] + row[7]
+        near = own - vehicle.reach - row[7] < key < back + vehicle.reach + row[7]
         if near and left > 0.0 and abs(left - offset) < wide + row[7]:
             return True
     return False
 
 
 @jit
-def keep_passing(
-    b: int, n: int, speed: float, way: ReferencePath, near: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> float:  # fmt: skip
+def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return the speed of a car that passes; end the manoeuvre when it is done or there is nothing left to pass."""
-    build = drivers.build[b]
-    floats = drivers.floats[b, n]
+    state, labels, obstacles, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.obstacles,
+        traffic.drivers,
+        traffic.scratch,
+    )
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     own = along(way, state.x[b, n], state.y[b, n])
     left = aside(way, state.x[b, n], state.y[b, n])
-    if own >= floats[UNTIL]:
+    if own >= car.until:
         if abs(left) < 0.05:
-            floats[ASIDE] = 0.0
+            car.aside = 0.0
         elif labels.bits[b, n] & LEFT != 0:
-            pass_again(b, own, way, near, state, floats, build, scratch)
+            pass_again(b, own, way, near, traffic, car, vehicle)
         return speed
-    if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(floats[ASIDE], build):
-        floats[ASIDE] = 0.0
+    if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(car.aside, vehicle):
+        car.aside = 0.0
         return speed
-    length = 2.0 * build[REACH]
+    length = 2.0 * vehicle.reach
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         key = along(way, row[0], row[1])
-        if own - row[7] - length < key <= floats[UNTIL] + row[7] and abs(aside(way, row[0], row[1])) < 2.0:
+        if own - row[7] - length < key <= car.until + row[7] and abs(aside(way, row[0], row[1])) < 2.0:
             return speed
     beside = False
     before = False
@@ -302,30 +299,31 @@ def keep_passing(
         j = scratch.near[k]
         key = along(way, state.x[b, j], state.y[b, j])
         its = aside(way, state.x[b, j], state.y[b, j])
-        if its > build[MIDDLE] or abs(its) > 2.0 * build[MIDDLE]:
+        if its > vehicle.middle or abs(its) > 2.0 * vehicle.middle:
             continue
         stands = labels.bits[b, j] & STANDS != 0 or abs(state.speed[b, j]) < SLOW
-        if stands and own - length < key <= floats[UNTIL]:
+        if stands and own - length < key <= car.until:
             return speed
         if abs(key - own) < length + BERTH:
             beside = True
             before = before or key >= own - 0.1
     if not beside:
-        floats[ASIDE] = 0.0
+        car.aside = 0.0
         return speed
     return 0.0 if before else speed
 
 
 @jit
 def pass_again(
-    b: int, own: float, way: ReferencePath, near: int, state: State, floats: Any, build: Any, scratch: Scratch
-) -> None:  # fmt: skip
+    b: int, own: float, way: ReferencePath, near: int, traffic: Traffic, car: Driver, vehicle: Vehicle
+) -> None:
     """Go on passing what has moved up meanwhile and stands where the car would return, if there is room."""
-    length = 2.0 * build[REACH] + BERTH
+    state, scratch = traffic.state, traffic.scratch
+    length = 2.0 * vehicle.reach + BERTH
     for k in range(near):
         j = scratch.near[k]
         key = along(way, state.x[b, j], state.y[b, j])
-        until = key + SLIP + 2.0 * build[HALF_LENGTH]
-        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < build[MIDDLE] and 0.0 < key - own < length
-        if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(build):
-            floats[UNTIL] = until
+        until = key + SLIP + 2.0 * vehicle.half_length
+        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < vehicle.middle and 0.0 < key - own < length
+        if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(vehicle):
+            car.until = until

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import FEW
-from dubins_traffic.cars.state import STATE_END, Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out
@@ -40,34 +39,20 @@ from dubins_traffic.policies.rules.steering import move
 from dubins_traffic.policies.rules.tables import (
     ABSENT,
     ALONE,
-    ASIDE,
-    CROSSING,
     CROWDED,
-    DEPARTS,
-    DISC,
-    HOLD,
-    KIND,
-    LANE,
     LEFT_SIDE,
-    MIDDLE,
     NEMESIS,
-    NEXT,
-    PERIOD,
-    REACH,
     ROUND,
     TAILGATING,
-    TURN,
     UNSURE,
-    UNTIL,
-    VIOLATIONS,
-    WAITED,
+    Driver,
     Drivers,
-    Scratch,
+    Traffic,
+    Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.safety import VERGE, leaves_road
 from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import lane_at
 from dubins_traffic.rules.propositions import APPROACH, BLOCKED, LEFT, STOPPED
 
@@ -80,51 +65,34 @@ DAWDLE = 0.12
 NOBODY, SEEN, ALL = range(3)
 """Who is in the lists of the segments: nobody, all whom the ego sees, all."""
 
-# Where each table begins and ends among the arrays of a call.
-LABELS_END = STATE_END + len(Labels._fields)
-ROADS_END = LABELS_END + len(RoadTable._fields)
-OBSTACLES_END = ROADS_END + len(ObstacleTable._fields)
-DRIVERS_END = OBSTACLES_END + len(Drivers._fields)
-
 
 @jit
-def decide(tick: int, commands: Floats, *arrays: Any) -> None:
-    """Write the commands of all cars that the law drives.
-
-    `arrays` are those of State, Labels, RoadTable, ObstacleTable, Drivers and Scratch, one after another: a call from
-    Python with arrays takes a third of the time of one with tables of them.
-    """
-    _decide(
-        tick, State(*arrays[:STATE_END]), Labels(*arrays[STATE_END:LABELS_END]),
-        RoadTable(*arrays[LABELS_END:ROADS_END]), ObstacleTable(*arrays[ROADS_END:OBSTACLES_END]),
-        Drivers(*arrays[OBSTACLES_END:DRIVERS_END]), Scratch(*arrays[DRIVERS_END:]), commands,
-    )  # fmt: skip
-
-
-@jit_inline
-def _decide(
-    tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
-    scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def decide(tick: int, commands: Floats, traffic: Traffic) -> None:
+    """Write the commands of all cars that the law drives."""
+    drivers, scratch = traffic.drivers, traffic.scratch
     for b in range(drivers.active.shape[0]):
         if drivers.active[b] != 0:
-            decide_trial(
-                b, tick, -1.0, scratch.apart, 0.0, state, labels, roads, obstacles, drivers, scratch, commands
-            )
+            decide_trial(b, tick, -1.0, scratch.apart, 0.0, traffic, commands)
 
 
 @jit_inline
 def decide_trial(
-    b: int, tick: int, sight2: float, apart: Floats, loss: float, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+    b: int, tick: int, sight2: float, apart: Floats, loss: float, traffic: Traffic, commands: Floats
+) -> None:
     """Write the commands of the cars of one trial that the law drives.
 
     The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
     given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
     """
+    state, labels, obstacles, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.obstacles,
+        traffic.drivers,
+        traffic.scratch,
+    )
     scratch.listed[0] = NOBODY
-    enough = loss + alone(drivers.build[b])
+    enough = loss + alone(drivers.vehicle[b])
     others = UNSURE if state.count[b] <= FEW else CROWDED
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
@@ -133,7 +101,7 @@ def decide_trial(
         company = others if apart[n] > 0.0 else CROWDED
         if apart[n] > enough:
             company = ALONE
-        kind = drivers.ints[b, n, KIND]
+        kind = drivers.car[b, n].kind
         if kind == ROUND:
             count_visit(b, n, labels, drivers)
         if kind == ABSENT:
@@ -141,39 +109,41 @@ def decide_trial(
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
-        elif company == CROWDED or not coast(b, n, kind, company, state, labels, roads, drivers, scratch):
-            drive(b, n, tick, company, sight2, state, labels, roads, obstacles, drivers, scratch, commands)
-    decide_deferred(b, state, drivers, scratch, commands)
+        elif company == CROWDED or not coast(b, n, kind, company, traffic):
+            drive(b, n, tick, company, sight2, traffic, commands)
+    decide_deferred(b, traffic, commands)
     if scratch.listed[0] != NOBODY:
-        unlist_cars(b, state, labels, scratch)
+        unlist_cars(b, traffic)
 
 
 @jit_inline
 def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
     """Tell whether a car still stands where it has started: it may, unless it would keep others from a crossing."""
-    if tick * drivers.build[b, PERIOD] >= drivers.floats[b, n, DEPARTS]:
+    if tick * drivers.vehicle[b].period >= drivers.car[b, n].departs:
         return False
     bits = np.int64(labels.bits[b, n])
     return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
 
 
 @jit_inline
-def enlist(b: int, n: int, sight2: float, state: State, labels: Labels, scratch: Scratch) -> None:
+def enlist(b: int, n: int, sight2: float, traffic: Traffic) -> None:
     """Have those in the lists of the segments by whom car n goes: whom it sees if it is the ego, else all."""
+    scratch = traffic.scratch
     if n > 0 and scratch.listed[0] == SEEN:
-        unlist_cars(b, state, labels, scratch)
+        unlist_cars(b, traffic)
         scratch.listed[0] = NOBODY
     if scratch.listed[0] == NOBODY:
-        hidden = list_cars(b, sight2 if n == 0 else -1.0, state, labels, scratch)
+        hidden = list_cars(b, sight2 if n == 0 else -1.0, traffic)
         scratch.listed[0] = SEEN if hidden > 0 else ALL
 
 
 @jit_inline
-def list_cars(b: int, sight2: float, state: State, labels: Labels, scratch: Scratch) -> int:
+def list_cars(b: int, sight2: float, traffic: Traffic) -> int:
     """Enter the cars that the ego sees (all if `sight2` is negative) in the lists of their segments.
 
     Returns how many it does not see.
     """
+    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
     hidden = 0
     for n in range(state.count[b]):
         dx = state.x[b, n] - state.x[b, 0]
@@ -187,228 +157,211 @@ def list_cars(b: int, sight2: float, state: State, labels: Labels, scratch: Scra
 
 
 @jit_inline
-def unlist_cars(b: int, state: State, labels: Labels, scratch: Scratch) -> None:
+def unlist_cars(b: int, traffic: Traffic) -> None:
     """Empty the lists of the segments on which there are cars."""
+    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
     for n in range(state.count[b]):
         scratch.head[labels.segment[b, n]] = -1
 
 
 @jit_inline
-def drive(
-    b: int, n: int, tick: int, company: int, sight2: float, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch, commands: Floats,
-) -> None:  # fmt: skip
+def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
     """Write the command of a car; `company` says what is known of the cars around it."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     x, y = state.x[b, n], state.y[b, n]
     stop_coasting(drivers.way[b, n])
-    if ints[KIND] == NEMESIS:
+    if car.kind == NEMESIS:
         watch_ego(b, n, labels, drivers)
-    way = keep_place(
-        b, n, tick, x, y, state.c[b, n], state.s[b, n], state, labels, roads, obstacles, drivers, scratch
-    )
+    way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], traffic)
     part, key, left, px, py = on_way(way, x, y)
-    outside = labels.lane[b, n] == ints[LANE]
+    outside = labels.lane[b, n] == car.lane
     if outside and part != BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    leaves = ints[KIND] != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], ints[LANE])
-    chooses = leaves and drivers.way[b, n, CROSSING] != 0.0
-    free = company != CROWDED and not chooses and just_drives(ints, floats)
+    leaves = car.kind != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
+    chooses = leaves and drivers.way[b, n].crossing != 0
+    free = company != CROWDED and not chooses and just_drives(car)
     if free and company != ALONE:
-        free = meets_nobody(b, n, part, key, left, x, y, way, state, build)
-    if free and drive_on(b, n, part, left, px, py, outside, way, state, labels, roads, drivers, scratch):
+        free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
+    if free and drive_on(b, n, part, left, px, py, outside, way, traffic):
         return
-    enlist(b, n, sight2, state, labels, scratch)
+    enlist(b, n, sight2, traffic)
     near = 0
-    if not (free and drivers.way[b, n, CROSSING] != 0.0):
-        near = gather(b, n, ints[LANE], x, y, way, labels, roads, drivers, scratch)
-    gap, who, close = look_ahead(
-        b, part, key, left, x, y, way, near, state, labels, obstacles, build, floats, scratch
-    )
-    rides = ints[VIOLATIONS] & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == ints[LANE]
-    speed = cruise(rides or floats[ASIDE] != 0.0, labels.crosses[b, n] >= 0, build, floats)
-    speed = yield_at_line(
-        b, n, tick, speed, part, left, x, y, way, near, state, labels, roads, obstacles, drivers, scratch
-    )
+    if not (free and drivers.way[b, n].crossing != 0):
+        near = gather(b, n, car.lane, x, y, way, traffic)
+    gap, who, close = look_ahead(b, part, key, left, x, y, way, near, traffic, vehicle, car)
+    rides = car.violations & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == car.lane
+    speed = cruise(rides or car.aside != 0.0, labels.crosses[b, n] >= 0, vehicle, car)
+    speed = yield_at_line(b, n, tick, speed, part, left, x, y, way, near, traffic)
     kept = 0.0
     if who != -1:
-        speed, kept = follow(b, n, speed, gap, who, rides, part, way, state, labels, roads, drivers, scratch)
-    speed = dawdle(b, n, speed, near, state, labels, roads, drivers, scratch)
-    speed, offset = pass_what_stands(
+        speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
+    speed = dawdle(b, n, speed, near, traffic)
+    speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
+    if leaves:
+        find_way_out(b, n, tick, part, traffic)
+    bend = way.bend if part == THROUGH else 0.0
+    if defer(b, n, speed, left - offset, px, py, bend, close, traffic):
+        return
+    speed, yaw_rate = move(
         b,
         n,
         speed,
-        gap,
-        kept,
-        who,
-        part,
+        left,
+        offset,
+        px,
+        py,
+        bend,
         outside,
         way,
-        near,
-        state,
-        labels,
-        roads,
-        obstacles,
-        drivers,
-        scratch,
+        near if close else 0,
+        who if rides else -1,
+        traffic,
     )
-    if leaves:
-        find_way_out(b, n, tick, part, state, labels, roads, obstacles, drivers, scratch)
-    bend = way.bend if part == THROUGH else 0.0
-    if defer(b, n, speed, left - offset, px, py, bend, close, state, labels, obstacles, drivers, scratch):
-        return
-    speed, yaw_rate = move(
-        b, n, speed, left, offset, px, py, bend, outside, way, near if close else 0, who if rides else -1, state,
-        labels, obstacles, drivers, scratch,
-    )  # fmt: skip
-    if speed != 0.0 and ints[KIND] == ROUND and strays(b, n, speed, yaw_rate, way, state, roads, drivers):
+    if speed != 0.0 and car.kind == ROUND and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed
     commands[b, n, 1] = yaw_rate
 
 
 @jit_inline
-def just_drives(ints: Any, floats: Any) -> bool:
+def just_drives(car: Driver) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
-    return ints[KIND] != NEMESIS and ints[VIOLATIONS] & TAILGATING == 0 and floats[ASIDE] == 0.0
+    return car.kind != NEMESIS and car.violations & TAILGATING == 0 and car.aside == 0.0
 
 
 @jit_inline
 def follow(
-    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: ReferencePath,
-    state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    n: int,
+    speed: float,
+    gap: float,
+    who: int,
+    rides: bool,
+    part: int,
+    way: ReferencePath,
+    traffic: Traffic,
+) -> tuple[float, float]:
     """Return (speed, gap to keep) of a car that has `who` ahead."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    kept = BUMPER if rides else wanted_gap(b, n, who, way, state, labels, ints, part, build[REACH])
+    state, drivers = traffic.state, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
+    kept = BUMPER if rides else wanted_gap(b, n, who, way, traffic, car, part, vehicle.reach)
     if kept > QUEUE_GAP and not rides and who != -1:
-        turn = part == BEFORE and ints[TURN] > 0
-        if turn or is_pressed(b, n, state, labels, roads, drivers, scratch):
+        turn = part == BEFORE and car.turn > 0
+        if turn or is_pressed(b, n, traffic):
             kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
-    return min(speed, max(0.0, gap - kept) / build[PERIOD] + ahead), kept
+    return min(speed, max(0.0, gap - kept) / vehicle.period + ahead), kept
 
 
 @jit_inline
-def dawdle(
-    b: int, n: int, speed: float, near: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers,
-    scratch: Scratch,
-) -> float:  # fmt: skip
+def dawdle(b: int, n: int, speed: float, near: int, traffic: Traffic) -> float:
     """Return the speed of a car that may hold up the ego, or stand in a disc, on purpose."""
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
-    passes = floats[ASIDE] != 0.0
-    if (
-        ints[KIND] == NEMESIS
-        and not passes
-        and before_ego(b, n, near, state, labels, roads, drivers, scratch)
-    ):
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
+    car = drivers.car[b, n]
+    passes = car.aside != 0.0
+    if car.kind == NEMESIS and not passes and before_ego(b, n, near, traffic):
         speed = min(speed, DAWDLE)
-    if floats[HOLD] > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], ints[LANE]):
-        floats[HOLD] -= drivers.build[b, PERIOD]
+    if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):
+        car.hold -= drivers.vehicle[b].period
         speed = 0.0
     return speed
 
 
 @jit_inline
-def strays(
-    b: int,
-    n: int,
-    speed: float,
-    yaw_rate: float,
-    way: ReferencePath,
-    state: State,
-    roads: RoadTable,
-    drivers: Drivers,
-) -> bool:
+def strays(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a motion takes the centre off the road, or nearly."""
+    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     if keeps_to_road(b, n, x, y, way, roads, drivers):
         return False
     net = drivers.net[b]
     edge = float(roads.half_width[net]) - VERGE
-    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.build[b, PERIOD], edge, roads, net)
+    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.vehicle[b].period, edge, roads, net)
 
 
 @jit_inline
 def pass_what_stands(
-    b: int, n: int, speed: float, gap: float, kept: float, who: int, part: int, outside: bool, way: ReferencePath,
-    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers,
-    scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    n: int,
+    speed: float,
+    gap: float,
+    kept: float,
+    who: int,
+    part: int,
+    outside: bool,
+    way: ReferencePath,
+    near: int,
+    traffic: Traffic,
+) -> tuple[float, float]:
     """Return (speed, offset to the left of the way): of a car that drives on the left, or passes, or waits to."""
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    floats = drivers.floats[b, n]
+    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     bits = np.int64(labels.bits[b, n])
-    if outside and (bits & BLOCKED != 0 or floats[ASIDE] != 0.0):
-        watch(b, n, who, state, ints, floats, ints[LANE], scratch)
-    offset = 2.0 * build[MIDDLE] if ints[VIOLATIONS] & LEFT_SIDE != 0 and outside else 0.0
+    if outside and (bits & BLOCKED != 0 or car.aside != 0.0):
+        watch(b, n, who, state, car, car.lane, scratch)
+    offset = 2.0 * vehicle.middle if car.violations & LEFT_SIDE != 0 and outside else 0.0
     stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
-    ints[WAITED] = ints[WAITED] + 1 if stubborn and gap < kept + 0.05 else 0
-    if offset != 0.0 and ints[WAITED] > ticks_of(STUCK, build):
-        ints[VIOLATIONS] &= ~LEFT_SIDE
-    idle = floats[ASIDE] == 0.0 or (
-        within_lane(floats[ASIDE], build) and ints[WAITED] > ticks_of(STUCK, build)
-    )
+    car.waited = car.waited + 1 if stubborn and gap < kept + 0.05 else 0
+    if offset != 0.0 and car.waited > ticks_of(STUCK, vehicle):
+        car.violations &= ~LEFT_SIDE
+    idle = car.aside == 0.0 or (within_lane(car.aside, vehicle) and car.waited > ticks_of(STUCK, vehicle))
     if who < -1 and part == BEFORE and idle and offset == 0.0:
-        keep_off(b, n, -2 - who, way, state, labels, obstacles, drivers, scratch)
+        keep_off(b, n, -2 - who, way, traffic)
     if not outside:
-        there = part == BEFORE and within_lane(floats[ASIDE], build)
-        floats[ASIDE] = offset = floats[ASIDE] if there else 0.0
-    elif floats[ASIDE] != 0.0:
-        speed = keep_passing(b, n, speed, way, near, state, labels, obstacles, drivers, scratch)
-        offset = floats[ASIDE] if way_to_go(way, state.x[b, n], state.y[b, n]) < floats[UNTIL] else 0.0
-    elif (bits & BLOCKED != 0 or who < -1) and waited_long(ints, bits, build):
-        find_way_past(b, n, way, who, state, labels, roads, obstacles, drivers, scratch)
+        there = part == BEFORE and within_lane(car.aside, vehicle)
+        car.aside = offset = car.aside if there else 0.0
+    elif car.aside != 0.0:
+        speed = keep_passing(b, n, speed, way, near, traffic)
+        offset = car.aside if way_to_go(way, state.x[b, n], state.y[b, n]) < car.until else 0.0
+    elif (bits & BLOCKED != 0 or who < -1) and waited_long(car, bits, vehicle):
+        find_way_past(b, n, way, who, traffic)
     return speed, offset
 
 
 @jit_inline
-def waited_long(ints: Any, bits: Any, build: Any) -> bool:
+def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether it is time to look for a way past: not in every tick, and sooner for who is left already."""
-    return (ints[WAITED] >= ticks_of(PASSING_WAIT, build) or bits & LEFT != 0) and ints[WAITED] % 4 == 0
+    return (car.waited >= ticks_of(PASSING_WAIT, vehicle) or bits & LEFT != 0) and car.waited % 4 == 0
 
 
 @jit_inline
 def keep_place(
-    b: int, n: int, tick: int, x: float, y: float, c: float, s: float, state: State, labels: Labels,
-    roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> ReferencePath:  # fmt: skip
+    b: int, n: int, tick: int, x: float, y: float, c: float, s: float, traffic: Traffic
+) -> ReferencePath:
     """Keep LANE and NEXT in step with where the car is; return its way."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     seen = labels.lane[b, n]
-    if ints[LANE] < 0:
+    if car.lane < 0:
         lane = seen if seen >= 0 else lane_at(roads, net, x, y, c, s)
-        take_lane(b, n, tick, lane, state, labels, roads, obstacles, drivers, scratch)
-    elif seen >= 0 and seen != ints[LANE]:
-        take_lane(b, n, tick, seen, state, labels, roads, obstacles, drivers, scratch)
+        take_lane(b, n, tick, lane, traffic)
+    elif seen >= 0 and seen != car.lane:
+        take_lane(b, n, tick, seen, traffic)
     way = way_of(b, n, roads, drivers)
-    if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * build[DISC]:
+    if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * vehicle.disc:
         part, _, _, _, _ = on_way(way, x, y)
         if part == AFTER:
-            take_lane(b, n, tick, ints[NEXT], state, labels, roads, obstacles, drivers, scratch)
+            take_lane(b, n, tick, car.next_lane, traffic)
             way = way_of(b, n, roads, drivers)
     return way
 
 
 @jit_inline
-def before_ego(
-    b: int,
-    n: int,
-    near: int,
-    state: State,
-    labels: Labels,
-    roads: RoadTable,
-    drivers: Drivers,
-    scratch: Scratch,
-) -> bool:
+def before_ego(b: int, n: int, near: int, traffic: Traffic) -> bool:
     """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
     lane = labels.lane[b, n]
     if lane < 0 or labels.crosses[b, n] >= 0:

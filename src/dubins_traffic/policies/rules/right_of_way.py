@@ -7,45 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
 from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
 from dubins_traffic.policies.rules.tables import (
-    APPROACHES,
-    CROSSING,
-    DISC,
-    FORFEIT,
-    GOAL_FIRST,
-    GOAL_LAST,
-    GOAL_TIME,
-    HALF_WIDTH,
-    KEPT_OUT,
-    KIND,
-    LANE,
     LEFT_SIDE,
-    MIDDLE,
     NEMESIS,
-    NEXT,
-    OWED,
-    PERIOD,
-    REACH,
-    REST_TIME,
     ROLLING,
     ROUND,
-    ROUNDING,
     TAILGATING,
-    TURN,
-    VIOLATIONS,
+    Driver,
     Drivers,
-    Scratch,
+    KeptPath,
+    Traffic,
+    Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import CLEAR, FIRST, FORFEITED, LEFT, STOPPED
 
 CHOOSY = 1.0
@@ -72,198 +53,208 @@ GOES_NOW = STOPPED | FIRST | CLEAR
 
 @jit_inline
 def yield_at_line(
-    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: ReferencePath,
-    near: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers, scratch:
-    Scratch,
-) -> float:  # fmt: skip
+    b: int,
+    n: int,
+    tick: int,
+    speed: float,
+    part: int,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    near: int,
+    traffic: Traffic,
+) -> float:
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
-    if not faces_gate(b, n, part, labels, roads, drivers):
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
+    if not faces_gate(b, n, part, traffic):
         return speed
     bits = np.int64(labels.bits[b, n])
-    its_turn = count_turn(bits, drivers.way[b, n], ints)
-    line = to_line(left, x, y, way, build)
-    minds = n != EGO and ints[VIOLATIONS] & TAILGATING == 0
-    behind = minds and is_behind_ego(b, n, x, y, way, state, labels, drivers)
-    if behind and drivers.way[b, n, CROSSING] != 0.0:
-        line -= build[APPROACHES]
+    its_turn = count_turn(bits, drivers.way[b, n], car)
+    line = to_line(left, x, y, way, vehicle)
+    minds = n != EGO and car.violations & TAILGATING == 0
+    behind = minds and is_behind_ego(b, n, x, y, way, traffic)
+    if behind and drivers.way[b, n].crossing != 0:
+        line -= vehicle.approaches
         its_turn = False
-    if line >= speed * build[PERIOD]:
+    if line >= speed * vehicle.period:
         return speed
-    v = lane_end(roads, net, ints[LANE])
-    if drivers.way[b, n, CROSSING] != 0.0:
-        free = its_turn and may_go(b, n, tick, state, labels, roads, obstacles, drivers, scratch)
-        free = free or ints[VIOLATIONS] & ROLLING != 0
+    v = lane_end(roads, net, car.lane)
+    if drivers.way[b, n].crossing != 0:
+        free = its_turn and may_go(b, n, tick, traffic)
+        free = free or car.violations & ROLLING != 0
     else:
-        free = may_enter_bend(b, n, tick, v, way, near, state, labels, roads, obstacles, drivers, scratch)
-    if bits & LEFT != 0 and ints[VIOLATIONS] & LEFT_SIDE == 0:
+        free = may_enter_bend(b, n, tick, v, way, near, traffic)
+    if bits & LEFT != 0 and car.violations & LEFT_SIDE == 0:
         free = False
-    return speed if free else max(0.0, line) / build[PERIOD]
+    return speed if free else max(0.0, line) / vehicle.period
 
 
 @jit
 def may_enter_bend(
-    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, traffic: Traffic
+) -> bool:
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
     An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone; who has waited for that
     for long takes the way on.
     """
-    build = drivers.build[b]
-    ints = drivers.ints[b, n]
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
     degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
-    turns = turns_round(ints)
-    hushed = is_hushed(tick, v, ints, build, drivers)
+    turns = turns_round(car)
+    hushed = is_hushed(tick, v, car, vehicle, drivers)
     inside = 0
     held = False
     for k in range(near):
         j = scratch.near[k]
         if labels.crosses[b, j] == v:
-            inside += 1 if turns else shares_way(b, j, way, degree, state, build)
-            held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.ints[b, j])))
+            inside += 1 if turns else shares_way(b, j, way, degree, state, vehicle)
+            held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
         elif turns and degree > 1:
-            held = held or comes_first(b, n, j, v, state, labels, roads, drivers)
-    long = ints[KIND] != ROUND and ints[KEPT_OUT] * build[PERIOD] > PATIENT * build[REST_TIME]
+            held = held or comes_first(b, n, j, v, traffic)
+    long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
-        free = has_room(b, n, ints[NEXT], inside, state, labels, roads, obstacles, drivers, scratch)
+        free = has_room(b, n, car.next_lane, inside, traffic)
         if long and inside == 0:
-            free = free or is_free(b, n, ints[NEXT], state, roads, drivers, scratch)
+            free = free or is_free(b, n, car.next_lane, traffic)
     if long and not free and turns and degree == 2:
-        take_way_on(b, n, state, roads, obstacles, drivers, scratch)
-    ints[KEPT_OUT] = 0 if free else ints[KEPT_OUT] + 1
+        take_way_on(b, n, traffic)
+    car.kept_out = 0 if free else car.kept_out + 1
     return free
 
 
 @jit_inline
-def is_hushed(tick: int, v: int, ints: Any, build: Any, drivers: Drivers) -> bool:
+def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers) -> bool:
     """Tell whether now is a time at which a car that minds goals enters the bend v only if nobody is in it.
 
     Without such times cars that follow one another through a bend without end would never leave it free.
     """
-    half = ticks_of(0.5 * build[GOAL_TIME], build)
+    half = ticks_of(0.5 * vehicle.goal_time, vehicle)
     if half <= 0 or tick % half < (1.0 - HUSH) * half:
         return False
     found = False
-    for k in range(ints[GOAL_FIRST], ints[GOAL_LAST]):
+    for k in range(car.goal_first, car.goal_last):
         found = found or drivers.stage[k] == v
     return found
 
 
 @jit_inline
-def faces_gate(b: int, n: int, part: int, labels: Labels, roads: RoadTable, drivers: Drivers) -> bool:
+def faces_gate(b: int, n: int, part: int, traffic: Traffic) -> bool:
     """Tell whether a car is before the disc at the end of its lane."""
-    return part == BEFORE and labels.crosses[b, n] != lane_end(
-        roads, drivers.net[b], drivers.ints[b, n, LANE]
-    )
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
+    return part == BEFORE and labels.crosses[b, n] != lane_end(roads, drivers.net[b], drivers.car[b, n].lane)
 
 
 @jit_inline
-def count_turn(bits: Any, way: Any, ints: Any) -> bool:
+def count_turn(bits: Any, way: KeptPath, car: Driver) -> bool:
     """Tell whether it is the turn of a car before a disc, and count for how long; `way` is its row of `Drivers.way`."""
-    its_turn = way[CROSSING] != 0.0 and bits & GOES_NOW == GOES_NOW
-    ints[TURN] = ints[TURN] + 1 if its_turn else 0
-    ints[OWED] = 0 if bits & STOPPED == 0 else ints[OWED] + (1 if its_turn else 0)
+    its_turn = way.crossing != 0 and bits & GOES_NOW == GOES_NOW
+    car.turn = car.turn + 1 if its_turn else 0
+    car.owed = 0 if bits & STOPPED == 0 else car.owed + (1 if its_turn else 0)
     return its_turn
 
 
 @jit_inline
-def to_line(left: float, x: float, y: float, way: ReferencePath, build: Any) -> float:
+def to_line(left: float, x: float, y: float, way: ReferencePath, vehicle: Vehicle) -> float:
     """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
-    edge = build[DISC] + build[REACH] + MARGIN
-    aside = left - build[MIDDLE]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    aside = left - vehicle.middle
     return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
 
 
 @jit_inline
-def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, build: Any) -> int:
+def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, vehicle: Vehicle) -> int:
     """Return 1 if a car in the disc is on this way, or in a disc that is no bend."""
     if degree != 2:
         return 1
     _, _, left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
-    return 1 if abs(left) < 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE else 0
+    return 1 if abs(left) < 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE else 0
 
 
 @jit_inline
-def is_behind_ego(
-    b: int, n: int, x: float, y: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers
-) -> bool:
+def is_behind_ego(b: int, n: int, x: float, y: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether the ego is ahead in a car's lane.
 
     Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
     again, and then bars the way of who would be first.
     """
-    if labels.lane[b, EGO] != drivers.ints[b, n, LANE]:
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    if labels.lane[b, EGO] != drivers.car[b, n].lane:
         return False
     return way_to_go(way, state.x[b, EGO], state.y[b, EGO]) > way_to_go(way, x, y)
 
 
 @jit_inline
-def turns_round(ints: Any) -> bool:
+def turns_round(car: Driver) -> bool:
     """Tell whether a car that the law drives is about to turn round at the end of its lane, or does it."""
-    return ints[NEXT] >= 0 and ints[NEXT] == ints[LANE] ^ 1
+    return car.next_lane >= 0 and car.next_lane == car.lane ^ 1
 
 
 @jit_inline
-def comes_first(
-    b: int, n: int, j: int, v: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers
-) -> bool:
+def comes_first(b: int, n: int, j: int, v: int, traffic: Traffic) -> bool:
     """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     lane, net = labels.lane[b, j], drivers.net[b]
-    if lane < 0 or lane == drivers.ints[b, n, LANE] or lane_end(roads, net, int(lane)) != v:
+    if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
         return False
     row = roads.vert_off[net] + v
     dx = state.x[b, j] - roads.vert[row, 0]
     dy = state.y[b, j] - roads.vert[row, 1]
-    near = drivers.build[b, DISC] + drivers.build[b, REACH] + SOON
-    first = n == EGO or j < n or not turns_round(drivers.ints[b, j])
+    near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON
+    first = n == EGO or j < n or not turns_round(drivers.car[b, j])
     return dx * dx + dy * dy < near * near and first
 
 
 @jit
-def may_go(
-    b: int, n: int, tick: int, state: State, labels: Labels, roads: RoadTable, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
     """Tell whether a car whose turn it is may enter: there is room behind the crossing. It may choose another exit."""
-    ints = drivers.ints[b, n]
-    build = drivers.build[b]
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    car = drivers.car[b, n]
+    vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    due = ints[KIND] != ROUND and is_due(ints[TURN], bits, build)
+    due = car.kind != ROUND and is_due(car.turn, bits, vehicle)
     if (
-        ints[KIND] == NEMESIS
+        car.kind == NEMESIS
         and bits & FORFEITED == 0
-        and ints[TURN] < ticks_of(LINGER * build[FORFEIT], build)
+        and car.turn < ticks_of(LINGER * vehicle.forfeit, vehicle)
     ):
         dx = state.x[b, 0] - state.x[b, n]
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
-    if has_room(b, n, ints[NEXT], 0, state, labels, roads, obstacles, drivers, scratch):
+    if has_room(b, n, car.next_lane, 0, traffic):
         return True
-    waited = ints[OWED] - ticks_of(CHOOSY, build)
+    waited = car.owed - ticks_of(CHOOSY, vehicle)
     if not due and (waited < 0 or waited % 8 != 0):
         return False
-    budget = BUDGET * ints[OWED] * build[PERIOD] if ints[KIND] == ROUND else INFINITE
-    if take_another(b, n, tick, budget, state, labels, roads, obstacles, drivers, scratch):
+    budget = BUDGET * car.owed * vehicle.period if car.kind == ROUND else INFINITE
+    if take_another(b, n, tick, budget, traffic):
         return True
-    if due and take_last_resort(b, n, state, labels, roads, obstacles, drivers, scratch):
+    if due and take_last_resort(b, n, traffic):
         return True
     if due:
-        take_widest(b, n, state, labels, roads, obstacles, drivers, scratch)
+        take_widest(b, n, traffic)
     return due
 
 
 @jit_inline
-def is_due(turn: int, bits: Any, build: Any) -> bool:
+def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether an e-agent whose turn it is has to enter now, or it loses its place a second time."""
     if bits & FORFEITED == 0:
         return False
-    forfeit = ticks_of(build[FORFEIT], build)
+    forfeit = ticks_of(vehicle.forfeit, vehicle)
     since = turn - forfeit if turn >= forfeit else turn
-    return since > ticks_of(DUTY * build[FORFEIT], build)
+    return since > ticks_of(DUTY * vehicle.forfeit, vehicle)

@@ -6,25 +6,11 @@ from math import sqrt
 from typing import Any
 
 from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import (
-    BACKS_UP,
-    DEGREE,
-    DISC,
-    EXIT_GAP,
-    HALF_WIDTH,
-    LANE,
-    MIDDLE,
-    REACH,
-    ROUNDING,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import LEFT, STANDS
 
 MARGIN = 0.02
@@ -39,22 +25,16 @@ PRESSED = 0.4
 
 
 @jit
-def has_room(
-    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def has_room(b: int, n: int, out: int, inside: int, traffic: Traffic) -> bool:
     """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
 
     `inside` cars are still in the disc and will be before it.
     """
-    return room_in(b, n, out, inside, state, labels, roads, obstacles, drivers, scratch) >= 0.0
+    return room_in(b, n, out, inside, traffic) >= 0.0
 
 
 @jit
-def room_in(
-    b: int, n: int, out: int, inside: int, state: State, labels: Labels, roads: RoadTable,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> float:  # fmt: skip
+def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres.
 
     It is negative where the car can't leave the disc. All that are in the lane drive on until they stand close behind
@@ -63,24 +43,31 @@ def room_in(
     whether it drives on; at a crossing, where who finds one exit barred has to take another in time, it may back up as
     well. `inside` cars are still in the disc and will be before this one.
     """
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
-    build = drivers.build[b]
-    edge = build[DISC] + build[REACH] + MARGIN
-    mouth = sqrt(max(edge * edge - build[MIDDLE] * build[MIDDLE], 0.0))
-    pitch = 2.0 * build[REACH] + QUEUE_GAP
+    vehicle = drivers.vehicle[b]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
+    pitch = 2.0 * vehicle.reach + QUEUE_GAP
     start = lane_start(roads, net, out)
     end = lane_end(roads, net, out)
-    crossing = roads.degree[roads.vert_off[net] + start] >= build[DEGREE]
+    crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
     last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
-    last = min(last, before_obstacles(b, out, roads, obstacles, drivers))
+    last = min(last, before_obstacles(b, out, traffic))
     wall = INFINITE
     for look in range(2):
         j = scratch.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
             gone = labels.at[b, j] == end and labels.bits[b, j] & STANDS == 0 and (j != EGO or n == EGO)
-            if j != n and not gone and takes_room(b, j, out, start, along, aside, labels, build):
+            if j != n and not gone and takes_room(b, j, out, start, along, aside, labels, vehicle):
                 if look == 1:
                     last -= pitch if along < wall else 0.0
                     j = scratch.link[j]
@@ -89,7 +76,7 @@ def room_in(
                 if is_slow(b, j, heading, state) and along < mouth + pitch:
                     return -1.0
                 if labels.bits[b, j] & STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
-                    back = build[BACKS_UP] if j == EGO and n != EGO and crossing else 0.0
+                    back = vehicle.backs_up if j == EGO and n != EGO and crossing else 0.0
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
             j = scratch.link[j]
@@ -98,11 +85,11 @@ def room_in(
 
 @jit_inline
 def takes_room(
-    b: int, j: Any, out: int, start: int, along: float, aside: float, labels: Labels, build: Any
+    b: int, j: Any, out: int, start: int, along: float, aside: float, labels: Labels, vehicle: Vehicle
 ) -> bool:
     """Tell whether a car, at (along, aside) of the lane `out`, is in the way of those that come there from `start`."""
     oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
-    there = aside < build[HALF_WIDTH] + build[ROUNDING] + OVER and along > build[DISC]
+    there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
     return there and not oncoming and labels.crosses[b, j] != start
 
 
@@ -113,15 +100,20 @@ def is_slow(b: int, j: Any, heading: float, state: State) -> bool:
 
 
 @jit
-def is_open(
-    b: int, n: int, out: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether a car can leave the disc by the lane `out` for all that is there now, wherever that may stop."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net = drivers.net[b]
-    build = drivers.build[b]
-    edge = build[DISC] + build[REACH] + MARGIN
-    mouth = sqrt(max(edge * edge - build[MIDDLE] * build[MIDDLE], 0.0))
-    pitch = 2.0 * build[REACH] + QUEUE_GAP
+    vehicle = drivers.vehicle[b]
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
+    pitch = 2.0 * vehicle.reach + QUEUE_GAP
     start = lane_start(roads, net, out)
     tx, ty = lane_direction(roads, net, out)
     j = scratch.head[out >> 1]
@@ -129,68 +121,71 @@ def is_open(
         along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
         heading = state.c[b, j] * tx + state.s[b, j] * ty
         near = along < mouth + pitch and is_slow(b, j, heading, state)
-        if j != n and near and takes_room(b, j, out, start, along, aside, labels, build):
+        if j != n and near and takes_room(b, j, out, start, along, aside, labels, vehicle):
             return False
         j = scratch.link[j]
     return True
 
 
 @jit
-def is_free(
-    b: int, n: int, out: int, state: State, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:
+def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
-    build = drivers.build[b]
+    state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
     j = scratch.head[out >> 1]
     while j >= 0:
         along, aside = lane_coordinates(
             roads, drivers.net[b], out, float(state.x[b, j]), float(state.y[b, j])
         )
-        if j != n and aside <= 0.0 and along <= build[DISC] + build[EXIT_GAP]:
+        if j != n and aside <= 0.0 and along <= vehicle.disc + vehicle.exit_gap:
             return False
         j = scratch.link[j]
     return True
 
 
 @jit
-def before_obstacles(
-    b: int, lane: int, roads: RoadTable, obstacles: ObstacleTable, drivers: Drivers
-) -> float:
+def before_obstacles(b: int, lane: int, traffic: Traffic) -> float:
     """Return how far along a lane a car can drive before an obstacle that can't be passed in the lane, metres."""
-    build = drivers.build[b]
+    roads, obstacles, drivers = traffic.roads, traffic.obstacles, traffic.drivers
+    vehicle = drivers.vehicle[b]
     free = INFINITE
     net, first, last = drivers.net[b], obstacles.off[b], obstacles.off[b + 1]
     for p in range(first, last):
         row = obstacles.part[p]
         along, aside = lane_coordinates(roads, net, lane, row[0], row[1])
-        wide = build[HALF_WIDTH] + build[ROUNDING] + SIDE + row[7]
-        if not (abs(aside + build[MIDDLE]) < wide and along + row[7] > build[DISC]):
+        wide = vehicle.half_width + vehicle.rounding + SIDE + row[7]
+        if not (abs(aside + vehicle.middle) < wide and along + row[7] > vehicle.disc):
             continue
         begin, end = along - row[7], along + row[7]
-        if offset_in_lane(roads, net, lane, begin, end, obstacles, first, last, build) == 0.0:
-            free = min(free, begin - build[REACH] - QUEUE_GAP)
+        if offset_in_lane(traffic, net, lane, begin, end, first, last, vehicle) == 0.0:
+            free = min(free, begin - vehicle.reach - QUEUE_GAP)
     return free
 
 
 @jit
-def is_pressed(
-    b: int, n: int, state: State, labels: Labels, roads: RoadTable, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
     """Tell whether a car behind is still in the disc at the beginning of the lane, and needs room to leave it.
 
     It, or the cars between, are close behind one another already.
     """
-    net, build, lane = drivers.net[b], drivers.build[b], drivers.ints[b, n, LANE]
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
+    net, vehicle, lane = drivers.net[b], drivers.vehicle[b], drivers.car[b, n].lane
     v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:
         return False
     own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
-    far = 2.0 * build[REACH] + PRESSED
+    far = 2.0 * vehicle.reach + PRESSED
     j = scratch.head[lane >> 1]
     while j >= 0:
         along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
         if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
-            far += 2.0 * build[REACH] + QUEUE_GAP
+            far += 2.0 * vehicle.reach + QUEUE_GAP
         j = scratch.link[j]
     row = roads.vert_off[net] + v
     for k in range(roads.degree[row]):

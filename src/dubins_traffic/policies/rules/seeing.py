@@ -3,32 +3,15 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    DISC,
-    FASTEST,
-    HALF_WIDTH,
-    KIND,
-    PERIOD,
-    REACH,
-    ROUND,
-    ROUNDING,
-    TAILGATING,
-    UNTIL,
-    VIOLATIONS,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import ROUND, TAILGATING, Driver, Scratch, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
-from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import APPROACH, EXCUSED, LEFT, STANDS
 
 QUEUE_GAP = 0.12
@@ -67,10 +50,10 @@ def way_to_go(way: ReferencePath, x: float, y: float) -> float:
 
 
 @jit_inline
-def alone(build: Any) -> float:
+def alone(vehicle: Vehicle) -> float:
     """Return metres between the centres beyond which another car makes no difference to one that just drives on."""
     widest = max(MOVING_GAP, STANDING_GAP, FACING_GAP)
-    return 2.0 * build[REACH] + widest + AWARE + build[FASTEST] * build[PERIOD]
+    return 2.0 * vehicle.reach + widest + AWARE + vehicle.fastest * vehicle.period
 
 
 @jit_inline
@@ -90,11 +73,11 @@ def meets_nobody(
     y: float,
     way: ReferencePath,
     state: State,
-    build: Any,
+    vehicle: Vehicle,
 ) -> bool:
     """Tell whether no car of the trial makes a difference to one that just drives on: is close, or ahead on its way."""
-    far, touch = alone(build), 2.0 * build[REACH] + CLOSE
-    low, high = corridor(left, 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE)
+    far, touch = alone(vehicle), 2.0 * vehicle.reach + CLOSE
+    low, high = corridor(left, 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE)
     for j in range(state.count[b]):
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
@@ -109,13 +92,11 @@ def meets_nobody(
 
 
 @jit_inline
-def gather(
-    b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, labels: Labels, roads: RoadTable,
-    drivers: Drivers, scratch: Scratch,
-) -> int:  # fmt: skip
+def gather(b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, traffic: Traffic) -> int:
     """List the cars on the car's segment, and on those that meet it where it is near an end; return how many."""
+    labels, roads, drivers, scratch = traffic.labels, traffic.roads, traffic.drivers, traffic.scratch
     net = drivers.net[b]
-    disc = drivers.build[b, DISC]
+    disc = drivers.vehicle[b].disc
     count = add_segment(labels.segment[b, n], n, 0, scratch)
     if labels.segment[b, n] != lane >> 1:
         count = add_segment(lane >> 1, n, count, scratch)
@@ -148,21 +129,31 @@ def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
 
 @jit_inline
 def look_ahead(
-    b: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, near: int,
-    state: State, labels: Labels, obstacles: ObstacleTable, build: Any, floats: Any, scratch: Scratch,
-) -> tuple[float, int, bool]:  # fmt: skip
+    b: int,
+    part: int,
+    key: float,
+    left: float,
+    x: float,
+    y: float,
+    way: ReferencePath,
+    near: int,
+    traffic: Traffic,
+    vehicle: Vehicle,
+    car: Driver,
+) -> tuple[float, int, bool]:
     """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
 
     `who` is a car, or -2 - p for obstacle part p.
     """
-    reach = build[REACH]
-    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING]) + SIDE
+    state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
+    reach = vehicle.reach
+    wide = 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE
     low, high = corridor(left, wide)
-    passing = floats[ASIDE] != 0.0
-    if passing and way_to_go(way, x, y) < floats[UNTIL]:
-        on_right = floats[ASIDE] < 0.0
-        low = floats[ASIDE] - wide if on_right else min(left, floats[ASIDE]) - 0.1
-        high = max(left, floats[ASIDE]) + 0.1 if on_right else floats[ASIDE] + wide
+    passing = car.aside != 0.0
+    if passing and way_to_go(way, x, y) < car.until:
+        on_right = car.aside < 0.0
+        low = car.aside - wide if on_right else min(left, car.aside) - 0.1
+        high = max(left, car.aside) + 0.1 if on_right else car.aside + wide
     gap = HELD
     who = -1
     close = False
@@ -179,8 +170,8 @@ def look_ahead(
         there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
         if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
             continue
-        passed = floats[ASIDE] > 0.0 and labels.bits[b, j] & STANDS != 0
-        if passed and its_left < floats[ASIDE] - wide + SIDE:
+        passed = car.aside > 0.0 and labels.bits[b, j] & STANDS != 0
+        if passed and its_left < car.aside - wide + SIDE:
             continue
         far = sqrt(d2)
         if there - part == 2:
@@ -189,7 +180,7 @@ def look_ahead(
         if its_gap < gap:
             gap = its_gap
             who = j
-    return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, build, floats)
+    return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, vehicle, car)
 
 
 @jit_inline
@@ -207,10 +198,10 @@ def chord(way: ReferencePath) -> float:
 @jit_inline
 def see_obstacles(
     b: int, part: int, key: float, x: float, y: float, way: ReferencePath, low: float, high: float,
-    gap: float, who: int, close: bool, obstacles: ObstacleTable, build: Any, floats: Any,
+    gap: float, who: int, close: bool, obstacles: ObstacleTable, vehicle: Vehicle, car: Driver,
 ) -> tuple[float, int, bool]:  # fmt: skip
     """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
-    wide = 2.0 * (build[HALF_WIDTH] + build[ROUNDING])
+    wide = 2.0 * (vehicle.half_width + vehicle.rounding)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         dx = row[0] - x
@@ -219,22 +210,22 @@ def see_obstacles(
         far = SIGHT + row[7]
         if d2 > far * far:
             continue
-        if d2 < (build[REACH] + row[7] + 0.2) * (build[REACH] + row[7] + 0.2):
+        if d2 < (vehicle.reach + row[7] + 0.2) * (vehicle.reach + row[7] + 0.2):
             close = True
         there, its_key, its_left, _, _ = on_way(way, row[0], row[1])
-        aside = row[7] - build[HALF_WIDTH] - build[ROUNDING] + NARROW - SIDE
+        aside = row[7] - vehicle.half_width - vehicle.rounding + NARROW - SIDE
         if there < part or (there == part and its_key <= key):
             continue
         if there > part and abs(its_left) > wide + SIDE + aside:
             continue
         if its_left < low - aside or its_left > high + aside:
             continue
-        if floats[ASIDE] > 0.0 and its_left < floats[ASIDE] - wide - aside:
+        if car.aside > 0.0 and its_left < car.aside - wide - aside:
             continue
         distance = sqrt(d2)
         if there - part == 2:
             distance = max(distance, its_key - key + max(around(way), chord(way)))
-        its_gap = distance - build[REACH] - row[7]
+        its_gap = distance - vehicle.reach - row[7]
         if its_gap < gap:
             gap = its_gap
             who = -2 - p
@@ -243,17 +234,10 @@ def see_obstacles(
 
 @jit_inline
 def wanted_gap(
-    b: int,
-    n: int,
-    who: int,
-    way: ReferencePath,
-    state: State,
-    labels: Labels,
-    ints: Any,
-    part: int,
-    reach: float,
+    b: int, n: int, who: int, way: ReferencePath, traffic: Traffic, car: Driver, part: int, reach: float
 ) -> float:
     """Return the gap to keep from `who`."""
+    state, labels = traffic.state, traffic.labels
     if who == -1:
         return 0.0
     standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)
@@ -261,7 +245,7 @@ def wanted_gap(
         standing = QUEUE_GAP
     if who < -1:
         return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
-    if ints[VIOLATIONS] & TAILGATING != 0:
+    if car.violations & TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
@@ -273,6 +257,6 @@ def wanted_gap(
     waits = its & EXCUSED != 0 or its & APPROACH != 0
     if in_disc or waits:
         return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
-    if its & STANDS != 0 or (ints[KIND] == ROUND and part == BEFORE):
+    if its & STANDS != 0 or (car.kind == ROUND and part == BEFORE):
         return standing
     return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 else MOVING_GAP

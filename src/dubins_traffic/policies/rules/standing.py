@@ -2,31 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.passing import along, aside, half_width
-from dubins_traffic.policies.rules.tables import (
-    BEHIND,
-    FORE,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LANE,
-    MIDDLE,
-    NEEDED,
-    OVER,
-    PERIOD,
-    ROUNDING,
-    STAND_TIME,
-    WATCH_X,
-    WATCH_Y,
-    WATCHED,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import APPROACH, OVERTAKING, STANDS, STOPPED
@@ -37,17 +17,15 @@ LINE, SURE = 0.002, 0.03
 
 
 @jit
-def stays_right(
-    b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> bool:  # fmt: skip
+def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
-    build = drivers.build[b]
+    state, labels, obstacles, drivers = traffic.state, traffic.labels, traffic.obstacles, traffic.drivers
+    vehicle = drivers.vehicle[b]
     x, y, c, s = advance(
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, build[PERIOD]
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period
     )
-    half = half_extent(way.tx, way.ty, c, s, build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING])
-    if aside(way, x, y) + half <= build[MIDDLE] + build[OVER] - LINE:
+    half = half_extent(way.tx, way.ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    if aside(way, x, y) + half <= vehicle.middle + vehicle.over - LINE:
         return True
     if labels.bits[b, n] & OVERTAKING == 0:
         return False
@@ -55,26 +33,25 @@ def stays_right(
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         row = obstacles.part[p]
         key = along(way, row[0], row[1])
-        there = own - row[7] <= key <= own + row[7] + build[FORE]
-        if there and abs(aside(way, row[0], row[1])) - row[7] < build[MIDDLE]:
+        there = own - row[7] <= key <= own + row[7] + vehicle.fore
+        if there and abs(aside(way, row[0], row[1])) - row[7] < vehicle.middle:
             return True
-    return surely_stands(b, n, own, way, state, labels, drivers, scratch)
+    return surely_stands(b, n, own, way, traffic)
 
 
 @jit
-def surely_stands(
-    b: int, n: int, own: float, way: ReferencePath, state: State, labels: Labels, drivers: Drivers, scratch: Scratch
-) -> bool:  # fmt: skip
+def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
 
     Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
     crossing; and it may drive off.
     """
-    build = drivers.build[b]
-    lane = drivers.ints[b, n, LANE]
-    if drivers.ints[b, n, WATCHED] * build[PERIOD] < build[STAND_TIME] + build[PERIOD]:
+    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
+    lane = drivers.car[b, n].lane
+    if drivers.car[b, n].watched * vehicle.period < vehicle.stand_time + vehicle.period:
         return False
-    watch_x, watch_y = drivers.floats[b, n, WATCH_X], drivers.floats[b, n, WATCH_Y]
+    watch_x, watch_y = drivers.car[b, n].watch_x, drivers.car[b, n].watch_y
     found = False
     j = scratch.head[lane >> 1]
     while j >= 0:
@@ -84,25 +61,25 @@ def surely_stands(
         watched = state.x[b, j] == watch_x and state.y[b, j] == watch_y
         if j != n and bits & STANDS != 0 and watched:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
-            left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - build[MIDDLE]
-            half = half_width(b, j, way, state, build)
-            if own - build[BEHIND] + SURE < key < own + build[FORE] - SURE:
-                found = found or narrows(left - half, left + half, 2.0 * build[MIDDLE], build[NEEDED])
+            left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - vehicle.middle
+            half = half_width(b, j, way, state, vehicle)
+            if own - vehicle.behind + SURE < key < own + vehicle.fore - SURE:
+                found = found or narrows(left - half, left + half, 2.0 * vehicle.middle, vehicle.needed)
         j = scratch.link[j]
     return found
 
 
 @jit_inline
 def watch(
-    b: int, n: int, who: int, state: State, ints: Any, floats: Any, lane: int, scratch: Scratch
+    b: int, n: int, who: int, state: State, car: Driver, lane: int, scratch: Scratch
 ) -> None:  # fmt: skip
     """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
     j = scratch.head[lane >> 1]
     while j >= 0:
-        if j != n and state.x[b, j] == floats[WATCH_X] and state.y[b, j] == floats[WATCH_Y]:
-            ints[WATCHED] += 1
+        if j != n and state.x[b, j] == car.watch_x and state.y[b, j] == car.watch_y:
+            car.watched += 1
             return
         j = scratch.link[j]
-    ints[WATCHED] = 0
+    car.watched = 0
     if who >= 0:
-        floats[WATCH_X], floats[WATCH_Y] = state.x[b, who], state.y[b, who]
+        car.watch_x, car.watch_y = state.x[b, who], state.y[b, who]

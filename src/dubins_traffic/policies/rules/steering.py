@@ -3,31 +3,13 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
-from dubins_traffic.policies.rules.tables import (
-    ASIDE,
-    FASTEST,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LEFT_SIDE,
-    PERIOD,
-    REACH,
-    ROUNDING,
-    SLOWEST,
-    TIGHTEST,
-    VIOLATIONS,
-    YAW_MOST,
-    Drivers,
-    Scratch,
-)
+from dubins_traffic.policies.rules.tables import LEFT_SIDE, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.rules.propositions import LEFT
@@ -47,65 +29,76 @@ GAIN = 8.0
 
 @jit_inline
 def move(
-    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
-    way: ReferencePath, near: int, trusted: int, state: State, labels: Labels, obstacles: ObstacleTable,
-    drivers: Drivers, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int,
+    n: int,
+    allowed: float,
+    left: float,
+    offset: float,
+    px: float,
+    py: float,
+    bend: float,
+    outside: bool,
+    way: ReferencePath,
+    near: int,
+    trusted: int,
+    traffic: Traffic,
+) -> tuple[float, float]:
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
-    build = drivers.build[b]
-    c, s, limit = state.c[b, n], state.s[b, n], build[YAW_MOST]
-    passes = drivers.floats[b, n, ASIDE] != 0.0
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    c, s, limit = state.c[b, n], state.s[b, n], vehicle.yaw_most
+    passes = drivers.car[b, n].aside != 0.0
     steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
     if not outside and left - offset > ASTRAY:
         steep = ABRUPT
     aligned = NIMBLE if passes and left < offset else ALIGNED
     allowed = slowed(allowed, bend, limit)
     speed, yaw_rate = steer(
-        c, s, left - offset, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+        c, s, left - offset, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
     )
-    if passes or build[TIGHTEST] > 0.0:
-        speed, yaw_rate = keep_right(
-            b, n, speed, yaw_rate, outside, way, state, labels, obstacles, drivers, scratch
-        )
-    safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
+    if passes or vehicle.tightest > 0.0:
+        speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
+    safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     if not safe and passes and offset == 0.0:
         speed, yaw_rate = steer(
-            c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, build[TIGHTEST], build[PERIOD]
+            c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
-    elif not safe and passes and within_lane(drivers.floats[b, n, ASIDE], build):
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+    elif not safe and passes and within_lane(drivers.car[b, n].aside, vehicle):
         across = 1.0 if left > offset else -1.0
         speed, yaw_rate = steer(
-            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, build[TIGHTEST], build[PERIOD]
+            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, vehicle.tightest, vehicle.period
         )
-        safe = is_safe(b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch)
+        safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     if not safe:
         speed = 0.0
-        if build[HALF_LENGTH] > 0.0 and not is_safe(
-            b, n, speed, yaw_rate, near, trusted, state, obstacles, build, scratch
-        ):
+        if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
     return speed, yaw_rate
 
 
 @jit_inline
 def keep_right(
-    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, state: State, labels: Labels,
-    obstacles: ObstacleTable, drivers: Drivers, scratch: Scratch,
-) -> tuple[float, float]:  # fmt: skip
+    b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, traffic: Traffic
+) -> tuple[float, float]:
     """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
-    build = drivers.build[b]
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    lawless = drivers.ints[b, n, VIOLATIONS] & LEFT_SIDE != 0
-    if lawless or speed == 0.0 or not outside or bits & LEFT != 0 or stays_right(
-        b, n, speed, yaw_rate, way, state, labels, obstacles, drivers, scratch
-    ):  # fmt: skip
+    lawless = drivers.car[b, n].violations & LEFT_SIDE != 0
+    if (
+        lawless
+        or speed == 0.0
+        or not outside
+        or bits & LEFT != 0
+        or stays_right(b, n, speed, yaw_rate, way, traffic)
+    ):
         return speed, yaw_rate
     leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
-    if drivers.floats[b, n, ASIDE] != 0.0 or not leans or build[SLOWEST] >= 0.0:
+    if drivers.car[b, n].aside != 0.0 or not leans or vehicle.slowest >= 0.0:
         return 0.0, 0.0
-    speed = min(speed, -build[SLOWEST])
-    return -speed, -min(speed / build[TIGHTEST], build[YAW_MOST])
+    speed = min(speed, -vehicle.slowest)
+    return -speed, -min(speed / vehicle.tightest, vehicle.yaw_most)
 
 
 @jit_inline
@@ -150,16 +143,16 @@ def steer(
 
 @jit
 def is_safe(
-    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, state: State,
-    obstacles: ObstacleTable, build: Any, scratch: Scratch,
-) -> bool:  # fmt: skip
+    b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
+) -> bool:
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    period = build[PERIOD]
-    p, q, r, reach = build[HALF_LENGTH], build[HALF_WIDTH], build[ROUNDING], build[REACH]
-    travel = build[FASTEST] * period
+    period = vehicle.period
+    p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach
+    travel = vehicle.fastest * period
     if p > 0.0:
-        travel += build[YAW_MOST] * reach * period
+        travel += vehicle.yaw_most * reach * period
     for k in range(near):
         j = scratch.near[k]
         dx = state.x[b, j] - x

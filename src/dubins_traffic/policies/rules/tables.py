@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
 
@@ -19,68 +23,12 @@ if TYPE_CHECKING:
 ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
 GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
 
-KIND, FIRST, LAST, PLACE, GOAL, LANE, NEXT, TURN, OWED, WAITED, VIOLATIONS, WATCHED, KEPT_OUT = range(13)
-WITHIN, GOAL_FIRST, GOAL_LAST = range(13, 16)
-INTS = 16
-"""Columns of `Drivers.ints`.
-
-KIND: how the car chooses its way, ABSENT where the law does not drive. FIRST, LAST: its rows of `stage` are FIRST to
-LAST - 1: the lanes of a loop, or the goals' vertices. It remembers PLACE: the row of `stage` it is at, -1: none; GOAL:
-the vertex it drives to; LANE: the lane driven, -1 before the first; NEXT: the lane to take at its end; TURN: ticks for
-which it has been its turn to enter the crossing ahead; OWED: the same, over all of this wait; WAITED: ticks for which
-something has been in its way; VIOLATIONS: which rules it breaks on this lane; WATCHED: ticks for which what it may
-pass has not moved; KEPT_OUT: ticks for which it has stood before a bend or dead end that it may not enter; WITHIN:
-ticks for which its body has met the crossing at the end of its lane. GOAL_FIRST, GOAL_LAST: the goals of its trial
-are the rows GOAL_FIRST to GOAL_LAST - 1 of `stage`, if the car minds them.
-"""
-
-SPEED, ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS, PARK_TIME, ASIDE, UNTIL, HOLD, WATCH_X, WATCH_Y, DEPARTS = (
-    range(13)
-)
-FLOATS = 13
-"""Columns of `Drivers.floats`.
-
-SPEED: how fast the car drives, m/s. ROLLS, LEFTS, BLOCKS, TAILGATES, PARKS: on which share of its lanes it breaks a
-rule. PARK_TIME: for how long it parks at most, s. It remembers ASIDE: how far left of its way it passes what stands,
-metres, 0 if it passes nothing; UNTIL: metres before the end of the lane (negative) at which it returns; HOLD: for how
-long it will still stand in the disc ahead, s; WATCH_X, WATCH_Y: where that stands which it may pass.
-DEPARTS: seconds from the beginning for which it parks.
-"""
-
-REACH, HALF_LENGTH, HALF_WIDTH, ROUNDING, MIDDLE, DISC, YAW_MOST, TIGHTEST, PERIOD = range(9)
-DEGREE, FASTEST, SLOWEST, FORFEIT, THROUGH_SPEED, OVER, BEHIND, FORE, NEEDED, LEFT_TIME = range(9, 19)
-STAND_TIME, BACKS_UP, EXIT_GAP, REST_TIME, APPROACHES, GOAL_TIME = range(19, 25)
-VEHICLE = 25
-"""Columns of `Drivers.build`: the body's farthest point, its rounded box, how far right of the centre line lanes are
-driven, R, metres; largest yaw rate, rad/s; least turning radius, metres; seconds of a tick; least degree of a
-crossing; the car's largest and smallest speed, m/s; seconds after which who does not enter on its turn loses its
-place; least speed in a disc, m/s; how far left of the centre line a body may reach, how far behind and ahead what
-stands makes a car overtake, and what must be free of the right lane, metres; for how long it may be left, and after
-how long a car that does not move stands, s; how far anybody may back up, and how far from the disc who stands in a lane
-leaves it free (E4), metres; for how long an e-agent may stand with a free way (E5), s;
-how near to a crossing a car takes its place in the order, metres; within how many seconds every goal has to be free
-once (E6).
-"""
-
-IN, OUT, CROSSING, LENGTH = range(4)
-WAY = 4
-COAST_LOW, COAST_HIGH, COAST_PAST, COAST_SPEED, COAST_BEND, COAST_LANE, COAST_CROSSES, OUT_LENGTH = range(
-    16, 24
-)
-WAYS = 24
-"""Columns of `Drivers.way`: the two lanes whose way the row holds (-1: none yet), whether there is a crossing between
-them, metres of the first, and from WAY on the fields of the `policies.rules.turn_arcs.ReferencePath`. Of a car that
-just drives on (`policies.rules.command_cache`): the stretch on which it goes on so, metres along the first lane from
-the arc's centre (from LOW to HIGH) and along the second (to PAST), its speed, m/s, the curvature of its line, 1/m,
-the lane of its lane state and the disc that its body meets. OUT_LENGTH: metres of the second lane.
-"""
-
 LONGEST_WAY = 2.21
 """Length of the longest way through a disc, in units of R + rho."""
 PROMPT = 0.8
 
 ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
-"""Bits of VIOLATIONS."""
+"""Bits of `Driver.violations`."""
 
 
 ALONE, UNSURE, CROWDED = range(3)
@@ -97,28 +45,193 @@ curvature, 1/m; the heading (C, S); and the yaw rate that is found, rad/s, as th
 """
 
 
-class Drivers(NamedTuple):
+@record
+class Driver:
+    """A car that the law drives: what it is given, and what it remembers."""
+
+    kind: int
+    """How the car chooses its way, ABSENT where the law does not drive."""
+    first: int
+    """Its first row of `Drivers.stage`: the lanes of a loop, or the goals' vertices."""
+    last: int
+    """The row after its last."""
+    goal_first: int
+    """The first row of `Drivers.stage` that is one of the goals of its trial, if the car minds them."""
+    goal_last: int
+    """The row after the last."""
+    speed: float
+    """How fast the car drives, m/s."""
+    rolls: float
+    """On which share of its lanes it does not stop before a crossing."""
+    lefts: float
+    """On which share it drives on the left."""
+    blocks: float
+    """On which share it stands in the disc ahead."""
+    tailgates: float
+    """On which share it drives too close."""
+    parks: float
+    """At which share of the goals it parks."""
+    park_time: float
+    """For how long it parks at most, seconds."""
+    departs: float
+    """For how long from the beginning it parks, seconds."""
+    place: int = -1
+    """The row of `Drivers.stage` it is at, -1: none."""
+    goal: int = -1
+    """The vertex it drives to."""
+    lane: int = -1
+    """The lane driven, -1 before the first."""
+    next_lane: int = -1
+    """The lane to take at its end."""
+    turn: int
+    """Ticks for which it has been its turn to enter the crossing ahead."""
+    owed: int
+    """The same, over all of this wait."""
+    waited: int
+    """Ticks for which something has been in its way."""
+    violations: int
+    """Which rules it breaks on this lane: ROLLING, LEFT_SIDE, TAILGATING."""
+    watched: int
+    """Ticks for which what it may pass has not moved."""
+    kept_out: int
+    """Ticks for which it has stood before a bend or dead end that it may not enter."""
+    within: int
+    """Ticks for which its body has met the crossing at the end of its lane."""
+    aside: float
+    """How far left of its way it passes what stands, metres, 0 if it passes nothing."""
+    until: float
+    """Metres before the end of the lane (negative) at which it returns."""
+    hold: float
+    """For how long it will still stand in the disc ahead, seconds."""
+    watch_x: float
+    """Where that stands which it may pass, metres."""
+    watch_y: float
+    """Where that stands which it may pass, metres."""
+
+
+@record
+class Vehicle:
+    """What the cars of a trial can do, and what the rules ask of them there."""
+
+    reach: float
+    """The body's farthest point, metres."""
+    half_length: float
+    """Of the body, a rounded box, metres."""
+    half_width: float
+    """Of the body, metres."""
+    rounding: float
+    """Of the body, metres."""
+    middle: float
+    """How far right of the centre line lanes are driven, metres."""
+    disc: float
+    """R, metres."""
+    yaw_most: float
+    """Largest yaw rate, rad/s."""
+    tightest: float
+    """Least turning radius, metres."""
+    period: float
+    """Seconds of a tick."""
+    degree: float
+    """Least degree of a crossing."""
+    fastest: float
+    """Largest speed, m/s."""
+    slowest: float
+    """Smallest speed, m/s."""
+    forfeit: float
+    """Seconds after which who does not enter on its turn loses its place."""
+    through_speed: float
+    """Least speed in a disc, m/s."""
+    over: float
+    """How far left of the centre line a body may reach, metres."""
+    behind: float
+    """How far behind what stands makes a car overtake, metres."""
+    fore: float
+    """How far ahead, metres."""
+    needed: float
+    """What must be free of the right lane, metres."""
+    left_time: float
+    """For how long a car may be left, seconds."""
+    stand_time: float
+    """After how long a car that does not move stands, seconds."""
+    backs_up: float
+    """How far anybody may back up, metres."""
+    exit_gap: float
+    """How far from the disc who stands in a lane leaves it free (E4), metres."""
+    rest_time: float
+    """For how long an e-agent may stand with a free way (E5), seconds."""
+    approaches: float
+    """How near to a crossing a car takes its place in the order, metres."""
+    goal_time: float
+    """Within how many seconds every goal has to be free once (E6)."""
+
+
+@record
+class KeptPath:
+    """The reference path of a car, kept from tick to tick, and what one does that just drives on.
+
+    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`; what a car does is
+    kept by `policies.rules.command_cache`.
+    """
+
+    lane: int = -1
+    """The lane in; -1: there is no path yet."""
+    out: int = -1
+    """The lane out."""
+    crossing: int = -1
+    """1 if there is a crossing between them."""
+    coast_lane: int = -1
+    """The lane of its lane state."""
+    coast_crosses: int = -1
+    """The disc that its body meets."""
+    length: float = -1.0
+    """Of the lane in, metres."""
+    out_length: float = -1.0
+    """Of the lane out, metres."""
+    x: float = -1.0
+    y: float = -1.0
+    tx: float = -1.0
+    ty: float = -1.0
+    ux: float = -1.0
+    uy: float = -1.0
+    cx: float = -1.0
+    cy: float = -1.0
+    radius: float = -1.0
+    side: float = -1.0
+    middle: float = -1.0
+    bend: float = -1.0
+    coast_low: float = -1.0
+    """Where it goes on so: metres along the lane in from the arc's centre, from here."""
+    coast_high: float = -1.0
+    """To here."""
+    coast_past: float = -1.0
+    """And along the lane out to here."""
+    coast_speed: float = -1.0
+    """Its speed, m/s."""
+    coast_bend: float = -1.0
+    """The curvature of its line, 1/m."""
+
+
+class Drivers(Tables):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
-    `trial` (B,): of the random numbers; `build` (B, VEHICLE), `ints` (B, N, INTS), `floats` (B, N, FLOATS) and `way`
-    (B, N, WAYS): columns as above; `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from
-    the beginning of each lane to the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
+    `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N) and `way` (B, N); `stage` (M,): lanes of loops,
+    and goals; `distance` (M, L): for a goal, metres from the beginning of each lane to the end of the lane by which
+    the goal is reached; (0, 0) where nobody drives a round.
     """
 
     active: Ints
     net: Ints
     seed: npt.NDArray[np.uint64]
     trial: Ints
-    build: Floats
-    ints: Ints
-    floats: Floats
-    way: Floats
+    vehicle: Rows[Vehicle]
+    car: Rows[Driver]
+    way: Rows[KeptPath]
     stage: Ints
     distance: Floats
 
 
-class Scratch(NamedTuple):
+class Scratch(Tables):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
     lanes that the ego will probably take; `late`: commands put off; `apart` (N,): for
     who does not know how far cars are apart, 0; `listed` (1,): who is in the lists.
@@ -136,16 +249,15 @@ class Scratch(NamedTuple):
     listed: Ints
 
 
-def blank(cars: int) -> tuple[Ints, Floats]:
-    """Return the rows (cars, INTS) and (cars, FLOATS) of cars that the law does not drive."""
-    ints = np.zeros((cars, INTS), dtype=np.int64)
-    ints[:, (PLACE, GOAL, LANE, NEXT)] = -1
-    return ints, np.zeros((cars, FLOATS))
+class Traffic(Tables):
+    """All that the cars of a batch that the law drives go by, and the law's room to work in."""
 
-
-def no_ways(trials: int, cars: int) -> Floats:
-    """Return `Drivers.way` before the first tick."""
-    return np.full((trials, cars, WAYS), -1.0)
+    state: State
+    labels: Labels
+    roads: RoadTable
+    obstacles: ObstacleTable
+    drivers: Drivers
+    scratch: Scratch
 
 
 def scratch(cars: int, segments: int) -> Scratch:
@@ -171,40 +283,40 @@ def through_speed(problem: Problem) -> float:
     return longest / (PROMPT * allowed) if allowed > 0.0 else problem.car.bounds.speed
 
 
-def build_of(problems: Sequence[Problem]) -> Floats:
-    """Return `Drivers.build`."""
+def vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
+    """Return `Drivers.vehicle`."""
     kinds, index = kinds_of(problems)
-    return _build_of(kinds)[index]
+    rows: Any = _vehicles_of(kinds)
+    return rows[index]
 
 
-def _build_of(problems: Sequence[Problem]) -> Floats:
+def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     cars = pack_cars([problem.car for problem in problems])
-    rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
-    columns = (
-        cars.reach,
-        cars.half_length,
-        cars.half_width,
-        cars.rounding,
-        cars.w,
-        np.array([problem.intersection_radius for problem in problems]),
-        cars.yaw_rate,
-        cars.turning_radius,
-        np.array([problem.period for problem in problems]),
-        np.array([own.crossing_degree for own in rules]),
-        cars.speed_high,
-        cars.speed_low,
-        np.array([own.forfeit_time for own in rules]),
-        np.array([through_speed(problem) for problem in problems]),
-        np.array([own.left_set for own in rules]),
-        np.array([own.overtaking_behind for own in rules]),
-        np.array([own.overtaking_ahead for own in rules]),
-        np.array([own.blocked_gap for own in rules]) + 2.0 * (cars.half_width + cars.rounding),
-        np.array([own.left_time for own in rules]),
-        np.array([own.stand_time for own in rules]),
-        np.array([own.turn_back for own in rules]),
-        np.array([own.exit_gap for own in rules]),
-        np.array([own.rest_time for own in rules]),
-        np.array([own.approach_distance for own in rules]),
-        np.array([own.goal_time for own in rules]),
-    )
-    return np.stack([column.astype(np.float64) for column in columns], axis=1)
+    rows = table(Vehicle, len(problems))
+    for name in ("reach", "half_length", "half_width", "rounding"):
+        rows[name] = getattr(cars, name)
+    rows["middle"] = cars.w
+    rows["yaw_most"] = cars.yaw_rate
+    rows["tightest"] = cars.turning_radius
+    rows["fastest"] = cars.speed_high
+    rows["slowest"] = cars.speed_low
+    widths = (2.0 * (cars.half_width + cars.rounding)).tolist()
+    for k, (problem, width) in enumerate(zip(problems, widths, strict=True)):
+        own, rules = rows[k], RuleParameters.from_mapping(problem.rules)
+        own.disc = problem.intersection_radius
+        own.period = problem.period
+        own.degree = rules.crossing_degree
+        own.forfeit = rules.forfeit_time
+        own.through_speed = through_speed(problem)
+        own.over = rules.left_set
+        own.behind = rules.overtaking_behind
+        own.fore = rules.overtaking_ahead
+        own.needed = rules.blocked_gap + width
+        own.left_time = rules.left_time
+        own.stand_time = rules.stand_time
+        own.backs_up = rules.turn_back
+        own.exit_gap = rules.exit_gap
+        own.rest_time = rules.rest_time
+        own.approaches = rules.approach_distance
+        own.goal_time = rules.goal_time
+    return rows

@@ -112,7 +112,7 @@ class Encoder:
     def world(self, trial: int, tick: int, time: float, state: State, labels: Labels) -> bytes:
         """Return the `world_t` of trial 0 of a batch."""
         count = len(self._names)
-        columns = [column[0, :count].tolist() for column in (*state[:6], *labels[:5])]
+        columns = [column[0, :count].tolist() for column in (*state[:6], *labels)]
         cars = [
             name + CAR.pack(*car) for name, car in zip(self._names, zip(*columns, strict=True), strict=True)
         ]

@@ -1,0 +1,125 @@
+"""How Numba compiles `kernels.tables.Tables`: a pointer, of which every array is read when it is asked for.
+
+What stands there never changes while a kernel runs, which the compiler is told: it reads each once, wherever it likes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any, cast
+
+import numba  # pyright: ignore[reportMissingTypeStubs]
+from llvmlite import ir as _ir  # pyright: ignore[reportMissingTypeStubs]
+from numba import extending as _extending  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import cgutils as _cgutils  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import types as _types  # pyright: ignore[reportMissingTypeStubs]
+from numba.core.typing import templates as _templates  # pyright: ignore[reportMissingTypeStubs]
+
+from dubins_traffic.kernels.tables import Tables
+
+WORD = 8
+"""Bytes of what is known of an array: its address, and each of its lengths."""
+
+library, ir, extending = cast(Any, numba), cast(Any, _ir), cast(Any, _extending)
+cgutils, types, templates = cast(Any, _cgutils), cast(Any, _types), cast(Any, _templates)
+
+
+class TablesType(types.Type):
+    """The type of a `Tables` whose arrays have certain types.
+
+    Parameters
+    ----------
+    name : str
+        Of the class.
+    fields : tuple of (str, type)
+        Names and types of its arrays.
+    """
+
+    def __init__(self, name: str, fields: tuple[tuple[str, Any], ...]) -> None:
+        self.fields = fields
+        digest = hashlib.sha256(repr(fields).encode()).hexdigest()[:12]
+        super().__init__(name=f"{name}-{digest}")  # pyright: ignore[reportUnknownMemberType]
+
+    def place(self, field: str) -> tuple[Any, int]:
+        """Return the type of a field, and at which byte what is known of it begins."""
+        words = 0
+        for name, kind in self.fields:
+            if name == field:
+                return kind, WORD * words
+            words += kind.words if isinstance(kind, TablesType) else 1 + kind.ndim
+        raise AttributeError(field)
+
+    @property
+    def words(self) -> int:
+        """How many numbers are known of all of its arrays."""
+        return sum(kind.words if isinstance(kind, TablesType) else 1 + kind.ndim for _, kind in self.fields)
+
+
+def type_of(tables: Tables) -> TablesType:
+    """Return the type of tables."""
+    fields = zip(tables.field_names, tables, strict=True)
+    return TablesType(type(tables).__name__, tuple((name, library.typeof(value)) for name, value in fields))
+
+
+@extending.register_model(TablesType)
+class _Pointer(extending.models.OpaqueModel):  # pyright: ignore[reportUnusedClass]
+    pass
+
+
+@extending.typeof_impl.register(Tables)
+def _typeof(value: Tables, _context: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    return value._numba_type_  # pyright: ignore[reportPrivateUsage]
+
+
+@extending.unbox(TablesType)
+def _unbox(_kind: Any, value: Any, c: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
+    address = c.pyapi.object_getattr_string(value, "address")
+    number = c.pyapi.number_as_ssize_t(address)
+    c.pyapi.decref(address)
+    return extending.NativeValue(c.builder.inttoptr(number, ir.IntType(8).as_pointer()))
+
+
+@extending.infer_getattr
+class _Fields(templates.AttributeTemplate):  # pyright: ignore[reportUnusedClass]
+    key = TablesType
+
+    def generic_resolve(self, kind: TablesType, name: str) -> Any:
+        """Return the type of a field."""
+        return dict(kind.fields).get(name)
+
+
+@extending.lower_getattr_generic(TablesType)
+def _read(context: Any, builder: Any, kind: TablesType, pointer: Any, name: str) -> Any:  # pyright: ignore[reportUnusedFunction]
+    field, begin = kind.place(name)
+    start = builder.gep(pointer, [ir.IntType(64)(begin)])
+    if isinstance(field, TablesType):
+        return start
+    words = builder.bitcast(start, ir.IntType(64).as_pointer())
+    steady = builder.module.add_metadata([])
+
+    def word(k: int) -> Any:
+        value = builder.load(builder.gep(words, [ir.IntType(64)(k)]), align=WORD)
+        value.set_metadata("invariant.load", steady)
+        return value
+
+    array = context.make_array(field)(context, builder)
+    size = context.get_abi_sizeof(context.get_data_type(field.dtype))
+    lengths = [word(1 + k) for k in range(field.ndim)]
+    stride = ir.IntType(64)(size)
+    strides: list[Any] = []
+    for length in reversed(lengths):
+        strides.insert(0, stride)
+        stride = builder.mul(stride, length)
+    items = lengths[0]
+    for length in lengths[1:]:
+        items = builder.mul(items, length)
+    data = builder.load(builder.bitcast(start, array.data.type.as_pointer()), align=WORD)
+    data.set_metadata("invariant.load", steady)
+    array.data = data
+    array.shape = cgutils.pack_array(builder, lengths, ty=ir.IntType(64))
+    array.strides = cgutils.pack_array(builder, strides, ty=ir.IntType(64))
+    array.itemsize = ir.IntType(64)(size)
+    array.nitems = items
+    array.meminfo = ir.Constant(array.meminfo.type, None)
+    array.parent = ir.Constant(array.parent.type, None)
+    return array._getvalue()

@@ -1,0 +1,226 @@
+"""Tables with names: rows of structured arrays, whose fields compiled kernels and plain Python read by name.
+
+A class with annotated fields says what a row holds; `record` makes it the type of the rows of a NumPy array:
+
+    @record
+    class Driver:
+        waited: int
+        '''Ticks for which something has been in its way.'''
+        lane: int = -1
+        '''The lane driven, -1 before the first.'''
+
+    drivers = table(Driver, (trials, cars))
+    drivers[b, n].waited += 1
+
+Compiled, a row is a pointer and a field a load at a fixed distance from it (Numba's `Record`), so that a kernel that
+takes a row takes one argument, however many fields it has.
+
+In plain Python a row is a structure of `ctypes` on the table's memory, kept by the table: where kernels run interpreted
+they read a field of it in less time than an element of an array, and of a row of NumPy's in a tenth of the time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.kernels.arrays import Ints
+
+R = TypeVar("R")
+R_co = TypeVar("R_co", covariant=True)
+
+KINDS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, np.uint64: ctypes.c_uint64}
+"""What a field may be, and how it is kept: eight bytes each."""
+
+
+class Rows(Protocol[R_co]):
+    """A NumPy array whose elements are rows of one record: what kernels see of it."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the array's axes."""
+        ...
+
+    @overload
+    def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
+    @overload
+    def __getitem__(self, place: int | tuple[int, ...]) -> R_co: ...
+    @overload
+    def __getitem__(self, place: Ints) -> Rows[R_co]: ...
+    def __getitem__(self, place: str | int | tuple[int, ...] | Ints) -> Any:
+        """Return the row at a place with a number for each axis, a field of all rows as an array, or some rows."""
+        ...
+
+    def __setitem__(self, place: str | int | tuple[int, ...], value: Any) -> None:
+        """Write a row, or a field of all rows."""
+        ...
+
+    def __len__(self) -> int: ...
+
+
+class Grid(Protocol[R_co]):
+    """As `Rows`, with two axes: a row at each place (b, n)."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the array's axes."""
+        ...
+
+    @overload
+    def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
+    @overload
+    def __getitem__(self, place: int) -> Rows[R_co]: ...
+    @overload
+    def __getitem__(self, place: tuple[int, int]) -> R_co: ...
+    def __getitem__(self, place: str | int | tuple[int, int]) -> Any:
+        """Return the row at a place, those of one number, or a field of all rows as an array."""
+        ...
+
+    def __setitem__(self, field: str, values: Any) -> None:
+        """Write a field of all rows."""
+        ...
+
+    def __len__(self) -> int: ...
+
+
+class Table(np.ndarray[Any, Any]):
+    """A structured array whose rows are made once: what `table` returns.
+
+    `RECORD` is the class of its rows; `KIND` makes them: from the array and how many bytes from its beginning one is.
+    """
+
+    RECORD: Any
+    KIND: Callable[[Any, int], Any]
+    known: dict[Any, Any]
+
+    def __array_finalize__(self, source: Any) -> None:
+        """Begin without rows known."""
+        self.known = {}
+
+    def __getitem__(self, place: Any) -> Any:
+        """Return the row, the field or the part of the table at a place."""
+        try:
+            return self.known[place]
+        except KeyError:
+            return self._find(place)
+        except TypeError:
+            return super().__getitem__(place)
+
+    def __reduce__(self) -> Any:
+        """Be pickled as the array that it is."""
+        return _revive, (self.RECORD, np.asarray(self))
+
+    def _find(self, place: Any) -> Any:
+        found = super().__getitem__(place)
+        if isinstance(place, str):
+            return found.view(np.ndarray)
+        if isinstance(found, np.void):
+            axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
+            far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
+            found = self.KIND(self, far)
+        self.known[place] = found
+        return found
+
+
+def _revive(kind: Any, rows: npt.NDArray[Any]) -> Any:
+    return rows.view(kind.TABLE)
+
+
+@dataclass_transform(kw_only_default=True)
+def record(kind: type[R]) -> type[R]:
+    """Make a class with annotated fields the type of the rows of structured arrays.
+
+    Parameters
+    ----------
+    kind : type
+        Its annotations are the fields, in order: ``int``, ``float`` or ``numpy.uint64``. A value given to a field is
+        its value in a new row, else that is 0.
+
+    Raises
+    ------
+    TypeError
+        If a field is annotated otherwise.
+    """
+    fields = get_type_hints(kind)
+    if not fields or "data" in fields or any(hint not in KINDS for hint in fields.values()):
+        expected = "annotated int, float or numpy.uint64, and none is named data"
+        raise TypeError(f"{kind.__name__}: the fields of a record are {expected}")
+    wrapping = {name: f"_{name}" for name, hint in fields.items() if hint is np.uint64}
+    members: dict[str, Any] = {name: _wrapping(own) for name, own in wrapping.items()}
+    members |= {
+        "_fields_": [(wrapping.get(name, name), KINDS[hint]) for name, hint in fields.items()],
+        "__doc__": kind.__doc__,
+        "__module__": kind.__module__,
+        "__qualname__": kind.__qualname__,
+        "__slots__": (),
+        "__setattr__": _set,
+        "_numba_type_": property(_numba_type_of),
+        "data": property(memoryview),
+        "FIRST_VALUES": {name: vars(kind)[name] for name in fields if name in vars(kind)},
+    }
+    row: Any = type(kind.__name__, (ctypes.Structure,), members)
+    row.LAYOUT = np.dtype([(name, np.dtype(KINDS[hint])) for name, hint in fields.items()], align=True)
+    row.TABLE = type(f"{kind.__name__}Table", (Table,), {"KIND": row.from_buffer, "RECORD": row})
+    return cast(type[R], row)
+
+
+def _numba_type_of(row: Any) -> Any:
+    kind = cast(Any, type(row))
+    return _numba_type(kind)
+
+
+@cache
+def _numba_type(row: Any) -> Any:
+    """Return what Numba takes a row for that is handed to a compiled kernel, which finds it by its `data`."""
+    import numba  # pyright: ignore[reportMissingTypeStubs]
+
+    return cast(Any, numba).from_dtype(row.LAYOUT)
+
+
+def _set(row: Any, name: str, value: Any) -> None:
+    """Write a field; `ctypes` takes no integers of NumPy's."""
+    try:
+        object.__setattr__(row, name, value)
+    except TypeError:
+        object.__setattr__(row, name, int(value))
+
+
+def _wrapping(name: str) -> property:
+    """Return a property for an unsigned field, whose values wrap around as they do where they are compiled."""
+    return property(lambda row: np.uint64(getattr(row, name)), lambda row, value: _set(row, name, int(value)))
+
+
+def layout(kind: type[Any]) -> np.dtype[Any]:
+    """Return the dtype of the rows of a record."""
+    return kind.LAYOUT
+
+
+@overload
+def table(kind: type[R], shape: int) -> Rows[R]: ...
+@overload
+def table(kind: type[R], shape: tuple[int, ...]) -> Any: ...
+def table(kind: type[R], shape: int | tuple[int, ...]) -> Any:
+    """Return an array of new rows of a record, each with the first values of its fields.
+
+    Parameters
+    ----------
+    kind : type
+        A class made by `record`.
+    shape : int or tuple of int
+        Lengths of the axes.
+    """
+    rows: Any = np.zeros(shape, dtype=layout(kind)).view(cast(Any, kind).TABLE)
+    for name, value in cast(Any, kind).FIRST_VALUES.items():
+        rows[name] = value
+    return rows
+
+
+def stack(tables: Sequence[Rows[R]]) -> Any:
+    """Return a table of which each row of the first axis is one of some tables of equal lengths."""
+    rows: Any = np.stack([cast(Any, own) for own in tables])
+    return rows.view(type(tables[0]))
