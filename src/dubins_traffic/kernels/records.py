@@ -114,6 +114,12 @@ class Table(np.ndarray[Any, Any]):
         """Be pickled as the array that it is."""
         return _revive, (type(self), np.asarray(self))
 
+    def __setitem__(self, place: Any, value: Any) -> None:
+        """Write a row, which may be one of another table, or a field of all rows."""
+        if isinstance(value, ctypes.Structure):
+            value = np.frombuffer(value, dtype=self.dtype)[0]
+        super().__setitem__(place, value)
+
     def _find(self, place: Any) -> Any:
         found = super().__getitem__(place)
         if isinstance(place, str):
