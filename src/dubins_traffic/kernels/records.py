@@ -117,8 +117,8 @@ class Table(np.ndarray[Any, Any]):
     def __setitem__(self, place: Any, value: Any) -> None:
         """Write a row, which may be one of another table, or a field of all rows."""
         if isinstance(value, ctypes.Structure):
-            value = np.frombuffer(value, dtype=self.dtype)[0]
-        super().__setitem__(place, value)
+            value = np.frombuffer(cast(Any, value), dtype=cast(Any, self).dtype)[0]
+        cast(Any, super()).__setitem__(place, value)
 
     def _find(self, place: Any) -> Any:
         found = super().__getitem__(place)
