@@ -111,3 +111,20 @@ def test_an_unsigned_field_wraps_round() -> None:
     with np.errstate(over="ignore"):
         driver.seed += np.uint64(2)
     assert driver.seed == 1
+
+
+@jit
+def copy_driver(drivers: Rows[Driver], source: int, to: int) -> None:
+    """Let a driver be as another one."""
+    drivers[to, 0] = drivers[source, 1]
+
+
+@pytest.mark.parametrize(
+    "call", [copy_driver, getattr(copy_driver, "py_func", copy_driver)], ids=["as it is", "interpreted"]
+)
+def test_a_row_is_copied(call) -> None:
+    drivers = table(Driver, (2, 3))
+    drivers[1, 1].speed, drivers[1, 1].lane = 3.0, 7
+    call(drivers, 1, 0)
+    drivers[1, 1].speed = 4.0
+    assert (drivers[0, 0].speed, drivers[0, 0].lane) == (3.0, 7)

@@ -115,6 +115,12 @@ class Table(np.ndarray[Any, Any]):
         """Be pickled as the array that it is."""
         return _revive, (self.RECORD, np.asarray(self))
 
+    def __setitem__(self, place: Any, value: Any) -> None:
+        """Write a row, which may be one of another table, or a field of all rows."""
+        if isinstance(value, ctypes.Structure):
+            value = np.frombuffer(cast(Any, value), dtype=cast(Any, self).dtype)[0]
+        cast(Any, super()).__setitem__(place, value)
+
     def _find(self, place: Any) -> Any:
         found = super().__getitem__(place)
         if isinstance(place, str):
