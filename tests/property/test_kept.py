@@ -80,19 +80,19 @@ def test_no_car_is_nearer_than_is_known(agents) -> None:
 
 
 @jit
-def total(scale: float, *arrays) -> float:
+def total(scale: float, one, two) -> float:
     found = 0.0
-    for k in range(arrays[0].shape[0]):
-        found += scale * (arrays[0][k] + arrays[1][k])
+    for k in range(one.shape[0]):
+        found += scale * (one[k] + two[k])
     return found
 
 
 def test_a_bound_kernel_reads_its_arrays_at_each_call() -> None:
     one, two = np.ones(3), np.zeros(3)
-    call = bound(total, (1.0,), (one, two))
-    assert call(2.0) == total(2.0, one, two) == 6.0
+    call = bound(total)
+    assert call(2.0, one, two) == total(2.0, one, two) == 6.0
     two[:] = 1.0
-    assert call(2.0) == 12.0
+    assert call(2.0, one, two) == 12.0
 
 
 def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() -> None:

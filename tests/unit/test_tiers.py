@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -13,10 +14,13 @@ import numpy as np
 import pytest
 
 from dubins_traffic.kernels import asking, compile, store
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import Kernel, jit
 from dubins_traffic.kernels.kinds import UnfitError, dtype_of, kind_of
 from dubins_traffic.kernels.machine import Code
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.trial.buffer import all_finite
 
@@ -225,23 +229,90 @@ def test_machine_code_takes_and_returns_what_the_function_does() -> None:
     assert {type(found) for found in all_finite._known.values()} == {Code}
 
 
-def test_bound_calls_see_other_arrays_in_front() -> None:
-    call = bound(add, (0, np.zeros(2)), (np.array([1.0, 2.0]), np.array([10.0])))
+def test_bound_calls_see_other_arrays_and_arrays_of_other_kinds() -> None:
+    call = bound(add)
+    terms = np.array([1.0, 2.0, 10.0])
     first, second = np.zeros(2), np.zeros(2)
-    assert call(1, first) == 13.0
-    assert call(2, second) == 26.0
-    assert call(1, first) == 13.0
-    assert first.tolist() == [2.0, 0.0]
+    assert call(1, first, terms) == 13.0
+    assert call(2, second, terms) == 26.0
+    assert call(1, first, np.array([1, 2, 10])) == 13.0
+    assert call(1, first, terms[::2]) == 11.0
+    assert first.tolist() == [3.0, 0.0]
     assert second.tolist() == [2.0, 0.0]
 
 
+def test_a_copy_of_bound_calls_writes_its_arguments_elsewhere() -> None:
+    call = bound(add)
+    terms = np.array([1.0, 2.0, 10.0])
+    assert call(1, np.zeros(1), terms) == 13.0
+    other = deepcopy(call)
+    assert other is not call
+    assert other._call is None
+    assert other(2, np.zeros(1), terms) == 26.0
+    assert other._call is not call._call
+
+
+@record
+class Car:
+    """A car of these tests."""
+
+    lane: int = -1
+    speed: float
+    seed: np.uint64
+
+
+class Traffic(Tables):
+    """Tables of these tests."""
+
+    car: Rows[Car]
+    limit: Floats
+
+
+class Scene(Tables):
+    """Tables that hold others."""
+
+    traffic: Traffic
+    count: Ints
+
+
+def test_rows_and_tables_are_handed_over_by_their_place() -> None:
+    cars = table(Car, (2, 3))
+    cars[1, 2].speed, cars[1, 2].seed = 0.5, 2**64 - 1
+    scene = Scene(Traffic(cars, np.array([0.25])), np.array([7]))
+    assert kind_of(scene) is kind_of(scene)
+    assert kind_of(scene) == kind_of(Scene(Traffic(table(Car, (1, 1)), np.zeros(5)), np.array([1, 2])))
+    assert hash(kind_of(scene)) == hash(tuple(kind_of(scene)))
+    for call in (drive, drive.interpreted, bound(drive)):
+        cars[1, 2].lane = -1
+        assert call(scene, 1, 2) == (7, 0.25)
+        assert cars["lane"].tolist() == [[-1, -1, -1], [-1, -1, 6]]
+    assert stop(cars[1, 2]) == 0.5
+    assert cars["speed"].max() == 0.0
+    assert {type(found) for own in (drive, stop) for found in own._known.values()} == {Code}
+
+
 @jit
-def add(times, into, *arrays):
-    """Add up arrays and count calls."""
+def drive(scene: Scene, b: int, n: int) -> tuple[int, float]:
+    """Drive a car into another lane."""
+    car = scene.traffic.car[b, n]
+    car.lane += scene.count[0]
+    return scene.count[0], min(car.speed, scene.traffic.limit[0])
+
+
+@jit
+def stop(car: Car) -> float:
+    """Stop a car; return its speed before."""
+    speed = car.speed
+    car.speed = 0.0
+    return speed
+
+
+@jit
+def add(times, into, terms):
+    """Add up an array and count calls."""
     total = 0.0
-    for array in arrays:
-        for k in range(array.shape[0]):
-            total += array[k]
+    for k in range(terms.shape[0]):
+        total += terms[k]
     into[0] += times
     return total * times
 

@@ -31,6 +31,7 @@ from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.problem.cycles import cycle_lanes
@@ -92,6 +93,7 @@ class Fleet:
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
+        self._call = bound(decide)
         self._scene = Scene(state, self._roads, self._obstacles, self._agents, self._work)
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
@@ -122,7 +124,7 @@ class Fleet:
             self._scene = self._scene.replace(state=state)
         done = 0
         while done < commands.shape[0]:
-            reached = decide(tick, done, commands, self._scene)
+            reached = self._call(tick, done, commands, self._scene)
             done = reached
             if reached < 0:
                 done = -1 - reached

@@ -11,6 +11,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
@@ -48,6 +49,7 @@ class Lawful:
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
         )
+        self._decide = bound(decide)
         self._traffic = Traffic(
             state,
             Labels.zeros(*state.x.shape),
@@ -65,7 +67,7 @@ class Lawful:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (B, N, 2)."""
         if state is not self._traffic.state or labels is not self._traffic.labels:
             self._traffic = self._traffic.replace(state=state, labels=labels)
-        decide(tick, commands, self._traffic)
+        self._decide(tick, commands, self._traffic)
 
 
 def pack_drivers(

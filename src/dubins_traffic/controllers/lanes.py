@@ -75,7 +75,7 @@ class Lanes:
         known = self._known
         if known is None:
             known = self._known = self._furnish(observation.pose)
-            self._decide = bound(decide, (known, self._roads))
+            self._decide = bound(decide)
         elif self._blocked or self._closed:
             known = self._known = self._remember(known, observation)
         ego, others = known.ego[0], known.others[0]

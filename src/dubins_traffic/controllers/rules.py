@@ -6,6 +6,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
@@ -38,6 +39,8 @@ class Rules:
 
     def __init__(self) -> None:
         self._drivers: Drivers | None = None
+        self._traffic: Traffic | None = None
+        self._decide = bound(decide)
 
     def start(self, problem: Problem) -> None:
         """Find the round; InputError if the car can't keep the rules."""
@@ -78,10 +81,10 @@ class Rules:
         if ego.place < 0:
             seen = observation.propositions
             ego.place = nearest_stage(drivers.distance, 0, len(drivers.stage), seen.lane, seen.segment)
-        decide(
-            observation.tick,
-            self._command,
-            Traffic(self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch),
-        )
+        traffic = self._traffic
+        if traffic is None or traffic.drivers is not drivers:
+            tables = (self._state, self._labels, self._roads, self._obstacles, drivers, self._scratch)
+            traffic = self._traffic = Traffic(*tables)
+        self._decide(observation.tick, self._command, traffic)
         speed, yaw_rate = self._command[0, EGO].tolist()
         return Command(speed, yaw_rate)

@@ -146,7 +146,7 @@ class Group:
         self._breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
         self._feed = Feed(instances, places, metrics) if metrics else None
-        self._take = bound(run_trials, (self.active, 1, 1.0, self.commands, self._world))
+        self._take = bound(run_trials)
         self._run(self.active, 1)
         self._aim()
 
@@ -192,7 +192,7 @@ class Group:
         twin._contacts = [list(self._contacts[b]) for b in trials]
         twin._breaches = [list(self._breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
-        twin._take = bound(run_trials, (taken, 1, 1.0, twin.commands, twin._world))
+        twin._take = bound(run_trials)
         twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
         twin._note_rules()
         if twin._feed is not None and seeds is not None:

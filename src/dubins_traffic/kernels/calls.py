@@ -5,82 +5,91 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 from dubins_traffic.kernels.compile import Kernel
 from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, is_number, kind_of
 from dubins_traffic.kernels.machine import Code, address
 
+P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def bound(
-    kernel: Callable[..., R], leading: Sequence[Any], arrays: Sequence[Any] | None = None
-) -> Callable[..., R]:
-    """Return a kernel that is to be called with other leading arguments and the same arrays after them.
+def bound(kernel: Callable[P, R]) -> Callable[P, R]:
+    """Return a kernel that is to be called often, with arguments of the same kinds, most of which are the same.
 
     Parameters
     ----------
     kernel
-        A function made by `kernels.compile.jit`.
-    leading
-        Leading arguments as those of the calls to come: an integer where they have integers, and so on. Arrays and
-        tables among them may be others in each call, of the same type.
-    arrays
-        The arrays, if the kernel's last parameter takes any number of them.
+        A function made by `kernels.compile.jit`, without a parameter that takes any number of arguments.
+
+    Notes
+    -----
+    What comes of it writes its arguments where the call before wrote them: a thread needs one of its own.
     """
-    after = () if arrays is None else tuple(arrays)
-    if not isinstance(kernel, Kernel):
-        return lambda *first: kernel(*first, *after)
-    own = cast("Kernel[..., R]", kernel)
-    tail = () if arrays is None else (after,)
-    try:
-        kinds = tuple(kind_of(value) for value in (*leading, *tail))
-    except UnfitError:
-        plain = own.interpreted
-        return lambda *first: plain(*first, *after)
-    code = own.code(kinds)
-    return _Later(own, kinds, tail, after) if code is None else _compiled(code, tail)
+    return (
+        cast("Callable[P, R]", Bound(cast("Kernel[..., R]", kernel)))
+        if isinstance(kernel, Kernel)
+        else kernel
+    )
 
 
-class _Later(Generic[R]):
-    """Calls that are interpreted until there is machine code."""
+class Bound(Generic[R]):
+    """Calls that look only at arguments that are others than before, and are interpreted until there is machine code.
 
-    def __init__(
-        self, kernel: Kernel[..., R], kinds: tuple[Kind, ...], tail: tuple[Any, ...], after: tuple[Any, ...]
-    ) -> None:
-        self._kernel, self._kinds, self._tail, self._after = kernel, kinds, tail, after
+    Parameters
+    ----------
+    kernel : Kernel
+        The kernel.
+    """
+
+    def __init__(self, kernel: Kernel[..., R]) -> None:
+        self._kernel = kernel
         self._call: Callable[..., R] | None = None
 
-    def __call__(self, *first: Any) -> R:
-        if self._call is not None:
-            return self._call(*first)
-        code = None if self._kernel.is_waiting else self._kernel.code(self._kinds)
-        if code is None:
-            return self._kernel.interpreted(*first, *self._after)
-        self._call = _compiled(code, self._tail)
-        return self._call(*first)
+    def __call__(self, *args: Any) -> R:
+        """Run the kernel."""
+        call = self._call or self._find(args)
+        if call is None:
+            return self._kernel.interpreted(*args)
+        try:
+            return call(*args)
+        except UnfitError:
+            return self._kernel(*args)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied as calls that have not been made yet: a copy writes its arguments elsewhere."""
+        return Bound, (self._kernel,)
+
+    def _find(self, args: Sequence[Any]) -> Callable[..., R] | None:
+        if self._kernel.is_waiting:
+            return None
+        try:
+            code = self._kernel.code(tuple([kind_of(value) for value in args]))
+        except UnfitError:
+            return None
+        if code is not None:
+            self._call = _compiled(code)
+        return self._call
 
 
-def _compiled(code: Code, tail: tuple[Any, ...]) -> Callable[..., Any]:
-    """Return a function that calls machine code with leading arguments, and with `tail` after them."""
-    kinds = code.kinds[: len(code.kinds) - len(tail)]
+def _compiled(code: Code) -> Callable[..., Any]:
+    """Return a function that calls machine code; it raises UnfitError if an argument is of another kind than before."""
+    kinds = code.kinds
     kept: dict[int, list[Any]] = {}
 
     def placed(k: int, value: Any) -> int:
-        """Return the address of a table, as argument k from now on."""
-        if kind_of(value) != code.kinds[k]:
-            raise TypeError(f"argument {k} is of another kind than before")
+        """Return the address of an array or table, as argument k from now on."""
+        if kind_of(value) != kinds[k]:
+            raise UnfitError(f"argument {k} is of another kind than before")
         own: list[Any] = []
-        found = address(value, code.kinds[k], own)
+        found = address(value, kinds[k], own)
         kept[k] = own
         return found
 
-    frame = ctypes.create_string_buffer(8 * len(code.kinds))
+    frame = ctypes.create_string_buffer(8 * len(kinds))
     room = code.room() or ctypes.create_string_buffer(8)
     words, reals = _views(frame)
-    if tail:
-        words[len(kinds)] = placed(len(kinds), tail[0])
     make = _maker(kinds, code.answer)
     function = ctypes.CFUNCTYPE(ctypes.c_int32)(code.address)
     where = ctypes.c_void_p(ctypes.addressof(frame)), ctypes.c_void_p(ctypes.addressof(room))

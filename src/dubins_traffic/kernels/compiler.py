@@ -28,7 +28,8 @@ from numba.core import codegen, config, targetconfig, types  # pyright: ignore[r
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
-from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of
+from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of, is_place
+from dubins_traffic.kernels.pointers import TablesType
 
 OURS = "dubins_traffic"
 """Part of the names of our compiled functions."""
@@ -162,6 +163,8 @@ class _Reader:
             if kind == NONE:
                 self._word()
             return self._value(kind, own)
+        if is_place(kind):
+            return self._value(kind, own)
         block = self._builder.inttoptr(self._word(), _ir.IntType(8).as_pointer())
         return _Reader(self._context, self._builder, block)._value(kind, own)
 
@@ -178,6 +181,8 @@ class _Reader:
             return self._number(own)
         if kind[0] == "array":
             return self._array(own)
+        if is_place(kind):
+            return self._builder.inttoptr(self._word(), self._context.get_value_type(own))
         parts = [self._value(part, each) for part, each in zip(kind[-1], own.types, strict=True)]
         return self._context.make_tuple(self._builder, own, parts)
 
@@ -278,6 +283,10 @@ def _type_of(kind: Kind) -> Any:
     if kind[0] == "array":
         _, elements, ndim, layout, writable = kind
         return _types.Array(_dtypes.from_dtype(dtype_of(elements)), ndim, layout, readonly=not writable)
+    if kind[0] == "row":
+        return _dtypes.from_dtype(dtype_of(kind[1]))
+    if kind[0] == "tables":
+        return TablesType(kind[1], tuple((name, _type_of(own)) for name, own in kind[2]))
     parts = [_type_of(part) for part in kind[-1]]
     if kind[0] == "tuple":
         return _types.Tuple(parts)

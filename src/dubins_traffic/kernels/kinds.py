@@ -4,11 +4,12 @@ A kind is a nested tuple of texts and numbers, so that it can be written down (`
 
 - ``("number", "i8")`` and the like for a number, with NumPy's letter and size; ``("none",)``.
 - ``("array", dtype, ndim, layout, writable)``, layout ``C``, ``F`` or ``A``.
+- ``("row", dtype)`` for a row of `kernels.records`, ``("tables", name, fields)`` for `kernels.tables.Tables`.
 - ``("tuple", kinds)`` and ``("named", module, name, kinds)`` for a tuple and a named tuple.
 
-A call hands over one frame: eight bytes for each argument, which hold a number, or the address of a block for an
-array or tuple. A block has eight bytes for each number in it, and for an array its address, its number of elements,
-the bytes of one, its shape and its strides.
+A call hands over one frame: eight bytes for each argument, which hold a number, the address of a row or of what tables
+say of their arrays, or the address of a block for an array or tuple. A block has eight bytes for each number in it, and
+for an array its address, its number of elements, the bytes of one, its shape and its strides.
 """
 
 from __future__ import annotations
@@ -16,9 +17,12 @@ from __future__ import annotations
 import ctypes
 import struct
 from functools import cache
-from typing import Any, TypeAlias, cast
+from typing import Any, Self, TypeAlias, cast
 
 import numpy as np
+
+from dubins_traffic.kernels.records import layout as record_layout
+from dubins_traffic.kernels.tables import Tables
 
 Kind: TypeAlias = tuple[Any, ...]
 
@@ -53,6 +57,10 @@ def kind_of(value: object) -> Kind:
             raise UnfitError("an array that is not aligned")
         layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
         return "array", _dtype_kind(array.dtype), array.ndim, layout, flags.writeable
+    if isinstance(value, Tables):
+        return _kind_of_tables(value)
+    if isinstance(value, ctypes.Structure):
+        return "row", _dtype_kind(record_layout(cast(Any, type(cast(object, value)))))
     if isinstance(value, tuple):
         kinds = tuple([kind_of(part) for part in cast("tuple[object, ...]", value)])
         own = type(cast(object, value))
@@ -72,6 +80,29 @@ _PLAIN: dict[type, Kind] = {
     float: REAL, int: WHOLE, bool: TRUTH, type(None): NONE, np.float64: REAL, np.int64: WHOLE, np.uint64: NATURAL,
     np.bool_: TRUTH,
 }  # fmt: skip
+
+
+class _Hashed(tuple[Any, ...]):
+    """A long kind, whose hash is found once."""
+
+    def __new__(cls, parts: tuple[Any, ...]) -> Self:
+        made = super().__new__(cls, parts)
+        made.number = hash(parts)
+        return made
+
+    number: int
+
+    def __hash__(self) -> int:
+        return self.number
+
+
+def _kind_of_tables(tables: Tables) -> Kind:
+    known = vars(tables)
+    kind = known.get("_kind")
+    if kind is None:
+        fields = tuple((name, kind_of(value)) for name, value in zip(tables.field_names, tables, strict=True))
+        kind = known["_kind"] = _Hashed(("tables", type(tables).__name__, fields))
+    return kind
 
 
 @cache
@@ -112,6 +143,16 @@ def is_number(kind: Kind) -> bool:
     return kind[0] == "number"
 
 
+def is_place(kind: Kind) -> bool:
+    """Tell whether of a kind the address of the value itself is handed over."""
+    return kind[0] in ("row", "tables")
+
+
+def place_of(value: Any) -> int:
+    """Return the address of a row, or of what tables say of their arrays."""
+    return value.address if isinstance(value, Tables) else ctypes.addressof(value)
+
+
 @cache
 def letters(kind: Kind) -> str:
     """Return how `struct` packs a number, or the block of an array or tuple."""
@@ -119,6 +160,8 @@ def letters(kind: Kind) -> str:
         return _LETTERS[kind[1][0]]
     if kind[0] == "array":
         return "q" * (3 + 2 * kind[2])
+    if is_place(kind):
+        return "q"
     return "" if kind == NONE else "".join(letters(part) for part in kind[-1])
 
 
@@ -134,6 +177,8 @@ def leaves(value: object, into: list[int | float]) -> None:
         into.append(array.itemsize)
         into.extend(array.shape)
         into.extend(array.strides)
+    elif isinstance(value, Tables | ctypes.Structure):
+        into.append(place_of(value))
     elif isinstance(value, tuple):
         for part in cast("tuple[object, ...]", value):
             leaves(part, into)

@@ -11,7 +11,7 @@ from importlib import import_module
 from threading import Lock
 from typing import Any, cast
 
-from dubins_traffic.kernels.kinds import NONE, Kind, is_number, letters, packed
+from dubins_traffic.kernels.kinds import NONE, Kind, is_number, is_place, letters, packed, place_of
 
 CPU = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
 """Environment variables by which Numba is told for which processor it compiles."""
@@ -116,6 +116,9 @@ def address(value: object, kind: Kind, kept: list[Any]) -> int:
     """Return the address of a new block for an array or tuple; the block is appended to what is to be kept."""
     if kind == NONE:
         return 0
+    if is_place(kind):
+        kept.append(value)
+        return place_of(value)
     block = packed(value, kind)
     kept.append((value, block))
     return ctypes.addressof(block)

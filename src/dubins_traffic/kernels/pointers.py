@@ -15,8 +15,6 @@ from numba.core import cgutils as _cgutils  # pyright: ignore[reportMissingTypeS
 from numba.core import types as _types  # pyright: ignore[reportMissingTypeStubs]
 from numba.core.typing import templates as _templates  # pyright: ignore[reportMissingTypeStubs]
 
-from dubins_traffic.kernels.tables import Tables
-
 WORD = 8
 """Bytes of what is known of an array: its address, and each of its lengths."""
 
@@ -55,28 +53,9 @@ class TablesType(types.Type):
         return sum(kind.words if isinstance(kind, TablesType) else 1 + kind.ndim for _, kind in self.fields)
 
 
-def type_of(tables: Tables) -> TablesType:
-    """Return the type of tables."""
-    fields = zip(tables.field_names, tables, strict=True)
-    return TablesType(type(tables).__name__, tuple((name, library.typeof(value)) for name, value in fields))
-
-
 @extending.register_model(TablesType)
 class _Pointer(extending.models.OpaqueModel):  # pyright: ignore[reportUnusedClass]
     pass
-
-
-@extending.typeof_impl.register(Tables)
-def _typeof(value: Tables, _context: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    return value._numba_type_  # pyright: ignore[reportPrivateUsage]
-
-
-@extending.unbox(TablesType)
-def _unbox(_kind: Any, value: Any, c: Any) -> Any:  # pyright: ignore[reportUnusedFunction]
-    address = c.pyapi.object_getattr_string(value, "address")
-    number = c.pyapi.number_as_ssize_t(address)
-    c.pyapi.decref(address)
-    return extending.NativeValue(c.builder.inttoptr(number, ir.IntType(8).as_pointer()))
 
 
 @extending.infer_getattr

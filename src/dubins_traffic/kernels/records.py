@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
 import numpy as np
@@ -153,9 +152,8 @@ def record(kind: type[R]) -> type[R]:
         If a field is annotated otherwise.
     """
     fields = get_type_hints(kind)
-    if not fields or "data" in fields or any(hint not in KINDS for hint in fields.values()):
-        expected = "annotated int, float or numpy.uint64, and none is named data"
-        raise TypeError(f"{kind.__name__}: the fields of a record are {expected}")
+    if not fields or any(hint not in KINDS for hint in fields.values()):
+        raise TypeError(f"{kind.__name__}: the fields of a record are annotated int, float or numpy.uint64")
     wrapping = {name: f"_{name}" for name, hint in fields.items() if hint is np.uint64}
     members: dict[str, Any] = {name: _wrapping(own) for name, own in wrapping.items()}
     members |= {
@@ -165,27 +163,12 @@ def record(kind: type[R]) -> type[R]:
         "__qualname__": kind.__qualname__,
         "__slots__": (),
         "__setattr__": _set,
-        "_numba_type_": property(_numba_type_of),
-        "data": property(memoryview),
         "FIRST_VALUES": {name: vars(kind)[name] for name in fields if name in vars(kind)},
     }
     row: Any = type(kind.__name__, (ctypes.Structure,), members)
     row.LAYOUT = np.dtype([(name, np.dtype(KINDS[hint])) for name, hint in fields.items()], align=True)
     row.TABLE = type(f"{kind.__name__}Table", (Table,), {"KIND": row.from_buffer, "RECORD": row})
     return cast(type[R], row)
-
-
-def _numba_type_of(row: Any) -> Any:
-    kind = cast(Any, type(row))
-    return _numba_type(kind)
-
-
-@cache
-def _numba_type(row: Any) -> Any:
-    """Return what Numba takes a row for that is handed to a compiled kernel, which finds it by its `data`."""
-    import numba  # pyright: ignore[reportMissingTypeStubs]
-
-    return cast(Any, numba).from_dtype(row.LAYOUT)
 
 
 def _set(row: Any, name: str, value: Any) -> None:

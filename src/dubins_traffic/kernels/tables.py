@@ -79,13 +79,6 @@ class Tables:
         """Where `description` stands."""
         return self.description.ctypes.data
 
-    @cached_property
-    def _numba_type_(self) -> Any:
-        """What Numba asks for."""
-        from dubins_traffic.kernels.pointers import type_of
-
-        return type_of(self)
-
 
 def _words(array: Any) -> list[int]:
     """Return an array's address and lengths; kernels take only those whose elements follow each other."""

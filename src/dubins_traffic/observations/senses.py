@@ -21,6 +21,7 @@ from dubins_traffic.cars.state import (
 )
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.trig import sincos
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class Senses:
     ) -> None:
         problem = instance.problem
         self._car = car
+        self._look = bound(neighbours)
         self._scanner = scanner
         self._instance = instance
         self._names = instance.names
@@ -81,7 +83,7 @@ class Senses:
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the car's driver knows at the beginning of the tick that starts in `state`."""
-        count = neighbours(0, self._car, self._radius, self._reals, self._wholes, state, labels)
+        count = self._look(0, self._car, self._radius, self._reals, self._wholes, state, labels)
         if count > 0:
             self._seen = self._labelled(count)
         count = len(self._seen)

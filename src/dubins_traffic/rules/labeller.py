@@ -9,6 +9,7 @@ import numpy as np
 from dubins_traffic.cars.state import NONE, Contact, Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.table import RoadTable, pack_distinct
@@ -81,6 +82,7 @@ class Labeller:
         self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
         self.labels = Labels.zeros(trials, cars)
         self._tables = None
+        self._look = bound(label_frame)
         self._tick = -1
 
     def update(
@@ -147,7 +149,7 @@ class Labeller:
         return self._tables
 
     def _label(self, state: State) -> None:
-        label_frame(self._tick, self.seeing(state))
+        self._look(self._tick, self.seeing(state))
 
 
 def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:

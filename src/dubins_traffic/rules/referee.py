@@ -14,6 +14,7 @@ from dubins_traffic.cars.near import unknown
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
     COLLISION,
@@ -122,6 +123,7 @@ class Referee:
         self._log = BreachLog.empty(trials, cars, self._goals)
         self._spacing = unknown(trials, cars)
         self._tables = None
+        self._judge_frame = bound(judge_frame)
         self._judge(0, state)
         return self._collect(state, [()] * trials)
 
@@ -206,7 +208,7 @@ class Referee:
 
     def _judge(self, tick: int, state: State) -> None:
         self._tick = tick
-        judge_frame(tick, self._seeing(state))
+        self._judge_frame(tick, self._seeing(state))
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._log.filled[0] and not any(contacts):

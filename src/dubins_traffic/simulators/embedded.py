@@ -15,6 +15,7 @@ from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.protocols import Capabilities
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class Embedded:
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
         self._rows = rows(self._cars, places, 1.0 / self._rate)
         self._tick = 0
+        self._move = bound(step)
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -75,7 +77,7 @@ class Embedded:
         self._tick += 1
         done = 0
         while done < trials:
-            reached = step(done, 1.0 / self._rate, commands, self.state, *self.tables)
+            reached = self._move(done, 1.0 / self._rate, commands, self.state, *self.tables)
             if self._work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached

@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.protocols import Ending, Forks, Sink
 
@@ -63,6 +64,7 @@ class FrameBuffer:
         self._cars = len(instance.starts)
         self._sinks = tuple(sinks)
         self._first = 0
+        self._keep = bound(keep)
         for sink in self._sinks:
             sink.begin(instance)
         self._renew()
@@ -91,7 +93,7 @@ class FrameBuffer:
     ) -> None:
         """Take the frame just reached, the clipped commands that led to it, and what happened in its tick."""
         f = self._filled
-        keep(f, self._reals, self._whole, self._bits, commands, state, labels)
+        self._keep(f, self._reals, self._whole, self._bits, commands, state, labels)
         if contacts:
             self._contacts += contacts
         if events:

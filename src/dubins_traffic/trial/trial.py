@@ -73,7 +73,7 @@ class Trial:
         self._buffer = FrameBuffer(instance, sinks)
         self._buffer.push(self._state, self._labels, self._commands, (), ())
         self._tick = 0
-        self._all_finite = bound(all_finite, (self._commands,))
+        self._all_finite = bound(all_finite)
         self._tellers = [agent for agent in self._agents if isinstance(agent, Reports)]
         self._note_agents()
         self._observation: Observation | None = None
@@ -167,10 +167,7 @@ class Trial:
         again = seed is not None and seed != self.instance.seed
         instance = replace(self.instance, seed=seed) if again else self.instance
         twin = object.__new__(type(self))
-        vars(twin).update(
-            forked({**vars(self), "_watchers": (), "_all_finite": None}, self.instance, instance)
-        )
-        twin._all_finite = bound(all_finite, (twin._commands,))
+        vars(twin).update(forked({**vars(self), "_watchers": ()}, self.instance, instance))
         if again:
             twin._reseed()
         return twin
