@@ -45,9 +45,17 @@ def without_docstring() -> Findings:
         if not ast.get_docstring(module.tree):
             found[module.name or "dubins_traffic"] = "module"
         for item in module.definitions():
-            if not item.name.startswith("_") and is_at_top(module, item) and not ast.get_docstring(item):
+            told = ast.get_docstring(item) or is_overload(item)
+            if not item.name.startswith("_") and is_at_top(module, item) and not told:
                 found[f"{module.name}.{item.name}"] = "definition"
     return found
+
+
+def is_overload(item: ast.AST) -> bool:
+    """Whether a function is there for its types alone."""
+    return any(
+        isinstance(own, ast.Name) and own.id == "overload" for own in getattr(item, "decorator_list", ())
+    )
 
 
 def is_at_top(module: Module, item: ast.AST) -> bool:

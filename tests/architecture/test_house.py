@@ -16,9 +16,9 @@ from tests.architecture.kernels import is_said, public_kernels
 
 MOST_STILL = {
     "circles": 0,
-    "duplicates": 4,
-    "kernels without units": 153,
-    "long modules": 4,
+    "duplicates": 6,
+    "kernels without units": 152,
+    "long modules": 1,
     "retired names": 2,
     "without docstring": 0,
 }

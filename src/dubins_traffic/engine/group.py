@@ -250,14 +250,12 @@ class Group:
         if not trials:
             return []
         world, begin, name = self._world, begin or {}, bare_name(controller)
-        rows = np.array(trials, dtype=np.int64)
-        endings = [ending for b in trials if (ending := self.endings[b]) is not None]
+        rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
         frames = np.array([ending.ticks + 1 for ending in endings])
         scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
         found: list[Outcome] = []
-        for b, ending, hanging in zip(
-            trials, endings, running(rows, world.terms, world.breach_log), strict=True
-        ):
+        pending = running(rows, world.terms, world.breach_log)
+        for b, ending, hanging in zip(trials, endings, pending, strict=True):
             score = scores.score(
                 self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
                 self._rules[b], name, begin.get(b),
@@ -319,8 +317,7 @@ class Group:
         if (status == NO_SIGHT).any():
             room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
             self._world = self._world.replace(space=self._world.space.replace(pair=room))
-        numbers: list[int] = active.tolist()
-        for b, why in zip(numbers, status.tolist(), strict=True):
+        for b, why in zip(map(int, active), status.tolist(), strict=True):
             if why == ENDED:
                 self.end(b, End.DURATION)
             elif why == FAULTY:
