@@ -13,6 +13,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Disturbances, Laser
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import Trial, run_trial
+from dubins_traffic.scoring.score import Scorer
 
 
 class Collect:
@@ -238,3 +239,13 @@ def test_the_laser_sweeps_at_its_own_rate() -> None:
     ]
     assert scans[0].shape == (8,)
     assert Trial(instance()).observation.scan is None
+
+
+def test_a_judged_trial_is_scored_before_its_first_second_has_passed() -> None:
+    trial = Trial(draw(load_config("town"), 1, 0), sinks=[Scorer()])
+    assert Scorer in {type(sink) for sink in trial.sinks}
+    first = trial.sinks[0].result()
+    trial.step((0.5, 0.0))
+    second = trial.sinks[0].result()
+    assert (first.duration_s, second.duration_s) == (0.0, trial.instance.problem.period)
+    assert first.verdict is not None

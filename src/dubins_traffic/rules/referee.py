@@ -91,6 +91,10 @@ class Pending:
     others: frozenset[str]
 
 
+NOTHING = Pending(frozenset(), frozenset())
+"""What hangs over the cars before the first frame."""
+
+
 class Referee:
     """Judges a batch of trials, tick by tick, or the frames of one trial, block by block; the same code does both.
 

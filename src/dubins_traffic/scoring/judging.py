@@ -12,6 +12,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import NOTHING
 from dubins_traffic.scoring.collisions import Collisions
 from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.goals import Visiting
@@ -95,7 +96,7 @@ class Judging:
             self._visiting.now,
             self._was_sensed,
             lambda car, tick: self._was_sensed(car, tick, tick),
-            self._referee.running[0],
+            self._referee.running[0] if self._last >= 0 else NOTHING,
             self._margins.result(),
             whole=ran_whole(self._instance, self._ending, self._last),
         )

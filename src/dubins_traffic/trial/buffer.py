@@ -76,7 +76,9 @@ class FrameBuffer:
 
     @property
     def sinks(self) -> tuple[Sink, ...]:
-        """Who gets the frames."""
+        """Who gets the frames; those that can go on in forks depend on no cut, and have been handed all of them."""
+        if all(isinstance(sink, Forks) and sink.forks for sink in self._sinks):
+            self.flush()
         return self._sinks
 
     def add(self, sink: Sink) -> None:

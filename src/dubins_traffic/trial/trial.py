@@ -88,7 +88,10 @@ class Trial:
 
     @property
     def sinks(self) -> Sequence[Sink]:
-        """Who is handed the frames of this trial; of a fork, those that have come along."""
+        """Who is handed the frames of this trial; of a fork, those that have come along.
+
+        They have been handed all frames, unless one of them writes a record, whose chunks are whole seconds.
+        """
         return self._buffer.sinks
 
     @property
