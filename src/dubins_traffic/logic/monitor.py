@@ -16,7 +16,7 @@ counted if the table stays within its limits.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
@@ -229,7 +229,7 @@ class Monitors:
         self.lines = len(self._delays)
         self._tables = packed_tables(self._pieces)
         self._lines = packed_lines(self._delays, self._column)
-        self._kernel: tuple[Tables, Lines] | None = None
+        self._kernel: tuple[Tables, Lines, Callable[..., None], Callable[..., None]] | None = None
         self.reset(0)
 
     def _take(self, number: int, formula: Formula, period: float, split: bool | None) -> bool:
@@ -312,16 +312,17 @@ class Monitors:
         (B, F) int64
             `verdicts`, updated in place.
         """
+        from dubins_traffic.kernels.calls import bound
         from dubins_traffic.logic.kernel import Lines, Tables, advance, delay
 
         width = len(self._column)
         if values.shape != (len(self._state), width):
             raise ValueError(f"values: shape {values.shape}, expected {(len(self._state), width)}")
         if self._kernel is None:
-            self._kernel = Tables(**self._tables), Lines(**self._lines)
-        tables, lines = self._kernel
+            self._kernel = Tables(**self._tables), Lines(**self._lines), bound(advance), bound(delay)
+        tables, lines, step, wait = self._kernel
         self._frame[:, :width] = values
         if self._delays:
-            delay(self._frame, lines, self._memory, self._rings)
-        advance(self._frame, tables, self._memory, self._state, self._clocks, self.verdicts)
+            wait(self._frame, lines, self._memory, self._rings)
+        step(self._frame, tables, self._memory, self._state, self._clocks, self.verdicts)
         return self.verdicts
