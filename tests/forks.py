@@ -130,7 +130,7 @@ def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[
         }
     found: dict[str, np.ndarray] = {}
     for key, part in parts.items():
-        if key == "_numba_type_":
+        if key == "description":  # where arrays stand, of a table that kernels have been handed
             continue
         found |= arrays_in(part, f"{name}.{key}", seen)
     return found

@@ -300,7 +300,7 @@ def test_forks_of_some_trials_of_a_batch_equal_the_trials(
 
 def shared(one: Group, other: Group) -> list[str]:
     """Return the names of the arrays that change and that two groups share."""
-    constant = ("stage", "distance", "cycle", "script", "mask", "description")
+    constant = ("stage", "distance", "cycle", "script", "mask")
     there = arrays_in(changing(other)).values()
     return [
         name
@@ -311,7 +311,7 @@ def shared(one: Group, other: Group) -> list[str]:
 
 def changing(group: Group) -> dict[str, Any]:
     """Return the tables of a group but for those of its roads, and what it has found so far."""
-    tables = zip(World.__annotations__, group.world, strict=True)
+    tables = zip(World.field_names, group.world, strict=True)
     mine = {name: value for name, value in tables if name not in ("roads", "beside", "labelling", "judging")}
     return mine | {"commands": group.commands}
 
