@@ -79,10 +79,7 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
         name = Path(controller).name.replace(":", "-")
         folder = output / name
         plan = dt.plan(configuration, controller, trials=trials, seed=seed, records=folder, overwrite=True)
-        print(
-            f"{len(plan.jobs)} trials with {controller} (the first on a machine compile first)",
-            file=sys.stderr,
-        )
+        print(f"{len(plan.jobs)} trials with {controller}", file=sys.stderr)
         sheets[name] = plan.conclude(dt.run_trials(plan.jobs))
     Console().print(side_by_side(sheets))
     print("Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md).\n")
