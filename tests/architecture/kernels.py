@@ -17,7 +17,7 @@ from functools import cache
 
 from tests.architecture.house import Findings, Module, modules
 
-JIT = frozenset({"jit", "jit_inline", "jit_inner", "jit_wide"})
+JIT = frozenset({"jit", "jit_inline", "jit_wide"})
 """What makes a function a kernel."""
 _ROW = re.compile(r"^(\w+(?:, \w+)*) +(\w+) {2,}\S", re.MULTILINE)
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*)(?: : (.*))?\n((?:    .*\n?)+)", re.MULTILINE)

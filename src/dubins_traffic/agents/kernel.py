@@ -20,7 +20,7 @@ from dubins_traffic.agents.tables import (
 from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import below
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.waypoint import pursue, turn_then_drive
@@ -51,7 +51,7 @@ def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
     return count.shape[0]
 
 
-@jit_inner
+@jit
 def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
     """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
     state, agents, work = scene.state, scene.agents, scene.space

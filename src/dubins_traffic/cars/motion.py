@@ -12,7 +12,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.trig import advance
 
 MOVED, FULL, CROWDED = range(3)
@@ -77,7 +77,7 @@ def step(
     return trials
 
 
-@jit_inner
+@jit
 def step_trial(
     b: int,
     dt: float,

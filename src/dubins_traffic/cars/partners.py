@@ -8,7 +8,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, separation
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.tables import Tables
 
 PARTED = 0.01
@@ -60,7 +60,7 @@ def workspace(trials: int, cars: int) -> Workspace:
     )
 
 
-@jit_inner
+@jit
 def part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
     """Forget the pairs of trial b that are PARTED or more apart."""
     for i in range(state.count[b]):

@@ -65,11 +65,6 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
     return _made(function, inlined=True)
 
 
-def jit_inner(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile as `jit` does a kernel that only other kernels call."""
-    return _made(function)
-
-
 def jit_wide(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `jit` does, and make the same steps for several cars one instruction: the compiler takes longer."""
     return _made(function, wide=True)

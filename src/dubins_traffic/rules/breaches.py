@@ -6,7 +6,7 @@ from typing import Any
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
     CLEARANCE,
@@ -34,7 +34,7 @@ from dubins_traffic.rules.propositions import (
 GOES = FIRST | CLEAR
 
 
-@jit_inner
+@jit
 def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex: int, lane: int) -> None:
     """Write down that a car has broken a rule, a number in `RULES`, in frame `tick`, except in which trial."""
     k: int = log.filled[0]
@@ -68,7 +68,7 @@ def when_due(tick: int, since: int, ago: int) -> int:
     return since + ago if since >= 0 and since + ago > tick else NEVER_DUE
 
 
-@jit_inner
+@jit
 def judge_lane(
     car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
 ) -> None:
@@ -81,7 +81,7 @@ def judge_lane(
         add(log, car, RETURN, tick, car.left_since, -1, lane)
 
 
-@jit_inner
+@jit
 def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
     """Rule 3, of car n of trial b that enters crossing v in this frame: judged on the frame before.
 
@@ -110,7 +110,7 @@ def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -
         add(log, car, ROAD, tick, tick, -1, lane)
 
 
-@jit_inner
+@jit
 def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> None:
     """E3, of car n of trial b that has stopped at v.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
 from dubins_traffic.rules.breach_log import EXIT, GOAL, NEVER_DUE, REST, RefereeTables
@@ -51,7 +51,7 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     return due
 
 
-@jit_inner
+@jit
 def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int:
     """E4, of e-agent n of trial b whose body meets the disc of v; return when to ask again, if its labels stay.
 
@@ -81,7 +81,7 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
     return min(again, when_due(tick, car.exit_since, ago))
 
 
-@jit_inner
+@jit
 def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     """E5: tell whether car n of trial b is in a lane with a free way ahead."""
     state, roads, labels, row = tables.state, tables.roads, tables.labels, tables.memory.car[b]
@@ -118,7 +118,7 @@ def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
             found[b, n] = has_way(b, n, tick, tables)
 
 
-@jit_inner
+@jit
 def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
     """E6: no goal is taken for too long; find when one will be, or has to be looked at, if no car comes or goes."""
     log, terms = tables.log, tables.terms[b]
@@ -142,7 +142,7 @@ def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
     log.goal_due[b] = due
 
 
-@jit_inner
+@jit
 def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, int]:
     """E6: tell whether no exit of the goal v is free, for any e-agent in it, and the ego is near one.
 

@@ -6,7 +6,7 @@ from math import sqrt
 
 from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.kernels.compile import jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
@@ -54,7 +54,7 @@ def to_mouth(along: float, lateral: float, own: TrialRules, terms: RefereeParame
     return sqrt(far * far + aside * aside)
 
 
-@jit_inner
+@jit
 def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTables) -> bool:
     """Tell whether some lane out of v, except that on segment `back`, is free for car n of trial b.
 
@@ -111,7 +111,7 @@ def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> 
     return taken
 
 
-@jit_inner
+@jit
 def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeTables) -> tuple[bool, int]:
     """E4: tell whether car n of trial b, whose body meets the disc of v, may leave by some lane, and when to ask again.
 
@@ -144,7 +144,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     return find_exit(b, n, v, back, count, tables), tick + 1
 
 
-@jit_inner
+@jit
 def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
     """E6: tell whether the ego of trial b is near an exit of v, of which that on segment `back` is none.
 

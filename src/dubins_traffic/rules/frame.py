@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
@@ -55,7 +55,7 @@ def label_frame(tick: int, tables: LabelTables) -> None:
         label_trial(b, tick, tables)
 
 
-@jit_inner
+@jit
 def label_trial(b: int, tick: int, tables: LabelTables) -> None:
     """Label frame `tick` of trial b."""
     state, labels, memory = tables.state, tables.labels, tables.memory
@@ -85,7 +85,7 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
         _look_beside(b, tables)
 
 
-@jit_inner
+@jit
 def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
     """Order the queues of trial b, and say who stands."""
     labels, memory, t = tables.labels, tables.memory, tables.roads
@@ -115,7 +115,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
             head[lane_end(t, own.net, lanes[n])].queue = -1
 
 
-@jit_inner
+@jit
 def _look_beside(b: int, tables: LabelTables) -> None:
     """Find who of trial b is blocked, overtakes and is left."""
     segments, head, row = tables.labels.segment[b], tables.memory.head[b], tables.memory.car[b]
@@ -236,7 +236,7 @@ def _who_stands(bits: Any) -> Any:
     return bits | STANDS if bits & EXCUSED == 0 and bits & LONG != 0 else bits
 
 
-@jit_inner
+@jit
 def _block(b: int, n: int, tables: LabelTables) -> None:
     """Find whether the lane of car n is blocked, whether it overtakes, and whether it is left."""
     labels, t = tables.labels, tables.roads

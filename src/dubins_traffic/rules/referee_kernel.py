@@ -9,7 +9,7 @@ import numpy as np
 from dubins_traffic.cars.near import list_near
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.arrays import Bits
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import distance2, lane_end
 from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, RefereeTables
 from dubins_traffic.rules.breaches import judge_entry, judge_lane, judge_road
@@ -35,7 +35,7 @@ def judge_frame(tick: int, tables: RefereeTables) -> None:
             judge_trial(b, tick, tables)
 
 
-@jit_inner
+@jit
 def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
     """Do as `judge_frame`, of trial b."""
     labels, log = tables.labels, tables.log
@@ -123,7 +123,7 @@ def _surely_left(bits: Any, reach: float, was: bool, own: TrialRules) -> bool:
     return bits & LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
 
 
-@jit_inner
+@jit
 def _by_the_road(b: int, tables: RefereeTables) -> bool:
     """Tell whether the ego is off the road by no more than rounding can be."""
     roads, net = tables.roads, tables.rules[b].net
@@ -132,7 +132,7 @@ def _by_the_road(b: int, tables: RefereeTables) -> bool:
     return distance2(roads, net, int(tables.labels.segment[b, EGO]), x, y) <= far * far
 
 
-@jit_inner
+@jit
 def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: RefereeTables) -> None:
     """Rule 3, of a car that enters crossing v and had `stopped` there in the frame before, or not."""
     roads, spacing = tables.roads, tables.spacing

@@ -13,7 +13,7 @@ from dubins_traffic.cars.near import Spacing, ticks_within
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
@@ -121,7 +121,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     )
 
 
-@jit_inner
+@jit
 def count_frame(
     b: int, tick: int, state: State, labels: Labels, roads: RoadTable, cars: CarTable, obstacles: ObstacleTable,
     spacing: Spacing, tally: Tally,

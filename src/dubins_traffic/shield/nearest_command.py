@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.passing import BACK, TURNING, along, find_way_past
 from dubins_traffic.policies.rules.policy import list_cars, unlist_cars
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
@@ -65,7 +65,7 @@ def shield(tick: Any, sighted: bool, traffic: Traffic, guards: Guards, commands:
             shield_trial(b, tick[b], sight2, traffic, guards, commands)
 
 
-@jit_inner
+@jit
 def shield_trial(
     b: int, tick: int, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
 ) -> None:

@@ -12,7 +12,7 @@ from math import sqrt
 
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit_inline, jit_inner
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.policy import decide_trial
 from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
@@ -34,14 +34,14 @@ ROUNDED = 1e-6
 """By how much more than rounding an obstacle has to block the lane, metres."""
 
 
-@jit_inner
+@jit
 def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
     """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
     scratch = traffic.scratch
     decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
 
-@jit_inner
+@jit
 def drive_alone(
     b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, traffic: Traffic, guards: Guards
 ) -> tuple[float, float]:
@@ -71,7 +71,7 @@ def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
     to.way[b, EGO] = source.way[b, EGO]
 
 
-@jit_inner
+@jit
 def surely_returns(
     b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: Guards
 ) -> bool:
@@ -122,7 +122,7 @@ def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Gua
     )
 
 
-@jit_inner
+@jit
 def _blocks(
     b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, guards: Guards
 ) -> bool:

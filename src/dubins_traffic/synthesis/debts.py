@@ -5,19 +5,19 @@ The clauses are docs/rules.md#E3 to docs/rules.md#E6; docs/theory.md says what t
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit_inner
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import UNITS, Moves, Work
 from dubins_traffic.synthesis.queues import EGO, SLOTS
 
 
-@jit_inner
+@jit
 def _inside(t: Tables, work: Work, node: int) -> int:
     """Return who is in a node: 0 nobody or no such node, 1 an e-agent, 2 the ego."""
     return int(t.inside[t.base[node] + work.scenes[node]]) if node >= 0 else 0
 
 
-@jit_inner
+@jit
 def _in_lane(t: Tables, work: Work, lane: int) -> int:
     """Return who is in a lane: 0 nobody, 1 an e-agent, 2 the ego."""
     end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
@@ -26,7 +26,7 @@ def _in_lane(t: Tables, work: Work, lane: int) -> int:
     return 1 if t.others_slots[end] >> t.lane_slot[lane] & 1 else EGO + 1
 
 
-@jit_inner
+@jit
 def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
     """Say whether an exit of a node is free; and whether the ego is in one (2), in the lane beside one (1) or not (0).
 
@@ -47,7 +47,7 @@ def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
     return left <= 0, ego
 
 
-@jit_inner
+@jit
 def _may_pass(t: Tables, work: Work, node: int) -> bool:
     """E5: say whether who waits before a bend or dead end that is clear has no excuse to wait there."""
     free, ego = _ways_out(t, work, node)
@@ -59,7 +59,7 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
     return free and not (t.switches[4] and opposite)
 
 
-@jit_inner
+@jit
 def _may_leave(t: Tables, work: Work, node: int) -> bool:
     """E4: say whether who is in a node has no excuse to stay there."""
     free, _ = _ways_out(t, work, node)
@@ -67,7 +67,7 @@ def _may_leave(t: Tables, work: Work, node: int) -> bool:
     return free and opposite != EGO + 1 and not (t.switches[4] and opposite)
 
 
-@jit_inner
+@jit
 def _to_free(t: Tables, work: Work, goal: int) -> int:
     """E6: return a node of a goal that an e-agent is in, or -1 if there is none or the ego keeps the goal closed."""
     found = -1
@@ -82,7 +82,7 @@ def _to_free(t: Tables, work: Work, goal: int) -> int:
     return -1 if ego and not free else found
 
 
-@jit_inner
+@jit
 def owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
     """Write what the environment owes in `work.scenes`; false if there is no room."""
     used = out.used[2]
@@ -111,7 +111,7 @@ def owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
     return True
 
 
-@jit_inner
+@jit
 def _bits(work: Work, node: int) -> int:
     """Return the bits of the e-agents that may move at a node."""
     bits = 0

@@ -13,7 +13,7 @@ The rank of a position is the step in which it came into Y. Ranks of one layer (
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit_inner, jit_long
+from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.synthesis.arrays import Bytes, Flags
 from dubins_traffic.synthesis.moves import environment
 from dubins_traffic.synthesis.positions import unrank
@@ -32,7 +32,7 @@ from dubins_traffic.synthesis.search import (
 )
 
 
-@jit_inner
+@jit
 def _turns(g: Graph, position: int) -> tuple[int, int]:
     """Return where the moves of the environment from a position begin and end in `g.to`; of a lean game, now."""
     if not g.lean:
@@ -63,7 +63,7 @@ def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
                 break
 
 
-@jit_inner
+@jit
 def _watch(g: Graph, s: Search, position: int) -> bool:
     """Let a position watch its next move that is not ready; true if there is none."""
     first, last = _turns(g, position)
@@ -78,7 +78,7 @@ def _watch(g: Graph, s: Search, position: int) -> bool:
     return True
 
 
-@jit_inner
+@jit
 def _watch_owed(g: Graph, s: Search, o: int) -> None:
     """Let a debt watch the next of its ends that is not ready; if there is none it becomes a candidate."""
     position = g.owner[o]
@@ -94,7 +94,7 @@ def _watch_owed(g: Graph, s: Search, o: int) -> None:
     s.candidates[g.owed[o]] = o
 
 
-@jit_inner
+@jit
 def _rank(s: Search, position: int, rank: int) -> None:
     """Take a position into Y."""
     s.rank[position] = rank
@@ -103,7 +103,7 @@ def _rank(s: Search, position: int, rank: int) -> None:
     s.control[RANKED] += 1
 
 
-@jit_inner
+@jit
 def _attract(g: Graph, s: Search) -> None:
     """Take into Y, again and again, what is in Cpre(Y)."""
     while s.control[TAKEN] < s.control[QUEUED] and s.control[STOPPED] == 0:
@@ -122,7 +122,7 @@ def _attract(g: Graph, s: Search) -> None:
         s.control[NEXT_RANK] = max(s.control[NEXT_RANK], last + 1)
 
 
-@jit_inner
+@jit
 def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
     """The ego can get into Y from `to`: tell all who watch it."""
     if s.ready[to]:
@@ -142,7 +142,7 @@ def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
         o = after
 
 
-@jit_inner
+@jit
 def _stays(g: Graph, s: Search, position: int) -> bool:
     """Say whether the ego can get from a position into Y or the marked ones, whatever the environment does."""
     first, last = _turns(g, position)
@@ -162,7 +162,7 @@ def _stays(g: Graph, s: Search, position: int) -> bool:
     return True
 
 
-@jit_inner
+@jit
 def _gather(g: Graph, s: Search, kind: int) -> int:
     """Mark and list the candidates of a kind that are not in Y yet; return how many."""
     count = 0
@@ -182,7 +182,7 @@ def _gather(g: Graph, s: Search, kind: int) -> int:
     return count
 
 
-@jit_inner
+@jit
 def _shrink(g: Graph, s: Search, count: int) -> int:
     """Unmark members until the ego can stay among those left; return how many are left, first in `members`."""
     before = count + 1
@@ -199,7 +199,7 @@ def _shrink(g: Graph, s: Search, count: int) -> int:
     return count
 
 
-@jit_inner
+@jit
 def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
     """Take the members into Y as one layer, ranked by their depth if `layered`; say whether there are any."""
     first = s.control[NEXT_RANK]
@@ -218,13 +218,13 @@ def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
     return count > 0
 
 
-@jit_inner
+@jit
 def _wait(g: Graph, s: Search, kind: int) -> bool:
     """Take into Y where the ego can wait until the environment pays a debt; say whether there is any such place."""
     return _settle(s, kind, _shrink(g, s, _gather(g, s, kind)), False)
 
 
-@jit_inner
+@jit
 def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
     """Do as `_wait`, but only where the environment can pay: some of its moves, answered by the ego, lead into Y.
 
@@ -241,7 +241,7 @@ def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
     return _settle(s, kind, count, True)
 
 
-@jit_inner
+@jit
 def _possible(g: Graph, s: Search, count: int) -> int:
     """Keep the members from which the environment has a way into Y, sorted by its length; return how many."""
     for k in range(count):
@@ -264,7 +264,7 @@ def _possible(g: Graph, s: Search, count: int) -> int:
     return kept
 
 
-@jit_inner
+@jit
 def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
     """Say whether some move of the environment, answered by the ego, leads into Y or to a member of less depth."""
     first, last = _turns(g, position)

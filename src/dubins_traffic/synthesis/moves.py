@@ -8,7 +8,7 @@ one turn take their places in an order that the environment chooses.
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit_inner, jit_long
+from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.debts import owe
 from dubins_traffic.synthesis.positions import (
@@ -31,7 +31,7 @@ INSIDE = -1
 """The slot of a car in a node."""
 
 
-@jit_inner
+@jit
 def _units(t: Tables, work: Work) -> None:
     """List the e-agents that may move and their choices; note whether one may ram the ego."""
     count = 0
@@ -65,7 +65,7 @@ def _units(t: Tables, work: Work) -> None:
     work.total[UNITS] = count
 
 
-@jit_inner
+@jit
 def _unit(work: Work, count: int, node: int, slot: int, choices: int) -> int:
     """Note an e-agent with more choices than to stay; return how many there are."""
     work.choice[count, 0] = STAY
@@ -76,7 +76,7 @@ def _unit(work: Work, count: int, node: int, slot: int, choices: int) -> int:
     return count + 1
 
 
-@jit_inner
+@jit
 def _next_choice(work: Work) -> bool:
     """Go on to the next joint choice; false after the last."""
     for u in range(work.total[UNITS]):
@@ -87,7 +87,7 @@ def _next_choice(work: Work) -> bool:
     return False
 
 
-@jit_inner
+@jit
 def _depart(t: Tables, work: Work) -> int:
     """Take all that move from their cells and list who arrives; return the bits of `Moves.moved`, or -1."""
     moved = 0
@@ -117,7 +117,7 @@ def _depart(t: Tables, work: Work) -> int:
     return moved
 
 
-@jit_inner
+@jit
 def _arrival(work: Work, arrivals: int, node: int, slot: int, who: int) -> int:
     """Put a car among those who arrive, by node; return how many there are."""
     place = arrivals
@@ -132,7 +132,7 @@ def _arrival(work: Work, arrivals: int, node: int, slot: int, who: int) -> int:
     return arrivals + 1
 
 
-@jit_inner
+@jit
 def _arrive(t: Tables, work: Work) -> bool:
     """Let all arrive in the order of `turn`; false if a lane is taken."""
     for v in range(t.base.shape[0]):
@@ -147,7 +147,7 @@ def _arrive(t: Tables, work: Work) -> bool:
     return True
 
 
-@jit_inner
+@jit
 def _next_turn(work: Work, sorts: Ints) -> bool:
     """Go on to the next order of arrival, node by node; false after the last.
 
@@ -164,7 +164,7 @@ def _next_turn(work: Work, sorts: Ints) -> bool:
     return False
 
 
-@jit_inner
+@jit
 def _permute(turn: Ints, low: int, high: int) -> bool:
     """Make turn[low:high] the next permutation in lexicographic order; after the last, the first, and false."""
     pivot = high - 2
@@ -185,7 +185,7 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
     return found
 
 
-@jit_inner
+@jit
 def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
     """Write the moves of the environment from `work.scenes`; false if there is no room.
 
@@ -219,7 +219,7 @@ def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) 
     return True
 
 
-@jit_inner
+@jit
 def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
     """Write the moves of the ego from `work.scenes`; return its cell, or -1 if there is no room."""
     used = out.used[1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit_inner, jit_long
+from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.random import below
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Tables
@@ -136,7 +136,7 @@ def play(
     )
 
 
-@jit_inner
+@jit
 def _visited(ranks: Numbers, position: int, turn: int, table: Table) -> int:
     """Note that the ego is at its goal, if it is; return the goal to seek now."""
     goal = table.now[GOAL]
@@ -149,7 +149,7 @@ def _visited(ranks: Numbers, position: int, turn: int, table: Table) -> int:
     return goal
 
 
-@jit_inner
+@jit
 def _grow(out: Moves, table: Table) -> int:
     """Note for how long each debt has been owed; return which of `out.owed` is the oldest, or -1."""
     for kind in range(table.age.shape[0]):
@@ -166,7 +166,7 @@ def _grow(out: Moves, table: Table) -> int:
     return oldest
 
 
-@jit_inner
+@jit
 def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
     """Return which of the ego's moves leads to the lowest rank, or -1 if none has a rank."""
     best = -1
@@ -177,7 +177,7 @@ def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
     return best
 
 
-@jit_inner
+@jit
 def _worst(
     t: Tables, size: tuple[int, int], ranks: Numbers, goal: int, must: int, work: Work, room: Room, first: int
 ) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inner
+from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.gaps import (
     NOBODY,
     O_GAP,
@@ -56,7 +56,7 @@ from dubins_traffic.policies.lanes.knowledge import (
 from dubins_traffic.policies.lanes.paths import HIGH, LOW
 
 
-@jit_inner
+@jit
 def gap_now(known: Knowledge, b: int, n: int) -> float:
     """Return the gap between the ego and car n, metres."""
     car = known.car[b]
@@ -68,7 +68,7 @@ def gap_now(known: Knowledge, b: int, n: int) -> float:
     )  # fmt: skip
 
 
-@jit_inner
+@jit
 def conflict(
     known: Knowledge,
     b: int,
@@ -92,7 +92,7 @@ def conflict(
     )  # fmt: skip
 
 
-@jit_inner
+@jit
 def stand(known: Knowledge, b: int, speed: float, cause: int, first: int) -> float:
     """Count how long the car has been kept waiting by `cause`; back up, pass or ask for another route in time."""
     memory = known.memory[b]
@@ -139,7 +139,7 @@ def _return(known: Knowledge, b: int) -> None:
     memory[STUCK] = 0.0
 
 
-@jit_inner
+@jit
 def is_oncoming(known: Knowledge, b: int, n: int) -> bool:
     """Whether car n faces the ego's way back, within 60 degrees."""
     o = known.others[b, n]

@@ -24,6 +24,14 @@ PRESSED = 0.4
 """Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
 
 
+@jit_inline
+def queue_lengths(vehicle: Vehicle) -> tuple[float, float]:
+    """Return how far behind a disc's centre a car in the lane has left it, and how far apart cars stand, metres."""
+    edge = vehicle.disc + vehicle.reach + MARGIN
+    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
+    return mouth, 2.0 * vehicle.reach + QUEUE_GAP
+
+
 @jit
 def has_room(b: int, n: int, out: int, inside: int, traffic: Traffic) -> bool:
     """Tell whether a car that takes the lane `out` can leave the disc at its beginning altogether.
@@ -52,9 +60,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     )
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
-    edge = vehicle.disc + vehicle.reach + MARGIN
-    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
-    pitch = 2.0 * vehicle.reach + QUEUE_GAP
+    mouth, pitch = queue_lengths(vehicle)
     start = lane_start(roads, net, out)
     end = lane_end(roads, net, out)
     crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
@@ -111,9 +117,7 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     )
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
-    edge = vehicle.disc + vehicle.reach + MARGIN
-    mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
-    pitch = 2.0 * vehicle.reach + QUEUE_GAP
+    mouth, pitch = queue_lengths(vehicle)
     start = lane_start(roads, net, out)
     tx, ty = lane_direction(roads, net, out)
     j = scratch.head[out >> 1]
