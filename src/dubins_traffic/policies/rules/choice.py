@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.barred import has_place, stands_in_disc
 from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
-from dubins_traffic.policies.rules.room import has_room, is_free, is_open, room_in
-from dubins_traffic.policies.rules.tables import Traffic
+from dubins_traffic.policies.rules.room import has_room, is_clear, is_free, is_open, room_in
+from dubins_traffic.policies.rules.tables import KeptPath, Traffic
 from dubins_traffic.policies.rules.turn_arcs import BEFORE
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 
@@ -16,6 +16,9 @@ asked, and on its way to another exit it might leave the disc outside its lane."
 LATE = 1.0
 """Who has been in a crossing for so long, seconds, keeps to its exit while this is open, though there may be no room
 behind what drives there: on the way to another it might not leave the disc in time."""
+
+CHOICES = 4
+"""A car in a crossing looks for another exit each so many ticks."""
 
 
 @jit
@@ -128,6 +131,12 @@ def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
         car.waited = 0
 
 
+@jit_inline
+def keeps_exit(b: int, n: int, tick: int, way: KeptPath, traffic: Traffic) -> bool:
+    """Tell whether `find_way_out` certainly leaves a car in its crossing its exit, and does nothing but count."""
+    return tick % CHOICES != 0 or is_clear(b, n, way, traffic.labels, traffic.state.count[b])
+
+
 @jit
 def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None:
     """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while.
@@ -142,7 +151,7 @@ def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None
         return
     if crossing:
         car.within += 1
-        if tick % 4 != 0 or has_room(b, n, car.next_lane, 0, traffic):
+        if tick % CHOICES != 0 or has_room(b, n, car.next_lane, 0, traffic):
             return
         late = car.within > ticks_of(LATE, vehicle)
         if late and is_open(b, n, car.next_lane, traffic):

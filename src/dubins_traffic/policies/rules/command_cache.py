@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.policies.rules.choice import keeps_exit
 from dubins_traffic.policies.rules.deferred import note
 from dubins_traffic.policies.rules.path_cache import kept_way
 from dubins_traffic.policies.rules.right_of_way import (
@@ -44,7 +45,7 @@ EVERYWHERE = 1e9
 
 
 @jit_inline
-def coast(b: int, n: int, kind: int, company: int, traffic: Traffic) -> bool:
+def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic) -> bool:
     """Put off the command of a car that still just drives on as it did; tell whether it does.
 
     Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
@@ -70,8 +71,12 @@ def coast(b: int, n: int, kind: int, company: int, traffic: Traffic) -> bool:
         part, key, left, px, py = in_arc(way, dx, dy)
     if row.coast_lane < 0 and left > ASTRAY:
         return False
+    if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
+        return False
     if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.vehicle[b]):
         return False
+    if row.coast_chooses != 0:
+        drivers.car[b, n].within += 1
     note(b, n, row.coast_speed, left, px, py, bend, traffic)
     return True
 
@@ -91,6 +96,7 @@ def drive_on(
     px: float,
     py: float,
     outside: bool,
+    chooses: bool,
     way: ReferencePath,
     traffic: Traffic,
 ) -> bool:
@@ -123,9 +129,11 @@ def drive_on(
         speed = max(0.0, line) / vehicle.period
     else:
         keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
+        row.coast_chooses = 1 if chooses else 0
     if gated:
         count_turn(bits, row, car)
     car.waited = 0
+    car.within += 1 if chooses else 0
     note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, traffic)
     return True
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.room import queue_lengths
 from dubins_traffic.policies.rules.tables import Drivers, KeptPath
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, way_between
 from dubins_traffic.roads.lookup import lane_end
@@ -52,6 +53,8 @@ def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
     row.crossing = 1 if degree >= vehicle.degree else 0
     row.length = roads.seg[roads.seg_off[net] + (car.lane >> 1), 4]
     row.out_length = roads.seg[roads.seg_off[net] + (car.next_lane >> 1), 4]
+    mouth, _ = queue_lengths(vehicle)
+    row.roomy = 1 if row.out_length - mouth - mouth >= 0.0 else 0
     row.x, row.y = way.x, way.y
     row.tx, row.ty = way.tx, way.ty
     row.ux, row.uy = way.ux, way.uy

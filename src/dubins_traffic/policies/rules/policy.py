@@ -16,7 +16,7 @@ from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.policies.rules.choice import STUCK, find_way_out
+from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
 from dubins_traffic.policies.rules.command_cache import coast, cruise, drive_on, keeps_to_road, stop_coasting
 from dubins_traffic.policies.rules.deferred import decide_deferred, defer
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
@@ -109,7 +109,7 @@ def decide_trial(
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
-        elif company == CROWDED or not coast(b, n, kind, company, traffic):
+        elif company == CROWDED or not coast(b, n, tick, kind, company, traffic):
             drive(b, n, tick, company, sight2, traffic, commands)
     decide_deferred(b, traffic, commands)
     if scratch.listed[0] != NOBODY:
@@ -181,14 +181,16 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         part, key, left, px, py = on_lane(way, x, y)
     leaves = car.kind != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
-    free = company != CROWDED and not chooses and just_drives(car)
+    free = company != CROWDED and just_drives(car)
+    if free and chooses:
+        free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
     if free and company != ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
-    if free and drive_on(b, n, part, left, px, py, outside, way, traffic):
+    if free and drive_on(b, n, part, left, px, py, outside, chooses, way, traffic):
         return
     enlist(b, n, sight2, traffic)
     near = 0
-    if not (free and drivers.way[b, n].crossing != 0):
+    if not (free and not chooses and drivers.way[b, n].crossing != 0):
         near = gather(b, n, car.lane, x, y, way, traffic)
     gap, who, close = look_ahead(b, part, key, left, x, y, way, near, traffic, vehicle, car)
     rides = car.violations & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == car.lane

@@ -179,6 +179,10 @@ class KeptPath:
     """The lane out."""
     crossing: int = -1
     """1 if there is a crossing between them."""
+    roomy: int = -1
+    """1 if the lane out is long enough for a car that has left the disc."""
+    coast_chooses: int = -1
+    """1 if it is in its crossing, where it may have to take another exit."""
     coast_lane: int = -1
     """The lane of its lane state."""
     coast_crosses: int = -1
