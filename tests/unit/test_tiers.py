@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
+import dubins_traffic
 from dubins_traffic.kernels import asking, compile, store
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
@@ -21,7 +23,7 @@ from dubins_traffic.kernels.kinds import UnfitError, dtype_of, kind_of
 from dubins_traffic.kernels.machine import Code
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.kernels.trig import arc_factors, sincos
 from dubins_traffic.trial.buffer import all_finite
 
 PATIENCE = 300.0
@@ -76,7 +78,7 @@ def kernels(cache: Path) -> list[Path]:
 
 
 def asked(cache: Path) -> list[Path]:
-    return sorted(cache.rglob("asked/*.json"))
+    return sorted(cache.rglob(f"{asking.ASKED}-*/*.json"))
 
 
 @pytest.fixture
@@ -135,6 +137,18 @@ def test_processes_at_once_have_one_companion(cache) -> None:
     until(lambda: len(companions(cache)) <= 1)
 
 
+def test_two_installations_with_other_sources_share_a_cache(cache, tmp_path, monkeypatch) -> None:
+    python(cache, CALL, "compiled")
+    assert companions(cache)
+    package = Path(dubins_traffic.__file__).parent
+    shutil.copytree(package, tmp_path / "src" / package.name, ignore=shutil.ignore_patterns("__pycache__"))
+    source = tmp_path / "src" / package.name / "kernels" / "trig.py"
+    source.write_text(source.read_text().replace("-d * across", "d * across"))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
+    code = "from dubins_traffic.kernels.trig import arc_factors; print(arc_factors(0.5)[1])"
+    assert python(cache, code, "compiled") == (f"{-arc_factors(0.5)[1]}\n", "")
+
+
 def test_one_companion_alone_holds_the_lock(cache, monkeypatch) -> None:
     monkeypatch.setattr(store, "cache_folder", lambda: cache)
     cache.mkdir()
@@ -153,8 +167,7 @@ def test_a_companion_takes_no_notice_of_notes_it_cannot_use(cache) -> None:
     python(cache, CALL, "compiled")
     end_companions(cache)
     kernel = kernels(cache)[0]
-    folder = kernel.parents[1] / asking.ASKED
-    folder.mkdir(exist_ok=True)
+    (folder,) = kernel.parents[1].glob(f"{asking.ASKED}-*")
     (folder / "torn.json").write_text('{"module": "dub')
     (folder / "other.json").write_text('["of", "another", "version"]')
     note = {"module": "dubins_traffic.kernels.trig", "name": "sincos", "file": "/gone", "kinds": "()"}

@@ -1,13 +1,16 @@
 """Asking the companion for a kernel: a file for each that is wanted, and a look now and then for what came of it.
 
-The companion (`kernels.companion`) is the one process that compiles for all that use a cache folder; whoever wants a
-kernel leaves a file in the folder, and begins a companion if none is at work.
+The companion (`kernels.companion`) is the one process that compiles for all that run the package where it is installed;
+whoever wants a kernel leaves a file in its folder, and begins a companion if none is at work. Two installations may share
+a cache folder: they use the same machine code where their sources are the same, and each has a companion of its own,
+since a companion compiles what it can import.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import hashlib
 import json
 import multiprocessing
 import os
@@ -23,7 +26,7 @@ from dubins_traffic.kernels import store
 from dubins_traffic.kernels.kinds import Kind
 
 ASKED = "asked"
-"""The folder in the cache folder with what is to be compiled."""
+"""How the folder in the cache folder begins with what is to be compiled."""
 LOCK = "companion.lock"
 """The file that the companion locks as long as it works; the system frees it however the companion ends."""
 FAILED = ".failed"
@@ -31,11 +34,17 @@ FAILED = ".failed"
 PAUSE = 0.25
 """Seconds between two looks for a kernel that is wanted."""
 HURRY = "hurry"
-"""The file in the cache folder that asks a companion that stands back, and gets little done, to make room."""
+"""The file in its folder that asks a companion that stands back, and gets little done, to make room."""
 LONG = 10.0
 """Seconds of interpreted work after which what is wanted is worth a processor of its own."""
 STARTS = 3
 """So often is a companion begun for one kernel, at most."""
+
+
+def folder() -> Path:
+    """Return the folder by which processes of this installation and their companion talk."""
+    where = hashlib.sha256(os.fsencode(store.PACKAGE)).hexdigest()[:12]
+    return store.cache_folder() / f"{ASKED}-{where}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +66,7 @@ class Wish:
     @property
     def note(self) -> Path:
         """The file by which it is asked for."""
-        return store.cache_folder() / ASKED / f"{store.symbol(self.path)}.json"
+        return folder() / f"{store.symbol(self.path)}.json"
 
     @property
     def failure(self) -> Path:
@@ -141,7 +150,7 @@ class Waiting:
     def _hurry(self) -> None:
         """Ask a companion that stands back and gets little done to make room for one that does not."""
         with contextlib.suppress(OSError):
-            (store.cache_folder() / HURRY).touch()
+            (folder() / HURRY).touch()
 
     def _ask(self) -> None:
         if self._left == 0:
@@ -169,7 +178,8 @@ def is_at_work() -> bool:
 def locked() -> Generator[bool]:
     """Hold the companion's lock while the body runs; yields whether it could be had."""
     try:
-        handle = os.open(store.cache_folder() / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        folder().mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder() / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError:
         yield False
         return

@@ -1,7 +1,7 @@
 """The companion: compiles what processes have asked for, one kernel after another.
 
 ``python -m dubins_traffic.kernels.companion [--behind]``, which stands back behind all other processes. There is one
-for a cache folder at a time. It ends some seconds after nothing is asked for any more, and after ten minutes in any
+for an installation and a cache folder at a time. It ends some seconds after nothing is asked for any more, and after ten minutes in any
 case; what is left then is compiled when it is next asked for.
 """
 
@@ -55,7 +55,7 @@ def main() -> None:
 
 def _make_room() -> None:
     """End this process when another is in a hurry and this one, behind all others, gets little done."""
-    hurry = store.cache_folder() / asking.HURRY
+    hurry = asking.folder() / asking.HURRY
     while True:
         clock, used = monotonic(), process_time()
         sleep(LOOK)
@@ -64,7 +64,7 @@ def _make_room() -> None:
 
 
 def _work(began: float) -> None:
-    (store.cache_folder() / asking.HURRY).unlink(missing_ok=True)
+    (asking.folder() / asking.HURRY).unlink(missing_ok=True)
     compiler: Compiler | None = None
     latest = monotonic()
     while monotonic() < min(latest + LINGER, began + LONGEST):
@@ -94,7 +94,7 @@ def _begin() -> Compiler:
 def _notes() -> list[Path]:
     """Return what is asked for, the longest wanted first."""
     found: list[tuple[int, Path]] = []
-    for path in (store.cache_folder() / asking.ASKED).glob("*.json"):
+    for path in asking.folder().glob("*.json"):
         with contextlib.suppress(FileNotFoundError):
             found.append((path.stat().st_mtime_ns, path))
     return [path for _, path in sorted(found)]

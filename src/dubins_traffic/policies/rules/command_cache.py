@@ -71,6 +71,8 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic) 
         part, key, left, px, py = in_arc(way, dx, dy)
     if row.coast_lane < 0 and left > ASTRAY:
         return False
+    if along > row.coast_minds and is_behind_ego(b, n, x, y, way, traffic):
+        return False
     if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
         return False
     if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.vehicle[b]):
@@ -153,8 +155,8 @@ def keep_course(
 ) -> None:
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
 
-    The stretch ends before the line at which the car may have to stop, for an e-agent that behind the ego. Without lane
-    state it also ends where the arc does: there the part of the way changes, or the lane.
+    The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. Without
+    lane state it also ends where the arc does: there the part of the way changes, or the lane.
     """
     labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -163,13 +165,14 @@ def keep_course(
     row.coast_low = 0.0 if part == THROUGH else -EVERYWHERE
     row.coast_high = EVERYWHERE if outside or part == THROUGH else 0.0
     row.coast_past = EVERYWHERE if outside else 0.0
+    row.coast_minds = EVERYWHERE
     if gated:
         along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
         edge = vehicle.disc + vehicle.reach + MARGIN
-        if drivers.car[b, n].kind != ROUND:
-            edge += vehicle.approaches
         spare = -way_to_go(way, x, y) - edge - speed * vehicle.period - CERTAIN
         row.coast_high = min(row.coast_high, along + spare)
+        if drivers.car[b, n].kind != ROUND:
+            row.coast_minds = along + spare - vehicle.approaches
     row.coast_speed = slowed(speed, bend, vehicle.yaw_most)
     row.coast_bend = bend
     row.coast_lane = labels.lane[b, n]

@@ -207,6 +207,8 @@ class KeptPath:
     """Where it goes on so: metres along the lane in from the arc's centre, from here."""
     coast_high: float = -1.0
     """To here."""
+    coast_minds: float = -1.0
+    """From here on an e-agent goes on so only while the ego is not ahead in its lane."""
     coast_past: float = -1.0
     """And along the lane out to here."""
     coast_speed: float = -1.0
