@@ -25,6 +25,7 @@ from dubins_traffic.policies.rules.tables import (
     Drivers,
     KeptPath,
     Traffic,
+    coasting,
     scratch,
     vehicles_of,
 )
@@ -126,6 +127,7 @@ def drivers_of(
         vehicle=vehicles_of([instance.problem for instance in instances]),
         car=cars,
         way=table(KeptPath, cars.shape),
+        coasting=coasting(*cars.shape),
         stage=stage,
         distance=distance,
     )

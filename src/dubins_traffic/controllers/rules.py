@@ -17,6 +17,7 @@ from dubins_traffic.policies.rules.tables import (
     KeptPath,
     Scratch,
     Traffic,
+    coasting,
     scratch,
     vehicles_of,
 )
@@ -67,6 +68,7 @@ class Rules:
             vehicle=vehicles_of([problem]),
             car=rows,
             way=table(KeptPath, (1, cars)),
+            coasting=coasting(1, cars),
             stage=stage,
             distance=distance,
         )

@@ -157,11 +157,11 @@ def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> Non
         decide_lawful(
             b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
-    unsound = 0.0
-    for n in range(world.state.count[b]):
+    finite = True
+    for n in range(commands.shape[1]):
         speed, yaw_rate = commands[b, n, 0], commands[b, n, 1]
-        unsound += (speed - speed) + (yaw_rate - yaw_rate)
-    if unsound != 0.0:
+        finite &= (speed - speed == 0.0) & (yaw_rate - yaw_rate == 0.0)
+    if not finite:
         own[STATUS] = FAULTY
     own[DECIDED] = 1
 

@@ -1,9 +1,9 @@
 """Asking the companion for a kernel: a file for each that is wanted, and a look now and then for what came of it.
 
-The companion (`kernels.companion`) is the one process that compiles for all that run the package where it is installed;
-whoever wants a kernel leaves a file in its folder, and begins a companion if none is at work. Two installations may share
-a cache folder: they use the same machine code where their sources are the same, and each has a companion of its own,
-since a companion compiles what it can import.
+The companion (`kernels.companion`) is the one process that compiles for all that run one installation of the package;
+whoever wants a kernel leaves a file in its folder, and begins a companion if none is at work. Two installations may
+share a cache folder: they use the same machine code where their sources are the same, and each has a companion of its
+own, since a companion compiles what it can import.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The companion: compiles what processes have asked for, one kernel after another.
 
 ``python -m dubins_traffic.kernels.companion [--behind]``, which stands back behind all other processes. There is one
-for an installation and a cache folder at a time. It ends some seconds after nothing is asked for any more, and after ten minutes in any
-case; what is left then is compiled when it is next asked for.
+for an installation and a cache folder at a time. It ends some seconds after nothing is asked for any more, and after
+ten minutes in any case; what is left then is compiled when it is next asked for.
 """
 
 from __future__ import annotations

@@ -38,7 +38,6 @@ IF_NEAREST = 2.0
 """Value of `Kept.holds` of a car that holds on to its labels if the nearest of the roads that meet is the same."""
 FARTHEST = 100.0
 """Metres up to which a place is said to be far from any that matters."""
-HUGE = 1e300
 
 
 @jit_inline
@@ -143,12 +142,12 @@ def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> 
         if places % TOGETHER == 0:
             for k in range(0, last, TOGETHER):
                 n = first + k
-                _copy(past_x, n, then_x, k)
-                _copy(past_y, n, then_y, k)
-                _copy(x, n, here_x, k)
-                _copy(y, n, here_y, k)
-                _copy(x, n, now_x, n)
-                _copy(y, n, now_y, n)
+                copy_together(past_x, n, then_x, k)
+                copy_together(past_y, n, then_y, k)
+                copy_together(x, n, here_x, k)
+                copy_together(y, n, here_y, k)
+                copy_together(x, n, now_x, n)
+                copy_together(y, n, now_y, n)
             continue
         for k in range(last):
             n = first + k
@@ -165,7 +164,7 @@ def growth_row(tick: int, own: TrialRules) -> int:
 
 
 @jit_inline
-def _copy(source: Floats, n: int, target: Floats, k: int) -> None:
+def copy_together(source: Floats, n: int, target: Floats, k: int) -> None:
     """Copy TOGETHER numbers at once: all are read before one is written."""
     first, second, third, fourth = source[n], source[n + 1], source[n + 2], source[n + 3]
     target[k], target[k + 1], target[k + 2], target[k + 3] = first, second, third, fourth
@@ -235,7 +234,7 @@ def hold(
     """Keep where car n, which has been located, is sure to hold on to its labels, as far as its lane is not asked.
 
     It does while it is less than `spare` metres from where it is, in its valid cell, and where the squared distance
-    from its vertex compares with all radii that matter as `away2` does. After `keep_vertex`, and with `keep_lane`.
+    from its vertex compares with all radii that matter as `away2` does. After `lane_cache.keep_road`.
     """
     k = n & (BLOCK - 1)
     x, y = block.here_x[k], block.here_y[k]
@@ -270,64 +269,3 @@ def _keep_ring(block: Kept, k: int, away2: float, own: TrialRules) -> None:
             high = min(high, edge2)
     block.ring_low[k] = low
     block.ring_high[k] = high
-
-
-@jit_inline
-def keep_lane(
-    block: Kept, n: int, lane: int, vertex: int, lateral: float, t: RoadTable, own: TrialRules
-) -> None:
-    """Keep the vertex of car n, the segment along which it makes progress, and how far aside its labels are the same.
-
-    `lateral` is its lateral offset in `lane` (-1: none), metres. Progress is measured as
-    `roads.lookup.lane_coordinates` does.
-    """
-    k = n & (BLOCK - 1)
-    net = own.net
-    place = t.vert_off[net] + vertex
-    block.vertex_x[k] = float(t.vert[place, 0])
-    block.vertex_y[k] = float(t.vert[place, 1])
-    row = t.seg_off[net] + (max(lane, 0) >> 1)
-    length = t.seg[row, 4]
-    back = lane >= 0 and lane & 1 != 0
-    block.from_x[k] = t.seg[row, 0]
-    block.from_y[k] = t.seg[row, 1]
-    block.axis_x[k] = t.seg[row, 2]
-    block.axis_y[k] = t.seg[row, 3]
-    block.base[k] = length if back else 0.0
-    block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
-    _keep_strip(block, k, lane, lateral, length, t.half_width[net], own)
-
-
-@jit_inline
-def _keep_strip(
-    block: Kept, k: int, lane: int, lateral: float, length: float, half: float, own: TrialRules
-) -> None:
-    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds.
-
-    The segment is `length` metres long and its road reaches `half` metres to each side.
-    """
-    low = begin = -HUGE
-    high = end = HUGE
-    if lane >= 0:
-        back = lane & 1 != 0
-        aside = -lateral if back else lateral
-        if abs(aside) <= half:
-            low = CERTAIN - half
-            high = half - CERTAIN
-        elif aside > 0.0:
-            low = half + CERTAIN
-        else:
-            high = -half - CERTAIN
-        most = own.left_set - own.rounding - CERTAIN
-        if lateral >= most:
-            low = high
-        elif back:
-            low = max(low, -most)
-        else:
-            high = min(high, most)
-        begin = CERTAIN
-        end = length - CERTAIN
-    block.aside_low[k] = low
-    block.aside_high[k] = high
-    block.along_low[k] = begin
-    block.along_high[k] = end

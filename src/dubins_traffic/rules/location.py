@@ -15,6 +15,7 @@ from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
+    CERTAIN,
     ValidCell,
     distance2,
     lane_direction,
@@ -29,12 +30,12 @@ from dubins_traffic.rules.label_cache import (
     KEPT,
     growth_row,
     hold,
-    keep_lane,
     lingers,
     note_growth,
     still,
     trust_fork,
 )
+from dubins_traffic.rules.lane_cache import keep_road
 from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import (
     AHEAD,
@@ -102,12 +103,11 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     memory.growth[b, growth_row(tick, own), n] = car.top
     labels.bits[b, n] = bits | still(block, n) | lingers(block, n)
 
-    spare = _reach(car, pose, v, lane, t, own)
+    spare, outside = _reach(car, pose, v, lane, t, own)
     if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
-    if lane < 0:
+    if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
         spare = min(spare, abs(sqrt(off2) - half_road))
-    keep_lane(block, n, lane, v, car.lateral, t, own)
     hold(block, n, away2, spare, cell, car, own)
     trust_fork(block, n, pose.x, pose.y, surely)
     return _change_crossing(crossed, crosses, memory.head[b])
@@ -130,11 +130,14 @@ def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell)
 
 
 @jit_inline
-def _reach(car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: TrialRules) -> float:
+def _reach(
+    car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: TrialRules
+) -> tuple[float, float]:
     """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
 
     Returns metres that a round body may move before it comes to where cars approach and queue, if the crossing is not
-    v, the nearest vertex; 0 where it is there.
+    v, the nearest vertex; 0 where it is there. And metres before the end of its lane up to which, along the lane, it
+    certainly does not come there, if these are told apart from the first, which is then FARTHEST; else 0.
     """
     net = own.net
     round_body = own.half_length + own.half_width == 0.0
@@ -142,6 +145,7 @@ def _reach(car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: Tri
     gap2 = -1.0
     zone = 0
     spare = FARTHEST
+    outside = 0.0
     if lane >= 0:
         half = own.rounding
         if not round_body:
@@ -154,13 +158,17 @@ def _reach(car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: Tri
             if not round_body:
                 gap2 = _distance2_to_vertex(t, own, end, pose)
             outer2 = max(own.stop2, own.queue2)
-            if end != v:
-                spare = max(sqrt(gap2) - sqrt(outer2), 0.0)
+            outer = sqrt(outer2) + CERTAIN
+            to_go = t.seg[t.seg_off[net] + (lane >> 1), 4] - car.progress
+            if end != v and to_go > outer + CERTAIN:
+                outside = outer
+            elif end != v:
+                spare = max(sqrt(gap2) - outer, 0.0)
             zone = 1 if own.cross2 <= gap2 <= outer2 else 0
     car.reach = reach
     car.gap2 = gap2
     car.zone = zone
-    return spare
+    return spare, outside
 
 
 @jit_inline

@@ -2,16 +2,21 @@
 (compiled).
 
 Most cars have nothing around them and follow a lane or an arc. Of these only the offset from their line, and its
-direction, change from tick to tick.
+direction, change from tick to tick. What they do stands in columns (`tables.Coasting`), and is found for several cars
+in one go of the processor, which takes less time than for one after another.
 """
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
+from dubins_traffic.cars.rows import TOGETHER
+from dubins_traffic.cars.state import State
+from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.choice import keeps_exit
-from dubins_traffic.policies.rules.deferred import note
 from dubins_traffic.policies.rules.path_cache import kept_way
 from dubins_traffic.policies.rules.right_of_way import (
     GOES_NOW,
@@ -22,15 +27,16 @@ from dubins_traffic.policies.rules.right_of_way import (
 )
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.seeing import meets_nobody, way_to_go
-from dubins_traffic.policies.rules.steering import ASTRAY, slowed
+from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, follow_line, slowed, steer
 from dubins_traffic.policies.rules.tables import (
     ALONE,
     LEFT_SIDE,
+    NOWHERE,
     ROLLING,
     ROUND,
+    Coasting,
     Driver,
     Drivers,
-    KeptPath,
     Traffic,
     Vehicle,
 )
@@ -38,55 +44,129 @@ from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, ReferencePat
 from dubins_traffic.policies.safety import VERGE
 from dubins_traffic.roads.lookup import CERTAIN
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.label_cache import copy_together
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, STOPPED
 
-EVERYWHERE = 1e9
-"""Metres that no way is long."""
+IF_NOT_BEHIND_EGO = 2.0
+"""Value of `Coasting.holds` of an e-agent that drives on if the ego is not ahead in its lane."""
+TINY = 1e-300
+"""Metres that no car is from the centre of an arc."""
 
 
 @jit_inline
-def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic) -> bool:
-    """Put off the command of a car that still just drives on as it did; tell whether it does.
+def look_who_coasts(b: int, traffic: Traffic) -> None:
+    """Find which cars of trial b still just drive on as they did, as far as their poses say, and their commands.
+
+    Nothing in the loop over the cars is a branch: so the compiler sees that several may be taken at once.
+    """
+    state, drivers = traffic.state, traffic.drivers
+    vehicle = drivers.vehicle[b]
+    count = state.count[b]
+    for first in range(0, count, BLOCK):
+        here = min(count - first, BLOCK)
+        block = drivers.coasting[b, first // BLOCK]
+        _bring(b, first, here, state, block)
+        _drive_on_as_before(block, (here + WIDE - 1) & -WIDE, vehicle.yaw_most, vehicle.period)
+
+
+@jit_inline
+def _bring(b: int, first: int, here: int, state: State, block: Coasting) -> None:
+    """Put where the `here` cars from car `first` on are beside what they do."""
+    x, y, c, s = state.x[b], state.y[b], state.c[b], state.s[b]
+    here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
+    if state.x.shape[1] % TOGETHER == 0:
+        for k in range(0, here, TOGETHER):
+            n = first + k
+            copy_together(x, n, here_x, k)
+            copy_together(y, n, here_y, k)
+            copy_together(c, n, here_c, k)
+            copy_together(s, n, here_s, k)
+        return
+    for k in range(here):
+        n = first + k
+        here_x[k], here_y[k], here_c[k], here_s[k] = x[n], y[n], c[n], s[n]
+
+
+@jit_inline
+def _drive_on_as_before(block: Coasting, last: int, limit: float, period: float) -> None:
+    """Find who of the first `last` cars of a block is where it just drives on, and the commands of all of them."""
+    x, y, c, s = block.here_x, block.here_y, block.here_c, block.here_s
+    low, high, past_most, minds, astray = block.low, block.high, block.past, block.minds, block.astray
+    way_x, way_y, tx, ty, ux, uy = block.x, block.y, block.tx, block.ty, block.ux, block.uy
+    cx, cy, radius, sides, middle = block.cx, block.cy, block.radius, block.side, block.middle
+    bends, speeds, holds, now, yaw_rates = block.bend, block.speed, block.holds, block.now, block.yaw_rate
+    for k in range(last):
+        dx = x[k] - cx[k]
+        dy = y[k] - cy[k]
+        along = dx * tx[k] + dy * ty[k]
+        past = dx * ux[k] + dy * uy[k]
+        far = max(sqrt(dx * dx + dy * dy), TINY)
+        bend, side = bends[k], sides[k]
+        in_arc_left = side * (radius[k] - far)
+        in_lane_left = tx[k] * (y[k] - way_y[k]) - ty[k] * (x[k] - way_x[k]) + middle[k]
+        bent = bend != 0.0
+        left = in_arc_left if bent else in_lane_left
+        px = -side * (dy / far) if bent else tx[k]
+        py = side * (dx / far) if bent else ty[k]
+        inside = (low[k] < along) & (along < high[k]) & (past < past_most[k]) & (left <= astray[k])
+        held = 1.0 if along <= minds[k] else IF_NOT_BEHIND_EGO
+        holds[k] = held if inside else 0.0
+        now[k], yaw_rates[k] = steer(
+            c[k], s[k], left, px, py, bend, speeds[k], SLANT, ALIGNED, limit, 0.0, period
+        )
+
+
+@jit_inline
+def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, commands: Floats) -> bool:
+    """Write the command of a car that still just drives on as it did; tell whether it does. After `look_who_coasts`.
 
     Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
     """
-    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
+    block = drivers.coasting[b, n // BLOCK]
+    k = n & (BLOCK - 1)
+    holds = block.holds[k]
+    if holds == 0.0:
+        return False
     row = drivers.way[b, n]
-    x, y = state.x[b, n], state.y[b, n]
-    way = kept_way(row)
-    dx, dy = x - way.cx, y - way.cy
-    along = dx * way.tx + dy * way.ty
-    past = dx * way.ux + dy * way.uy
-    if not (row.coast_low < along < row.coast_high and past < row.coast_past):
-        return False
     changed = labels.lane[b, n] != row.coast_lane or labels.crosses[b, n] != row.coast_crosses
-    if changed or np.int64(labels.bits[b, n]) & (STOPPED | BLOCKED | LEFT) != 0:
+    bits = np.int64(labels.bits[b, n])
+    if changed or bits & (STOPPED | BLOCKED | LEFT) != row.coast_stopped or bits & GOES_NOW == GOES_NOW:
         return False
-    if kind == ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
+    x, y = state.x[b, n], state.y[b, n]
+    if row.coast_waits != 0 and (x != row.coast_x or y != row.coast_y):
         return False
-    bend = row.coast_bend
-    if bend == 0.0:
-        part, key, left, px, py = on_lane(way, x, y)
-    else:
-        part, key, left, px, py = in_arc(way, dx, dy)
-    if row.coast_lane < 0 and left > ASTRAY:
+    if kind == ROUND and not keeps_to_road(b, n, x, y, kept_way(row), traffic.roads, drivers):
         return False
-    if along > row.coast_minds and is_behind_ego(b, n, x, y, way, traffic):
+    if holds == IF_NOT_BEHIND_EGO and is_behind_ego(b, n, x, y, kept_way(row), traffic):
         return False
     if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
         return False
-    if company != ALONE and not meets_nobody(b, n, part, key, left, x, y, way, state, drivers.vehicle[b]):
+    if company != ALONE and not still_meets_nobody(b, n, block.bend[k], x, y, kept_way(row), traffic):
         return False
     if row.coast_chooses != 0:
         drivers.car[b, n].within += 1
-    note(b, n, row.coast_speed, left, px, py, bend, traffic)
+    commands[b, n, 0] = block.now[k]
+    commands[b, n, 1] = block.yaw_rate[k]
     return True
 
 
 @jit_inline
-def stop_coasting(row: KeptPath) -> None:
-    """Forget what a car did; `row` is its row of `Drivers.way`."""
-    row.coast_low = EVERYWHERE
+def still_meets_nobody(
+    b: int, n: int, bend: float, x: float, y: float, way: ReferencePath, traffic: Traffic
+) -> bool:
+    """Tell what `meets_nobody` does, of a car on its lane in, or in its arc if its line has a `bend`."""
+    if bend == 0.0:
+        part, key, left, _, _ = on_lane(way, x, y)
+    else:
+        part, key, left, _, _ = in_arc(way, x - way.cx, y - way.cy)
+    return meets_nobody(b, n, part, key, left, x, y, way, traffic.state, traffic.drivers.vehicle[b])
+
+
+@jit_inline
+def stop_coasting(b: int, n: int, drivers: Drivers) -> None:
+    """Forget what a car did."""
+    drivers.coasting[b, n // BLOCK].low[n & (BLOCK - 1)] = NOWHERE
 
 
 @jit_inline
@@ -101,8 +181,9 @@ def drive_on(
     chooses: bool,
     way: ReferencePath,
     traffic: Traffic,
+    commands: Floats,
 ) -> bool:
-    """Put off the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
+    """Write the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
 
     Nothing is around the car that matters to it (`policy.just_drives`). What it does is kept for the ticks to come.
     """
@@ -124,19 +205,22 @@ def drive_on(
         return False
     if gated and car.kind != ROUND and is_behind_ego(b, n, x, y, way, traffic):
         return False
-    line = to_line(left, x, y, way, vehicle) if gated else EVERYWHERE
-    if line < speed * vehicle.period:
+    line = to_line(left, x, y, way, vehicle) if gated else NOWHERE
+    waits = line < speed * vehicle.period
+    if waits:
         if row.crossing == 0 or bits & GOES_NOW == GOES_NOW or car.violations & ROLLING != 0:
             return False
         speed = max(0.0, line) / vehicle.period
-    else:
+    if not waits or speed == 0.0:
         keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
         row.coast_chooses = 1 if chooses else 0
+        row.coast_waits = 1 if waits else 0
+        row.coast_stopped = bits & STOPPED if waits else 0
     if gated:
         count_turn(bits, row, car)
     car.waited = 0
     car.within += 1 if chooses else 0
-    note(b, n, slowed(speed, bend, vehicle.yaw_most), left, px, py, bend, traffic)
+    follow_line(b, n, speed, left, px, py, bend, traffic, commands)
     return True
 
 
@@ -156,25 +240,38 @@ def keep_course(
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
 
     The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. Without
-    lane state it also ends where the arc does: there the part of the way changes, or the lane.
+    lane state it also ends where the arc does: there the part of the way changes, or the lane. Who stands at its line
+    does so until it moves, or it is its turn.
     """
     labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     row = drivers.way[b, n]
+    block = drivers.coasting[b, n // BLOCK]
+    k = n & (BLOCK - 1)
     bend = way.bend if part == THROUGH else 0.0
-    row.coast_low = 0.0 if part == THROUGH else -EVERYWHERE
-    row.coast_high = EVERYWHERE if outside or part == THROUGH else 0.0
-    row.coast_past = EVERYWHERE if outside else 0.0
-    row.coast_minds = EVERYWHERE
+    high = NOWHERE if outside or part == THROUGH else 0.0
+    minds = NOWHERE
     if gated:
         along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
         edge = vehicle.disc + vehicle.reach + MARGIN
         spare = -way_to_go(way, x, y) - edge - speed * vehicle.period - CERTAIN
-        row.coast_high = min(row.coast_high, along + spare)
+        high = min(high, along + spare)
         if drivers.car[b, n].kind != ROUND:
-            row.coast_minds = along + spare - vehicle.approaches
-    row.coast_speed = slowed(speed, bend, vehicle.yaw_most)
-    row.coast_bend = bend
+            minds = along + spare - vehicle.approaches
+        if speed == 0.0:
+            high = NOWHERE
+    block.low[k] = 0.0 if part == THROUGH else -NOWHERE
+    block.high[k] = high
+    block.past[k] = NOWHERE if outside else 0.0
+    block.minds[k] = minds
+    block.astray[k] = ASTRAY if labels.lane[b, n] < 0 else NOWHERE
+    block.speed[k] = slowed(speed, bend, vehicle.yaw_most)
+    block.bend[k] = bend
+    block.x[k], block.y[k] = way.x, way.y
+    block.tx[k], block.ty[k], block.ux[k], block.uy[k] = way.tx, way.ty, way.ux, way.uy
+    block.cx[k], block.cy[k], block.radius[k], block.side[k] = way.cx, way.cy, way.radius, way.side
+    block.middle[k] = way.middle
+    row.coast_x, row.coast_y = x, y
     row.coast_lane = labels.lane[b, n]
     row.coast_crosses = labels.crosses[b, n]
 

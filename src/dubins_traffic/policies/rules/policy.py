@@ -17,8 +17,14 @@ from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
-from dubins_traffic.policies.rules.command_cache import coast, cruise, drive_on, keeps_to_road, stop_coasting
-from dubins_traffic.policies.rules.deferred import decide_deferred, defer
+from dubins_traffic.policies.rules.command_cache import (
+    coast,
+    cruise,
+    drive_on,
+    keeps_to_road,
+    look_who_coasts,
+    stop_coasting,
+)
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing
@@ -35,7 +41,7 @@ from dubins_traffic.policies.rules.seeing import (
     way_to_go,
 )
 from dubins_traffic.policies.rules.standing import watch
-from dubins_traffic.policies.rules.steering import move
+from dubins_traffic.policies.rules.steering import follow_line, follows_line, move
 from dubins_traffic.policies.rules.tables import (
     ABSENT,
     ALONE,
@@ -97,6 +103,7 @@ def decide_trial(
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
         others = CROWDED
+    look_who_coasts(b, traffic)
     for n in range(state.count[b]):
         company = others if apart[n] > 0.0 else CROWDED
         if apart[n] > enough:
@@ -109,9 +116,8 @@ def decide_trial(
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
-        elif company == CROWDED or not coast(b, n, tick, kind, company, traffic):
+        elif company == CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
             drive(b, n, tick, company, sight2, traffic, commands)
-    decide_deferred(b, traffic, commands)
     if scratch.listed[0] != NOBODY:
         unlist_cars(b, traffic)
 
@@ -171,7 +177,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     x, y = state.x[b, n], state.y[b, n]
-    stop_coasting(drivers.way[b, n])
+    stop_coasting(b, n, drivers)
     if car.kind == NEMESIS:
         watch_ego(b, n, labels, drivers)
     way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], traffic)
@@ -186,7 +192,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
     if free and company != ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
-    if free and drive_on(b, n, part, left, px, py, outside, chooses, way, traffic):
+    if free and drive_on(b, n, part, left, px, py, outside, chooses, way, traffic, commands):
         return
     enlist(b, n, sight2, traffic)
     near = 0
@@ -204,7 +210,8 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == THROUGH else 0.0
-    if defer(b, n, speed, left - offset, px, py, bend, close, traffic):
+    if not close and follows_line(b, n, left - offset, traffic):
+        follow_line(b, n, speed, left - offset, px, py, bend, traffic, commands)
         return
     speed, yaw_rate = move(
         b,

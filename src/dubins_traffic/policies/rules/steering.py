@@ -6,10 +6,11 @@ from math import sqrt
 
 import numpy as np
 
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
-from dubins_traffic.policies.rules.tables import LEFT_SIDE, Traffic, Vehicle
+from dubins_traffic.policies.rules.tables import LEFT_SIDE, ROUND, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
 from dubins_traffic.rules.propositions import LEFT
@@ -102,6 +103,37 @@ def keep_right(
 
 
 @jit_inline
+def follows_line(b: int, n: int, left: float, traffic: Traffic) -> bool:
+    """Tell whether a car with nothing close around it, `left` of its line, metres, may just follow that."""
+    labels, obstacles, drivers = traffic.labels, traffic.obstacles, traffic.drivers
+    car = drivers.car[b, n]
+    free = obstacles.off[b] == obstacles.off[b + 1] and car.kind != ROUND
+    bound = car.aside != 0.0 or drivers.vehicle[b].tightest > 0.0
+    astray = labels.lane[b, n] < 0 and left > ASTRAY
+    return free and not bound and not astray and np.int64(labels.bits[b, n]) & LEFT == 0
+
+
+@jit_inline
+def follow_line(
+    b: int,
+    n: int,
+    speed: float,
+    left: float,
+    px: float,
+    py: float,
+    bend: float,
+    traffic: Traffic,
+    commands: Floats,
+) -> None:
+    """Write the command of a car `left` of its line, metres, whose direction is (px, py) and curvature `bend`, 1/m."""
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    speed = slowed(speed, bend, vehicle.yaw_most)
+    commands[b, n, 0], commands[b, n, 1] = steer(
+        state.c[b, n], state.s[b, n], left, px, py, bend, speed, SLANT, ALIGNED, vehicle.yaw_most, 0.0, vehicle.period
+    )  # fmt: skip
+
+
+@jit_inline
 def slowed(speed: float, bend: float, limit: float) -> float:
     """Return the speed at which a car follows a line of curvature `bend`, 1/m, with a yaw rate of `limit` at most."""
     if abs(bend) * speed > 0.8 * limit:
@@ -118,8 +150,8 @@ def steer(
 
     `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
     line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
-    `limit` is its largest yaw rate. All is worked out whatever the case, so that `decide_deferred` has no
-    branches.
+    `limit` is its largest yaw rate. All is worked out whatever the case, so that the loop of
+    `command_cache.look_who_coasts` has no branches.
     """
     sine = min(max(-left / HURRY, -most), most)
     cosine = sqrt(1.0 - sine * sine)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
+from dubins_traffic.kernels.columns import columns
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
@@ -36,13 +37,8 @@ ALONE, UNSURE, CROWDED = range(3)
 all of them; nothing.
 """
 
-DUE, LATE_SPEED, LATE_LEFT, LATE_X, LATE_Y, LATE_BEND, LATE_C, LATE_S, LATE_YAW = range(9)
-LATE = 9
-"""`Scratch.late`: blocks of BLOCK cars, each LATE columns of BLOCK numbers.
-
-DUE: 1 if a command has been put off. Allowed speed, m/s; metres left of the line to follow; its direction (X, Y); its
-curvature, 1/m; the heading (C, S); and the yaw rate that is found, rad/s, as the speed is then found in LATE_SPEED.
-"""
+NOWHERE = 1e9
+"""Metres that no way is long: who would have to be so far along its way to go on as it does, doesn't."""
 
 
 @record
@@ -167,10 +163,9 @@ class Vehicle:
 
 @record
 class KeptPath:
-    """The reference path of a car, kept from tick to tick, and what one does that just drives on.
+    """The reference path of a car, kept from tick to tick, and the labels with which one just drives on.
 
-    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`; what a car does is
-    kept by `policies.rules.command_cache`.
+    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`.
     """
 
     lane: int = -1
@@ -187,6 +182,13 @@ class KeptPath:
     """The lane of its lane state."""
     coast_crosses: int = -1
     """The disc that its body meets."""
+    coast_waits: int = -1
+    """1 if it waits at its line, and stays where it is."""
+    coast_stopped: int = -1
+    """STOPPED if it has, else 0."""
+    coast_x: float = -1.0
+    coast_y: float = -1.0
+    """Where it waits."""
     length: float = -1.0
     """Of the lane in, metres."""
     out_length: float = -1.0
@@ -203,27 +205,67 @@ class KeptPath:
     side: float = -1.0
     middle: float = -1.0
     bend: float = -1.0
-    coast_low: float = -1.0
-    """Where it goes on so: metres along the lane in from the arc's centre, from here."""
-    coast_high: float = -1.0
-    """To here."""
-    coast_minds: float = -1.0
-    """From here on an e-agent goes on so only while the ego is not ahead in its lane."""
-    coast_past: float = -1.0
-    """And along the lane out to here."""
-    coast_speed: float = -1.0
+
+
+@columns(BLOCK)
+class Coasting:
+    """Of BLOCK cars, number by number: where a car just drives on as it did, and the command with which it does.
+
+    The loop over the cars of `policies.rules.command_cache.look_who_coasts` reads and writes these columns several cars
+    at once. The path is that of `policies.rules.turn_arcs.ReferencePath`.
+    """
+
+    low: Floats
+    high: Floats
+    """Where a car drives on so: between these two metres along the lane in, from the arc's centre; nowhere at first."""
+    past: Floats
+    """And along the lane out up to here."""
+    minds: Floats
+    """Along the lane in, from here on an e-agent drives on so only while the ego is not ahead in its lane."""
+    astray: Floats
+    """Up to how many metres left of its line it does."""
+    speed: Floats
     """Its speed, m/s."""
-    coast_bend: float = -1.0
+    bend: Floats
     """The curvature of its line, 1/m."""
+    x: Floats
+    y: Floats
+    tx: Floats
+    ty: Floats
+    ux: Floats
+    uy: Floats
+    cx: Floats
+    cy: Floats
+    radius: Floats
+    side: Floats
+    middle: Floats
+    """Its path."""
+    here_x: Floats
+    here_y: Floats
+    here_c: Floats
+    here_s: Floats
+    """Where it is in this frame."""
+    holds: Floats
+    """Whether it just drives on, as far as its pose says: 0, 1, or `command_cache.IF_NOT_BEHIND_EGO`."""
+    now: Floats
+    yaw_rate: Floats
+    """Its command in this tick, m/s and rad/s, if it does."""
+
+
+def coasting(trials: int, cars: int) -> Rows[Coasting]:
+    """Return `Drivers.coasting` of cars of which none drives yet, (trials, blocks of cars)."""
+    rows = table(Coasting, (trials, -(-cars // BLOCK)))
+    rows["low"] = NOWHERE
+    return rows
 
 
 class Drivers(Tables):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
-    `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N) and `way` (B, N); `stage` (M,): lanes of loops,
-    and goals; `distance` (M, L): for a goal, metres from the beginning of each lane to the end of the lane by which
-    the goal is reached; (0, 0) where nobody drives a round.
+    `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N), `way` (B, N) and `coasting` (B, ceil(N / BLOCK));
+    `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from the beginning of each lane to
+    the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
     """
 
     active: Ints
@@ -233,14 +275,15 @@ class Drivers(Tables):
     vehicle: Rows[Vehicle]
     car: Rows[Driver]
     way: Rows[KeptPath]
+    coasting: Rows[Coasting]
     stage: Ints
     distance: Floats
 
 
 class Scratch(Tables):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
-    lanes that the ego will probably take; `late`: commands put off; `apart` (N,): for
-    who does not know how far cars are apart, 0; `listed` (1,): who is in the lists.
+    lanes that the ego will probably take; `apart` (N,): for who does not know how far cars are apart, 0; `listed` (1,):
+    who is in the lists.
     """
 
     head: Ints
@@ -250,7 +293,6 @@ class Scratch(Tables):
     queue: Ints
     cost: Floats
     chain: Ints
-    late: Floats
     apart: Floats
     listed: Ints
 
@@ -276,7 +318,6 @@ def scratch(cars: int, segments: int) -> Scratch:
         queue=np.zeros(2 * segments, dtype=np.int64),
         cost=np.zeros(4),
         chain=np.zeros(4, dtype=np.int64),
-        late=np.zeros((cars + BLOCK - 1) // BLOCK * BLOCK * LATE),
         apart=np.zeros(cars),
         listed=np.zeros(1, dtype=np.int64),
     )

@@ -1,0 +1,102 @@
+"""Where along its road, and beside it, a car's labels are the same for certain (compiled).
+
+`rules.label_cache` looks in every frame for whether a car is still there.
+"""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.arrays import BLOCK
+from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.roads.lookup import CERTAIN
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.tables import Kept, TrialRules
+
+HUGE = 1e300
+
+
+@jit_inline
+def keep_road(
+    block: Kept, n: int, lane: int, segment: int, vertex: int, lateral: float, outside: float, t: RoadTable,
+    own: TrialRules,
+) -> bool:  # fmt: skip
+    """Keep the vertex of car n, its segment, and where along it and beside it labels are the same.
+
+    `lateral` is its lateral offset in `lane` (-1: none), metres; its labels are not the same less than `outside` metres
+    before the end of that. Progress is measured as `roads.lookup.lane_coordinates` does. Tells whether the car is on
+    the road, or off it, in all these places as it is now; if not, that is not known.
+    """
+    k = n & (BLOCK - 1)
+    net = own.net
+    place = t.vert_off[net] + vertex
+    block.vertex_x[k] = float(t.vert[place, 0])
+    block.vertex_y[k] = float(t.vert[place, 1])
+    row = t.seg_off[net] + (lane >> 1 if lane >= 0 else segment)
+    length = t.seg[row, 4]
+    back = lane >= 0 and lane & 1 != 0
+    block.from_x[k] = t.seg[row, 0]
+    block.from_y[k] = t.seg[row, 1]
+    block.axis_x[k] = t.seg[row, 2]
+    block.axis_y[k] = t.seg[row, 3]
+    block.base[k] = length if back else 0.0
+    block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    if lane >= 0:
+        _keep_strip(block, k, back, lateral, outside, length, t.half_width[net], own)
+        return True
+    return _keep_sides(block, k, length, t.half_width[net])
+
+
+@jit_inline
+def _keep_strip(
+    block: Kept, k: int, back: bool, lateral: float, outside: float, length: float, half: float, own: TrialRules
+) -> None:  # fmt: skip
+    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds.
+
+    The segment is `length` metres long and its road reaches `half` metres to each side.
+    """
+    low, high = -HUGE, HUGE
+    aside = -lateral if back else lateral
+    if abs(aside) <= half:
+        low = CERTAIN - half
+        high = half - CERTAIN
+    elif aside > 0.0:
+        low = half + CERTAIN
+    else:
+        high = -half - CERTAIN
+    most = own.left_set - own.rounding - CERTAIN
+    if lateral >= most:
+        low = high
+    elif back:
+        low = max(low, -most)
+    else:
+        high = min(high, most)
+    block.aside_low[k] = low
+    block.aside_high[k] = high
+    block.along_low[k] = max(outside, CERTAIN) if back else CERTAIN
+    block.along_high[k] = length - CERTAIN if back else length - max(outside, CERTAIN)
+
+
+@jit_inline
+def _keep_sides(block: Kept, k: int, length: float, half: float) -> bool:
+    """Keep on which side of the edges of its road a car without lane state is; tell whether that can be told.
+
+    It can beside the segment, which is `length` metres long and whose road reaches `half` metres to each side; beyond
+    its ends the edge is round.
+    """
+    rx = block.here_x[k] - block.from_x[k]
+    ry = block.here_y[k] - block.from_y[k]
+    along = rx * block.axis_x[k] + ry * block.axis_y[k]
+    aside = block.axis_x[k] * ry - block.axis_y[k] * rx
+    beside = CERTAIN < along < length - CERTAIN
+    low, high = -HUGE, HUGE
+    if beside and abs(aside) <= half:
+        low = CERTAIN - half
+        high = half - CERTAIN
+    elif beside and aside > 0.0:
+        low = half + CERTAIN
+    elif beside:
+        high = -half - CERTAIN
+    block.aside_low[k] = low
+    block.aside_high[k] = high
+    block.along_low[k] = CERTAIN if beside else -HUGE
+    block.along_high[k] = length - CERTAIN if beside else HUGE
+    return beside
