@@ -211,11 +211,10 @@ def drive_on(
         if row.crossing == 0 or bits & GOES_NOW == GOES_NOW or car.violations & ROLLING != 0:
             return False
         speed = max(0.0, line) / vehicle.period
-    if not waits or speed == 0.0:
-        keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
-        row.coast_chooses = 1 if chooses else 0
-        row.coast_waits = 1 if waits else 0
-        row.coast_stopped = bits & STOPPED if waits else 0
+    row.coast_chooses = 1 if chooses else 0
+    row.coast_waits = 1 if waits else 0
+    row.coast_stopped = bits & STOPPED if waits else 0
+    keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:
         count_turn(bits, row, car)
     car.waited = 0
@@ -240,8 +239,8 @@ def keep_course(
     """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
 
     The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. Without
-    lane state it also ends where the arc does: there the part of the way changes, or the lane. Who stands at its line
-    does so until it moves, or it is its turn.
+    lane state it also ends where the arc does: there the part of the way changes, or the lane. Who waits at its line
+    does the same until it has moved, or it is its turn.
     """
     labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -258,7 +257,7 @@ def keep_course(
         high = min(high, along + spare)
         if drivers.car[b, n].kind != ROUND:
             minds = along + spare - vehicle.approaches
-        if speed == 0.0:
+        if row.coast_waits != 0:
             high = NOWHERE
     block.low[k] = 0.0 if part == THROUGH else -NOWHERE
     block.high[k] = high
