@@ -127,7 +127,7 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             if tick % 10 != n or not (low < high).all():
                 continue
             looked += 1
-            points = random.uniform(low, high, (20, 2))
+            points = random.uniform(low, high, (60, 2))
             segment, far = surface.nearest_segment(points)
             vertex, away = surface.nearest_vertex(points)
             to_vertex = np.hypot(*(points - (row["vertex_x"], row["vertex_y"])).T) ** 2
