@@ -13,11 +13,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
-from dubins_traffic.cars.state import Observation, Pose, Propositions, Twist
+from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.lanes import Lanes
-from dubins_traffic.kernels.boxes import NEVER, box_contact, separation
+from dubins_traffic.kernels.boxes import NEVER, Box, box_contact, separation
+from dubins_traffic.kernels.records import table
 from dubins_traffic.kernels.trig import advance, sincos
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, VISIT, Site, along, shape
+from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.policies.safety import motion_is_safe
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
@@ -166,12 +168,11 @@ def test_a_safe_motion_meets_nobody_or_leads_away(
     c, s = sincos(other[2])
     assume(separation(0.0, 0.0, 1.0, 0.0, a, h, r, other[0], other[1], c, s, a, h, r)[0] > 1e-6)
     travel = (0.7 + (3.15 * reach if box else 0.0)) / 30
-    safe = motion_is_safe(
-        0.0, 0.0, 1.0, 0.0, *own, 1 / 30, a, h, r, reach, other[0], other[1], c, s, a, h, r, travel
-    )
-    assert motion_is_safe(
-        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1 / 30, a, h, r, reach, *other[:2], c, s, a, h, r, travel
-    )
+    car = table(Vehicle, 1)[0]
+    car.half_length, car.half_width, car.rounding, car.reach, car.period = a, h, r, reach, 1 / 30
+    origin, body = Pose(0.0, 0.0, 1.0, 0.0), Box(other[0], other[1], c, s, a, h, r)
+    safe = motion_is_safe(origin, Command(*own), car, body, travel)
+    assert motion_is_safe(origin, Command(0.0, 0.0), car, body, travel)
     if not safe:
         return
     met = box_contact(

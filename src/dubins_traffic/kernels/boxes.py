@@ -7,6 +7,7 @@ the radius r by which it is grown. A disc has a = b = 0, an edge b = 0.
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.trig import advance
@@ -22,6 +23,21 @@ _NUMB = 1e-7
 _FACE = 1.0 + 1e-6
 """Beyond this ratio to the separation by faces, the nearest features are two corners."""
 _CAP = 4096
+
+
+class Box(NamedTuple):
+    """A rounded box: centre (`x`, `y`) in metres, axis (`c`, `s`), and the shape about it, in metres.
+
+    `half_length` lies along the axis and `half_width` across it; `rounding` is the radius by which that is grown.
+    """
+
+    x: float
+    y: float
+    c: float
+    s: float
+    half_length: float
+    half_width: float
+    rounding: float
 
 
 @jit

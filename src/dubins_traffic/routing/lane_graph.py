@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import nearest_segment
@@ -22,11 +23,11 @@ def frame(row: Floats, lane: int) -> tuple[float, float, float, float, float]:
 
 
 @jit
-def lane_at(roads: RoadTable, net: int, x: float, y: float, c: float, s: float) -> int:
+def lane_at(roads: RoadTable, net: int, pose: Pose) -> int:
     """Return the lane of the nearest segment that leads along the heading (its first-to-second end on ties)."""
-    segment, _ = nearest_segment(roads, net, x, y)
+    segment, _ = nearest_segment(roads, net, pose.x, pose.y)
     row = roads.seg[roads.seg_off[net] + segment]
-    return 2 * segment + (0 if c * row[2] + s * row[3] >= 0.0 else 1)
+    return 2 * segment + (0 if pose.c * row[2] + pose.s * row[3] >= 0.0 else 1)
 
 
 @jit
