@@ -80,13 +80,11 @@ class Lanes:
             self._decide = bound(decide)
         elif self._blocked or self._closed:
             known = self._known = self._remember(known, observation)
-        ego = known.follower
-        ego.x, ego.y, ego.c, ego.s = observation.pose
+        ego, tick = known.follower, observation.tick
         others = np.asarray(known.other)  # to write all of a row at once
-        others["is_seen"] = 0
         for car in observation.others:
-            others[car.index - 1] = (*car.pose, *car.twist, 1)
-        self._decide(known, self._roads)
+            others[car.index - 1] = (*car.pose, *car.twist, tick)
+        self._decide(tick, *observation.pose, known, self._roads)
         if ego.blocker != NOBODY:
             self._detour(observation, ego.blocker)
         return Command(ego.speed, ego.yaw_rate)

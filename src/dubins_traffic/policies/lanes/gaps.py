@@ -86,7 +86,7 @@ def first_conflict(
     Kept are `still_margin` (m) from what stands and `moving_margin` (m) from what moves; where a gap is smaller
     already, it may stay so.
     """
-    vehicle, obstacles = known.vehicle, known.obstacles
+    vehicle, obstacles, tick = known.vehicle, known.obstacles, known.follower.tick
     before = body_at(Pose(0.0, 0.0, 0.0, 0.0), vehicle)
     for k in range(last + 1):
         place = known.sample[k]
@@ -103,7 +103,7 @@ def first_conflict(
             dx = car.x - x
             dy = car.y - y
             near = 2.0 * vehicle.reach + margin
-            is_near = car.is_seen != 0 and k > 0 and dx * dx + dy * dy < near * near
+            is_near = car.tick == tick and k > 0 and dx * dx + dy * dy < near * near
             if is_near and comes_nearer(before, body, body_at(pose_of(car), vehicle), margin):
                 return k, n, nearest_sample(known, k, car.x, car.y)
         for p in range(obstacles.part.shape[0]):

@@ -75,6 +75,8 @@ class Manner:
 class Follower:
     """The ego: where it is, where on its path, what it is about, what it remembers, and what it decides."""
 
+    tick: int
+    """The tick for which it decides."""
     x: float
     """Its centre, metres."""
     y: float
@@ -138,8 +140,8 @@ class SeenCar:
     """m/s."""
     yaw_rate: float
     """rad/s."""
-    is_seen: int
-    """Whether it is seen in this tick."""
+    tick: int = -1
+    """The tick in which it was last seen."""
 
 
 @record

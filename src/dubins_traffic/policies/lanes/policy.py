@@ -27,9 +27,10 @@ from dubins_traffic.roads.table import RoadTable
 
 
 @jit
-def decide(known: Knowledge, roads: RoadTable) -> None:
-    """Choose the ego's command."""
+def decide(tick: int, x: float, y: float, c: float, s: float, known: Knowledge, roads: RoadTable) -> None:
+    """Choose the command of an ego at a pose; `roads` has its network only."""
     ego = known.follower
+    ego.tick, ego.x, ego.y, ego.c, ego.s = tick, x, y, c, s
     ego.blocker = NOBODY
     near = _watch(known)
     _find_place(known)
@@ -52,7 +53,7 @@ def _watch(known: Knowledge) -> bool:
     ego, manner = known.follower, known.manner
     for n in range(known.other.shape[0]):
         car = known.other[n]
-        if car.is_seen == 0:
+        if car.tick != ego.tick:
             known.still[n] = 0.0
             continue
         found = True
@@ -146,7 +147,8 @@ def _occupant(known: Knowledge, gate: PathRow) -> int:
     """Return a car whose body meets the disc and that has moved of late, or NOBODY."""
     for n in range(known.other.shape[0]):
         car = known.other[n]
-        if car.is_seen != 0 and known.still[n] < known.manner.stands and _in_disc(known, gate, car.x, car.y):
+        is_awake = car.tick == known.follower.tick and known.still[n] < known.manner.stands
+        if is_awake and _in_disc(known, gate, car.x, car.y):
             return n
     return NOBODY
 
@@ -222,6 +224,6 @@ def _is_safe(known: Knowledge, roads: RoadTable, command: Command) -> bool:
     travel = travel_of(vehicle)
     for n in range(known.other.shape[0]):
         car = known.other[n]
-        if car.is_seen != 0 and may_meet(pose, command, vehicle, pose_of(car), travel):
+        if car.tick == ego.tick and may_meet(pose, command, vehicle, pose_of(car), travel):
             return False
     return not may_hit(0, pose, command, vehicle, known.obstacles, NEAR, 0.0)

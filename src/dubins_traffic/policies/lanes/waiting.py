@@ -93,7 +93,7 @@ def _backs_up(known: Knowledge, cause: int) -> bool:
     if begins and far2 < manner.near * manner.near and ego.waited > 0.6 and known.still[cause] > 0.5:
         ego.backs_from = cause
     if ego.backs_from >= 0 and (
-        car.is_seen == 0 or far2 > manner.clear * manner.clear or not _free_behind(known)
+        car.tick != ego.tick or far2 > manner.clear * manner.clear or not _free_behind(known)
     ):
         ego.backs_from = -1
         ego.is_barred = 1
@@ -106,7 +106,7 @@ def _nearest_body(known: Knowledge) -> int:
     best = 1.0
     who = -1 if known.obstacles.part.shape[0] > 0 else NOBODY
     for n in range(known.other.shape[0]):
-        if known.other[n].is_seen != 0 and known.gap[n] < best:
+        if known.other[n].tick == known.follower.tick and known.gap[n] < best:
             best = known.gap[n]
             who = n
     return who
@@ -122,7 +122,7 @@ def _free_behind(known: Knowledge) -> bool:
     x, y, c, s = ego.x, ego.y, ego.c, ego.s
     for n in range(known.other.shape[0]):
         car = known.other[n]
-        if car.is_seen == 0 or (car.x - x) * c + (car.y - y) * s > 0.0:
+        if car.tick != ego.tick or (car.x - x) * c + (car.y - y) * s > 0.0:
             continue
         if gap_from(known, x - 0.1 * c, y - 0.1 * s, n) < known.manner.still_margin:
             return False
