@@ -55,7 +55,7 @@ def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
 def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
     """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
     state, agents, work = scene.state, scene.agents, scene.space
-    if look(scene, b) > work.pair.shape[0]:
+    if look(scene, b) > work.search.pair.shape[0]:
         return False
     ego = _pose(state, b, 0)
     for n in range(1, state.count[b]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import nearest_segment
@@ -82,18 +82,15 @@ def motion_is_safe(
     own = (abs(speed) + turns) * period
     if own == 0.0:
         return True
-    gap, _, _, _, _ = separation(
-        x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-    )
+    other = Box(ox, oy, oc, os, o_length, o_width, o_rounding)
+    gap, _, _, _, _ = separation(Box(x, y, c, s, half_length, half_width, rounding), other)
     if gap > own + o_travel + GUARD:
         return True
     least = gap
     last = gap
     for k in range(1, 5):
         nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, 0.25 * k * period)
-        last, _, _, _, _ = separation(
-            nx, ny, nc, ns, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-        )
+        last, _, _, _, _ = separation(Box(nx, ny, nc, ns, half_length, half_width, rounding), other)
         least = min(least, last)
     return least > o_travel + GUARD or (least == gap and last - gap > 0.2 * own)
 

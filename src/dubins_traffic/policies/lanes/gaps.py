@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.paths import GATE_X, GATE_Y, HIGH, LENGTH, LOW, NO_STOP, STOP
 from dubins_traffic.policies.lanes.tracking import next_row, place_on
@@ -79,7 +79,7 @@ def gap_to(
     if half_length + half_width + o_length + o_width == 0.0:
         return sqrt((ox - x) * (ox - x) + (oy - y) * (oy - y)) - rounding - o_rounding
     gap, _, _, _, _ = separation(
-        x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
+        Box(x, y, c, s, half_length, half_width, rounding), Box(ox, oy, oc, os, o_length, o_width, o_rounding)
     )
     return gap
 
