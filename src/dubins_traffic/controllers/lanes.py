@@ -207,10 +207,8 @@ class Lanes:
         """Note where the way is blocked, and plan again."""
         known = self._known
         assert known is not None
-        if blocker >= 0:
-            point = np.array((known.other[blocker].x, known.other[blocker].y))
-        else:
-            point = known.obstacles.part[-1 - blocker, :2]
+        body = known.other[blocker] if blocker >= 0 else known.obstacles.parts[-1 - blocker]
+        point = np.array((body.x, body.y))
         until = observation.time + FORGET
         vertex, far = self._network.nearest_intersection(point)
         pose = observation.pose

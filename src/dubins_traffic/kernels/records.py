@@ -223,3 +223,14 @@ def stack(tables: Sequence[Rows[R]]) -> Any:
     """Return a table of which each row of the first axis is one of some tables of equal lengths."""
     rows: Any = np.stack([cast(Any, own) for own in tables])
     return rows.view(type(tables[0]))
+
+
+def join(tables: Sequence[Rows[R]]) -> Rows[R]:
+    """Return a table of the rows of some tables, one after another."""
+    rows: Any = np.concatenate([cast(Any, own) for own in tables])
+    return rows.view(type(tables[0]))
+
+
+def numbers(rows: Rows[Any], kind: type[np.generic]) -> npt.NDArray[Any]:
+    """Return a table whose fields are all of one kind as an array of numbers, with a column for each field: a view."""
+    return np.asarray(rows).view(kind).reshape(*rows.shape, -1)

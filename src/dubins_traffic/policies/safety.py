@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from dubins_traffic.cars.state import Command, Pose
-from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.cars.tables import ObstacleTable, box_of
 from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -92,25 +92,16 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
     own = (abs(speed) + turns) * period
     if own == 0.0:
         return True
-    gap = _gap(body_at(pose, car), other)
+    gap, _, _, _, _ = separation(body_at(pose, car), other)
     if gap > own + travel + GUARD:
         return True
     least = gap
     last = gap
     for k in range(1, 5):
         nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, 0.25 * k * period)
-        last = _gap(body_at(Pose(nx, ny, nc, ns), car), other)
+        last, _, _, _, _ = separation(body_at(Pose(nx, ny, nc, ns), car), other)
         least = min(least, last)
     return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
-
-
-@jit
-def _gap(one: Box, other: Box) -> float:
-    gap, _, _, _, _ = separation(
-        one.x, one.y, one.c, one.s, one.half_length, one.half_width, one.rounding,
-        other.x, other.y, other.c, other.s, other.half_length, other.half_width, other.rounding,
-    )  # fmt: skip
-    return gap
 
 
 @jit_inline
@@ -137,12 +128,11 @@ def may_hit(
     The rest is as in `motion_is_safe`.
     """
     for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[k]
-        dx = row[0] - pose.x
-        dy = row[1] - pose.y
-        far = car.reach + row[7] + near
-        if dx * dx + dy * dy < far * far:
-            part = Box(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
-            if not motion_is_safe(pose, command, car, part, spread):
-                return True
+        part = obstacles.parts[k]
+        dx = part.x - pose.x
+        dy = part.y - pose.y
+        far = car.reach + part.reach + near
+        is_near = dx * dx + dy * dy < far * far
+        if is_near and not motion_is_safe(pose, command, car, box_of(part), spread):
+            return True
     return False

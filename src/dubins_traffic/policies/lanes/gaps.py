@@ -6,6 +6,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.cars.tables import box_of
 from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.knowledge import NOBODY, Follower, Knowledge, SeenCar
@@ -62,10 +63,7 @@ def gap_between(one: Box, other: Box) -> float:
         dx = other.x - one.x
         dy = other.y - one.y
         return sqrt(dx * dx + dy * dy) - one.rounding - other.rounding
-    gap, _, _, _, _ = separation(
-        one.x, one.y, one.c, one.s, one.half_length, one.half_width, one.rounding,
-        other.x, other.y, other.c, other.s, other.half_length, other.half_width, other.rounding,
-    )  # fmt: skip
+    gap, _, _, _, _ = separation(one, other)
     return gap
 
 
@@ -106,15 +104,14 @@ def first_conflict(
             is_near = car.tick == tick and k > 0 and dx * dx + dy * dy < near * near
             if is_near and comes_nearer(before, body, body_at(pose_of(car), vehicle), margin):
                 return k, n, nearest_sample(known, k, car.x, car.y)
-        for p in range(obstacles.part.shape[0]):
-            row = obstacles.part[p]
-            dx = row[0] - x
-            dy = row[1] - y
-            near = vehicle.reach + row[7] + still_margin
-            if k > 0 and dx * dx + dy * dy < near * near:
-                part = Box(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
-                if comes_nearer(before, body, part, still_margin):
-                    return k, -1 - p, nearest_sample(known, k, part.x, part.y)
+        for p in range(obstacles.parts.shape[0]):
+            part = obstacles.parts[p]
+            dx = part.x - x
+            dy = part.y - y
+            near = vehicle.reach + part.reach + still_margin
+            is_near = k > 0 and dx * dx + dy * dy < near * near
+            if is_near and comes_nearer(before, body, box_of(part), still_margin):
+                return k, -1 - p, nearest_sample(known, k, part.x, part.y)
         before = body
     return -1, NOBODY, -1
 

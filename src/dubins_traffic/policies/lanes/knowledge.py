@@ -132,10 +132,13 @@ class SeenCar:
     """Another car as the ego sees it."""
 
     x: float
+    """Its centre, metres."""
     y: float
+    """Its centre, metres."""
     c: float
+    """Cosine of its heading."""
     s: float
-    """Centre (x, y), metres, and heading (c, s)."""
+    """Sine of its heading."""
     speed: float
     """m/s."""
     yaw_rate: float
@@ -149,13 +152,17 @@ class Sample:
     """A place of the path ahead."""
 
     x: float
+    """Where it is, metres."""
     y: float
+    """Where it is, metres."""
     tx: float
+    """Of the unit vector along the path."""
     ty: float
-    """The place (x, y), metres, and the unit vector (tx, ty) along the path."""
+    """Of the unit vector along the path."""
     low: float
+    """`PathRow.low` there, metres."""
     high: float
-    """`PathRow.low` and `PathRow.high` there, metres."""
+    """`PathRow.high` there, metres."""
 
 
 class Knowledge(Tables):

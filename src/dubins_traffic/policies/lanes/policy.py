@@ -35,7 +35,7 @@ def decide(tick: int, x: float, y: float, c: float, s: float, known: Knowledge, 
     near = _watch(known)
     _find_place(known)
     wanted = known.vehicle.fastest
-    if near or known.obstacles.part.shape[0] > 0:
+    if near or known.obstacles.parts.shape[0] > 0:
         wanted = _speed_in_traffic(known)
     speed, yaw_rate = _follow(known, wanted)
     if not _is_safe(known, roads, Command(speed, yaw_rate)):

@@ -104,7 +104,7 @@ def _backs_up(known: Knowledge, cause: int) -> bool:
 def _nearest_body(known: Knowledge) -> int:
     """Return the sensed car nearest to the ego, or an obstacle's part if there is no car within 1 m."""
     best = 1.0
-    who = -1 if known.obstacles.part.shape[0] > 0 else NOBODY
+    who = -1 if known.obstacles.parts.shape[0] > 0 else NOBODY
     for n in range(known.other.shape[0]):
         if known.other[n].tick == known.follower.tick and known.gap[n] < best:
             best = known.gap[n]
