@@ -7,7 +7,7 @@ import importlib.util
 import re
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -132,6 +132,33 @@ def make(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
                 f"{name} is not a {seam.name}: it lacks the method {method}", spec, seam.signature
             )
     return made
+
+
+def make_strictly(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
+    """Do as `make`, for what a stranger's document names: only a class with the methods of the seam is called."""
+    if not isinstance(maker, type):
+        raise seam.refuse(f"{spec.rpartition(':')[2]} is not a class", spec, CLASS)
+    for method in seam.methods:
+        if not callable(getattr(maker, method, None)):
+            problem = f"{maker.__name__} is not a {seam.name}: it lacks the method {method}"
+            raise seam.refuse(problem, spec, seam.signature)
+    return make(maker, spec, seam)
+
+
+def parameters_of(made: Any, given: Mapping[str, Any], field: str) -> dict[str, Any]:
+    """Return all parameters of an object, whose attribute `parameters` holds the defaults.
+
+    Raises
+    ------
+    InputError
+        If one is given, in the field `field`, that it does not take.
+    """
+    defaults = dict(getattr(made, "parameters", {}))
+    for name in given:
+        if name not in defaults:
+            expected = f"one of {', '.join(defaults)}" if defaults else "no parameters"
+            raise InputError("unknown parameter", field=field, value=name, expected=expected)
+    return {**defaults, **given}
 
 
 def _load_file(place: str, spec: str, seam: Seam) -> ModuleType:

@@ -6,7 +6,7 @@ import numpy as np
 from shapely import LineString, Point, Polygon
 
 from dubins_traffic.cars.sensing import ray_box
-from dubins_traffic.kernels.boxes import NEVER, corner, separation
+from dubins_traffic.kernels.boxes import NEVER, Box, corner, separation
 
 
 def random_box(rng):
@@ -21,7 +21,7 @@ def as_shape(place, box):
     a, b, _ = box
     if a == b == 0:
         return Point(place[:2])
-    corners = [corner(k, *place, a, b) for k in (0, 1, 3, 2)]
+    corners = [corner(k, Box(*place, *box)) for k in (0, 1, 3, 2)]
     return LineString([corners[0], corners[3]]) if b == 0 else Polygon(corners)
 
 
@@ -30,7 +30,7 @@ def test_gaps_of_bodies() -> None:
     touching = 0
     for _ in range(10_000):
         (p, box), (q, other) = random_box(rng), random_box(rng)
-        gap, nx, ny, _, _ = separation(*p, *box, *q, *other)
+        gap, nx, ny, _, _ = separation(Box(*p, *box), Box(*q, *other))
         true = as_shape(p, box).distance(as_shape(q, other)) - box[2] - other[2]
         if true > 1e-6:
             assert abs(gap - true) < 1e-6 * max(1.0, true)
@@ -54,7 +54,7 @@ def test_rays() -> None:
             shape = shape.buffer(box[2], quad_segs=256)
         ray = LineString([origin, origin + 20 * direction])
         crossing = shape.intersection(ray)
-        ours = ray_box(*origin, *direction, *place, *box)
+        ours = ray_box(*origin, *direction, Box(*place, *box))
         if crossing.is_empty:
             grazes = shape.distance(ray) < 1e-4
             assert ours >= NEVER or grazes

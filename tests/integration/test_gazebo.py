@@ -14,10 +14,10 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.cars.body import Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
-from dubins_traffic.cars.sensing import scan
+from dubins_traffic.cars.sensing import Surroundings, rays_at, scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.kernels.records import numbers
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
@@ -266,22 +266,13 @@ def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> 
     wall = PolygonObstacle(((1.5, -1.0), (2.5, -1.0), (2.5, 2.0), (2.0, 0.0), (1.5, 1.0)))
     starts = [pose(0, 0), pose(1, 3, 1.0), pose(-1, 2, 0.5)]
     one = scene(starts, Car(body=body), [DiscObstacle(0, -2, 0.5), wall])
-    rays = np.array([sincos(float(angle)) for angle in np.linspace(-3.0, 3.0, 200)])
+    rays = rays_at(np.linspace(-3.0, 3.0, 200))
     simulator = Gazebo()
     state = simulator.reset([one])
-    seen = simulator.scan(0, rays, 5.0)
+    seen = simulator.scan(0, numbers(rays, np.float64), 5.0)
     expected = np.zeros(200)
-    scan(
-        state,
-        0,
-        0,
-        pack_cars([one.problem.car]),
-        pack_obstacles([one.problem.obstacles]),
-        rays,
-        0,
-        5,
-        expected,
-    )
+    around = Surroundings(state, pack_cars([one.problem.car]), pack_obstacles([one.problem.obstacles]))
+    scan(0, 0, 0.0, 5.0, rays, expected, around)
     contacts = [
         contact
         for _ in range(120)

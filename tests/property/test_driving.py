@@ -13,11 +13,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
-from dubins_traffic.cars.state import Observation, Pose, Propositions, Twist
+from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.lanes import Lanes
-from dubins_traffic.kernels.boxes import NEVER, box_contact, separation
+from dubins_traffic.kernels.boxes import NEVER, Box, Drive, box_contact, separation
+from dubins_traffic.kernels.records import table
 from dubins_traffic.kernels.trig import advance, sincos
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, VISIT, Site, along, shape
+from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.policies.safety import motion_is_safe
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
@@ -164,43 +166,19 @@ def test_a_safe_motion_meets_nobody_or_leads_away(
     a, h, r = (0.25, 0.15, 0.0) if box else (0.0, 0.0, 0.177)
     reach = math.hypot(0.25, 0.15) if box else 0.177
     c, s = sincos(other[2])
-    assume(separation(0.0, 0.0, 1.0, 0.0, a, h, r, other[0], other[1], c, s, a, h, r)[0] > 1e-6)
+    body, beside = Box(0.0, 0.0, 1.0, 0.0, a, h, r), Box(other[0], other[1], c, s, a, h, r)
+    assume(separation(body, beside)[0] > 1e-6)
     travel = (0.7 + (3.15 * reach if box else 0.0)) / 30
-    safe = motion_is_safe(
-        0.0, 0.0, 1.0, 0.0, *own, 1 / 30, a, h, r, reach, other[0], other[1], c, s, a, h, r, travel
-    )
-    assert motion_is_safe(
-        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1 / 30, a, h, r, reach, *other[:2], c, s, a, h, r, travel
-    )
+    car = table(Vehicle, 1)[0]
+    car.half_length, car.half_width, car.rounding, car.reach, car.period = a, h, r, reach, 1 / 30
+    origin = Pose(0.0, 0.0, 1.0, 0.0)
+    safe = motion_is_safe(origin, Command(*own), car, beside, travel)
+    assert motion_is_safe(origin, Command(0.0, 0.0), car, beside, travel)
     if not safe:
         return
-    met = box_contact(
-        0.0, 0.0, 1.0, 0.0, *own, 1.0, a, h, r, other[0], other[1], c, s, *its, 1.0, a, h, r, 0.0, 1 / 30
-    )
+    met = box_contact(body, Drive(*own, 1.0), beside, Drive(*its, 1.0), 0.0, 1 / 30)
     if met < NEVER:
-        stands = box_contact(
-            0.0,
-            0.0,
-            1.0,
-            0.0,
-            *own,
-            1.0,
-            a,
-            h,
-            r,
-            other[0],
-            other[1],
-            c,
-            s,
-            0.0,
-            0.0,
-            1.0,
-            a,
-            h,
-            r,
-            0.0,
-            1 / 30,
-        )
+        stands = box_contact(body, Drive(*own, 1.0), beside, Drive(0.0, 0.0, 0.0), 0.0, 1 / 30)
         assert stands == NEVER
 
 

@@ -10,7 +10,8 @@ from dubins_traffic.cars import near
 from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import pack_obstacles
-from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
+from dubins_traffic.kernels.boxes import NEVER, Box, Drive, box_contact, disc_contact, separation
+from dubins_traffic.kernels.records import numbers
 from dubins_traffic.kernels.trig import advance, sincos
 from dubins_traffic.simulators.embedded import Embedded
 from tests.batches import pose, scene
@@ -47,7 +48,7 @@ def test_motion_agrees_with_an_integrator(x, y, theta, u, w) -> None:
 
 def sampled_gap(a, b, shape_a, shape_b, t):
     pa, pb = advance(*a, t), advance(*b, t)
-    return separation(*pa, *shape_a, *pb, *shape_b)[0]
+    return separation(Box(*pa, *shape_a), Box(*pb, *shape_b))[0]
 
 
 @st.composite
@@ -65,10 +66,9 @@ def test_contact_is_the_first_zero_of_the_gap(pair, kind) -> None:
     shape_b = (0.4, 0.2, 0.0) if kind == "box" else (0.0, 0.0, 0.3)
     if sampled_gap(a, b, shape_a, shape_b, 0.0) < 1e-6:
         return
-    if kind == "disc":
-        when = disc_contact(*a, NEVER, *b, NEVER, 0.6, 0.0, DT)
-    else:
-        when = box_contact(*a, NEVER, *shape_a, *b, NEVER, *shape_b, 0.0, DT)
+    meet = disc_contact if kind == "disc" else box_contact
+    own, other = Box(*a[:4], *shape_a), Box(*b[:4], *shape_b)
+    when = meet(own, Drive(*a[4:], NEVER), other, Drive(*b[4:], NEVER), 0.0, DT)
     times = np.linspace(0, min(when, DT), 400)
     gaps = [sampled_gap(a, b, shape_a, shape_b, t) for t in times]
     assert min(gaps) > -1e-9
@@ -87,15 +87,10 @@ def test_cells_find_the_same_pairs_as_looking_at_all(seed) -> None:
     state.y[0] = rng.uniform(-4, 4, n)
     found = []
     none = pack_obstacles([[]])
-    pair = np.zeros((4000, 2), dtype=np.int64)
-    head, link, cell = (
-        np.zeros(128, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.zeros((n, 2), dtype=np.int64),
-    )
+    search = near.search_room(n, 4000)
     distance = rng.uniform(0.1, 1.5)
-    count = near.candidates(state, 0, distance, none, 0.1, pair, head, link, cell)
-    found = {tuple(sorted(row)) for row in pair[:count].tolist()}
+    count = near.candidates(0, distance, 0.1, state, none, search)
+    found = {tuple(sorted(row)) for row in numbers(search.pair, np.int64)[:count].tolist()}
     assert len(found) == count
     gaps = np.hypot(state.x[0][:, None] - state.x[0], state.y[0][:, None] - state.y[0])
     true = {(i, j) for i in range(n) for j in range(i + 1, n) if gaps[i, j] < distance}
@@ -141,7 +136,7 @@ def test_bodies_never_overlap_in_a_crowd(body) -> None:
             cars = np.stack([state.x[0], state.y[0], state.c[0], state.s[0]], axis=1)
             for i in range(10):
                 for j in range(i + 1, 10):
-                    assert separation(*cars[i], *box, *cars[j], *box)[0] > -3e-9
+                    assert separation(Box(*cars[i], *box), Box(*cars[j], *box))[0] > -3e-9
     assert touched > 10
 
 

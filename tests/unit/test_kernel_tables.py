@@ -33,6 +33,23 @@ class Outer(Tables):
     inner: Inner
 
 
+class Alone(Tables):
+    """A car and the road that it drives, (M,) metres."""
+
+    car: Car
+    road: Floats
+
+
+@jit
+def roll(alone: Alone) -> float:
+    """Drive along the road, and count its parts."""
+    car = alone.car
+    for k in range(alone.road.shape[0]):
+        car.waited += 1
+        car.speed += alone.road[k]
+    return car.speed
+
+
 @jit
 def drive(outer: Outer, b: int) -> float:
     """Let the cars of a trial drive, and count their ticks."""
@@ -82,3 +99,13 @@ def test_a_copy_has_arrays_of_its_own() -> None:
 def test_arrays_are_contiguous() -> None:
     with pytest.raises(TypeError, match="follow each other"):
         _ = Inner(table(Car, (2, 3)), np.zeros(4, dtype=np.int64)[::2]).address
+
+
+@pytest.mark.parametrize("call", [roll, getattr(roll, "py_func", roll)], ids=["as it is", "interpreted"])
+def test_a_row_stands_in_a_group_by_itself(call) -> None:
+    own = Alone(table(Car, 1)[0], np.array([1.0, 2.0]))
+    other = copy.deepcopy(own)
+    assert call(own) == 3.0
+    assert (own.car.waited, other.car.waited) == (2, 0)
+    assert call(other.replace(car=own.car)) == 6.0
+    assert own.car.waited == 4

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.body import Car, DiscObstacle, PolygonObstacle
-from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbours, scan
+from dubins_traffic.cars.sensing import Surroundings, blur, neighbours, nothing_seen, rays_at, scan
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.kernels.records import numbers
 
 
 def cars_at(*places):
@@ -19,24 +19,24 @@ def cars_at(*places):
 
 def test_neighbours_are_those_within_the_radius_in_order_of_index() -> None:
     state = cars_at((0, 0), (5.0, 0), (0, 5.0000001), (3, 4), (-1, 0))
-    reals, wholes = np.zeros((5, SEEN_REALS)), np.zeros((5, SEEN_WHOLES), dtype=np.int64)
-    count = neighbours(0, 0, 5.0, reals, wholes, state, Labels.zeros(1, 5))
-    assert wholes[:count, 0].tolist() == [0, 1, 3, 4]
-    assert reals[2, :2].tolist() == [3, 4]
-    assert wholes[1].tolist() == [1, 0, -1, -1, -1, 0]
+    seen = nothing_seen(5)
+    count = neighbours(0, 0, 5.0, seen, state, Labels.zeros(1, 5))
+    assert seen.labels["car"][:count].tolist() == [0, 1, 3, 4]
+    assert (seen.poses[2].x, seen.poses[2].y) == (3, 4)
+    assert numbers(seen.labels, np.int64)[1].tolist() == [1, 0, -1, -1, -1, 0]
 
 
 def test_neighbours_tell_whether_anything_but_places_has_changed() -> None:
     state, labels = cars_at((0, 0), (1, 0), (2, 0)), Labels.zeros(1, 3)
-    reals, wholes = np.zeros((3, SEEN_REALS)), np.full((3, SEEN_WHOLES), -1, dtype=np.int64)
+    seen = nothing_seen(3)
 
     def look() -> int:
-        return neighbours(0, 0, 5.0, reals, wholes, state, labels)
+        return neighbours(0, 0, 5.0, seen, state, labels)
 
     assert [look(), look()] == [3, -3]
     state.x[0, 1] = 1.5
     assert look() == -3
-    assert reals[1, 0] == 1.5
+    assert seen.poses[1].x == 1.5
     for change in (
         lambda: state.x[0].put(2, 6.0),
         lambda: labels.bits[0].put(1, 4),
@@ -46,17 +46,18 @@ def test_neighbours_tell_whether_anything_but_places_has_changed() -> None:
         count = look()
         assert count in (2, 3)
         assert look() == -count
-    assert wholes[:, 0].tolist() == [0, 1, 2]
-    assert wholes[1, 5] == 4
+    assert seen.labels["car"].tolist() == [0, 1, 2]
+    assert seen.labels[1].bits == 4
 
 
 def test_noise_has_the_asked_size_and_keeps_headings_unit() -> None:
     rows = []
     for tick in range(3000):
-        reals = np.zeros((2, SEEN_REALS))
-        reals[:, 2] = 1.0
-        blur(reals, np.array([[0] * 6, [1] * 6]), 2, np.uint64(9), 4, tick, 0.05, 0.1)
-        rows.append(reals)
+        seen = nothing_seen(2)
+        seen.poses["c"] = 1.0
+        seen.labels["car"] = [0, 1]
+        blur(seen, 2, np.uint64(9), 4, tick, 0.05, 0.1)
+        rows.append(numbers(seen.poses, np.float64))
     rows = np.array(rows)
     assert rows[:, :, :2].std(axis=0) == pytest.approx(0.05, rel=0.05)
     assert np.arctan2(rows[:, :, 3], rows[:, :, 2]).std(axis=0) == pytest.approx(0.1, rel=0.05)
@@ -70,9 +71,8 @@ def test_a_scan_of_the_2016_layout() -> None:
         [[DiscObstacle(0, 0.15, 0.1), PolygonObstacle(((3, 3), (4, 3), (4, 4), (3, 4)))]]
     )
     angles = np.linspace(-2, 2, 300)
-    rays = np.array([sincos(angle) for angle in angles])
     ranges = np.zeros(300)
-    scan(state, 0, 0, pack_cars([Car()]), obstacles, rays, 0.08, 5.0, ranges)
+    scan(0, 0, 0.08, 5.0, rays_at(angles), ranges, Surroundings(state, pack_cars([Car()]), obstacles))
 
     def at(angle):
         return ranges[int(np.abs(angles - angle).argmin())]

@@ -25,6 +25,7 @@ from dubins_traffic.agents.tables import (
     Stretch,
     Team,
     Trail,
+    wider,
     workspace,
 )
 from dubins_traffic.cars.state import Labels, State
@@ -128,8 +129,7 @@ class Fleet:
             done = reached
             if reached < 0:
                 done = -1 - reached
-                pairs = 4 * len(self._work.pair)
-                self._work = self._work.replace(pair=np.zeros((pairs, 2), dtype=np.int64))
+                self._work = wider(self._work)
                 self._scene = self._scene.replace(space=self._work)
 
 

@@ -18,7 +18,7 @@ from dubins_traffic.agents.tables import (
     Team,
 )
 from dubins_traffic.agents.trail import follow
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import Command, Pose, State
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import below
@@ -29,7 +29,6 @@ from dubins_traffic.routing.lane_graph import FAR, aim_for, frame, lane_at, plac
 
 AIM = 0.6
 """How far along the lane's line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""
-Numbers = tuple[float, float, float, float]
 TURN_DRAW = 1
 TIRES = 4.0
 """Mean time for which a car whose patience ended waits for its way to be clear before it turns round, seconds."""
@@ -39,7 +38,7 @@ BACK = -0.99
 
 @jit
 def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
-    """Write the commands of all e-agents of the trials from `begin` on.
+    """Write the commands of all e-agents of the trials from `begin` (trial) on.
 
     Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which is
     then untouched, like those after it.
@@ -55,7 +54,7 @@ def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
 def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
     """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
     state, agents, work = scene.state, scene.agents, scene.space
-    if look(scene, b) > work.pair.shape[0]:
+    if look(scene, b) > work.search.pair.shape[0]:
         return False
     ego = _pose(state, b, 0)
     for n in range(1, state.count[b]):
@@ -82,42 +81,40 @@ def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
 
 @jit
 def drive(
-    b: int, n: int, tick: int, pose: Numbers, seen: bool, weary: bool, scene: Scene
+    b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) of a car that drives to its waypoint, after choosing the next where it is time."""
+    """Return (speed, yaw rate) of a car that drives to its waypoint, after choosing the next where it is time.
+
+    `seen` (whether the ego is in sight) and `weary` (whether its patience has ended) decide which.
+    """
     team, agent = scene.agents.team[b], scene.agents.agent[b, n]
-    x, y, c, s = pose
+    most = Command(agent.speed, agent.yaw_rate)
     if team.curves != 0:
         navigate_arcs(b, n, tick, pose, seen, scene)
-        return pursue(
-            x, y, c, s, agent.goal_x, agent.goal_y, agent.speed, team.slowest, agent.yaw_rate, team.radius
-        )
-    dx = agent.goal_x - x
-    dy = agent.goal_y - y
+        return pursue(pose, agent.goal_x, agent.goal_y, most, team.slowest, team.radius)
+    dx = agent.goal_x - pose.x
+    dy = agent.goal_y - pose.y
     weary = weary and tires(tick, n, team)
     reached = agent.reached
     if weary or agent.lane < 0 or dx * dx + dy * dy < reached * reached:
         navigate(b, n, tick, pose, seen, weary, scene)
-    return turn_then_drive(
-        x, y, c, s, agent.goal_x, agent.goal_y, agent.tangent, agent.miss, agent.speed, agent.yaw_rate,
-        team.period,
-    )  # fmt: skip
+    return turn_then_drive(pose, agent.goal_x, agent.goal_y, most, agent.tangent, agent.miss, team.period)
 
 
 @jit
-def _pose(state: State, b: int, n: int) -> Numbers:
-    return state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+def _pose(state: State, b: int, n: int) -> Pose:
+    return Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
 
 
 @jit
-def hold(tick: int, pose: Numbers, ego: Numbers, held: int, agent: Agent) -> int:
-    """Return what holds a car: SEES for no motion, BARRED for no speed, TIGHT for no turning.
+def hold(tick: int, pose: Pose, ego: Pose, held: int, agent: Agent) -> int:
+    """Return what of `held` (bits) holds a car: SEES for no motion, BARRED for no speed, TIGHT for no turning.
 
     A car stands while it SEES something, and has no speed near the ego. When its patience ends, only what is in
     its way or too near holds it, and WEARY says that something is in its way.
     """
-    dx = ego[0] - pose[0]
-    dy = ego[1] - pose[1]
+    dx = ego.x - pose.x
+    dy = ego.y - pose.y
     berth = agent.berth
     beside = dx * dx + dy * dy <= berth * abs(berth)
     if held == 0 and not beside:
@@ -158,19 +155,23 @@ def play(tick: int, agent: Agent, script: Rows[Stretch]) -> tuple[float, float]:
 
 
 @jit
-def begin_lane(pose: Numbers, roads: RoadTable, net: int, agent: Agent, cycle: Ints, leg: int) -> None:
-    """Take the lane of the nearest segment that leads along the heading."""
-    lane = lane_at(roads, net, pose[0], pose[1], pose[2], pose[3])
+def begin_lane(pose: Pose, roads: RoadTable, net: int, agent: Agent, cycle: Ints, leg: int) -> None:
+    """Take the lane of the nearest segment that leads along the heading.
+
+    `cycle` (M,) are the lanes of loops; `leg` (number) is the new `Agent.leg`.
+    """
+    lane = lane_at(roads, net, pose)
     agent.lane = lane
     agent.leg = leg
     agent.place = place_of(lane, agent.first, agent.last, cycle)
 
 
 @jit
-def navigate(b: int, n: int, tick: int, pose: Numbers, seen: bool, weary: bool, scene: Scene) -> None:
+def navigate(b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene) -> None:
     """Set the next waypoint: the end of the lane; after turning round at an end first the start of the lane back.
 
-    A `weary` car turns round where it stands, others have reached their waypoint or begin to drive.
+    A car that is `weary` (whether) turns round where it stands, others have reached their waypoint or begin to drive.
+    Where the ego is `seen` (whether), it may be driven to.
     """
     roads, cycle = scene.roads, scene.agents.cycle
     net, agent = scene.agents.team[b].net, scene.agents.agent[b, n]
@@ -188,7 +189,7 @@ def navigate(b: int, n: int, tick: int, pose: Numbers, seen: bool, weary: bool, 
     else:
         agent.leg = 1
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    x0, y0, tx, ty, length = frame(roads, net, lane)
     progress = length if agent.leg == 1 else 0.0
     _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
 
@@ -202,39 +203,42 @@ def _aim_at(agent: Agent, x: float, y: float, tx: float, ty: float) -> None:
 
 
 @jit
-def navigate_arcs(b: int, n: int, tick: int, pose: Numbers, seen: bool, scene: Scene) -> None:
+def navigate_arcs(b: int, n: int, tick: int, pose: Pose, seen: bool, scene: Scene) -> None:
     """Set the waypoint of a car that can't turn in place: a point of its lane's line ahead.
 
     It chooses its next lane before the end of the present one and takes it where the arc between the two lines
-    begins.
+    begins. Where the ego is `seen` (whether), it may be driven to.
     """
     roads, team, agent = scene.roads, scene.agents.team[b], scene.agents.agent[b, n]
     net, radius, offset = team.net, team.radius, agent.offset
-    x, y, _, _ = pose
+    x, y = pose.x, pose.y
     if agent.lane < 0:
         begin_lane(pose, roads, net, agent, scene.agents.cycle, -1)
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    x0, y0, tx, ty, length = frame(roads, net, lane)
     ahead = length - (x - x0) * tx - (y - y0) * ty
     if agent.leg < 0 and ahead <= 2.0 * (offset + radius):
         agent.leg = choose(b, n, tick, lane, seen, scene)
     coming = agent.leg
     if coming >= 0:
-        _, _, ux, uy, _ = frame(roads.seg[roads.seg_off[net] + (coming >> 1)], coming)
+        _, _, ux, uy, _ = frame(roads, net, coming)
         along = tx * ux + ty * uy
         half = (tx * uy - ty * ux) / (1.0 + along) if along > BACK else 0.0
         if ahead <= radius * abs(half) - offset * half:
             lane = coming
             agent.lane = lane
             agent.leg = -1
-            x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+            x0, y0, tx, ty, length = frame(roads, net, lane)
     progress = (x - x0) * tx + (y - y0) * ty + max(AIM * team.w / 0.3, 2.0 * radius)
     _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
 
 
 @jit
 def choose(b: int, n: int, tick: int, lane: int, seen: bool, scene: Scene) -> int:
-    """Return the lane to take at the end of `lane`: round the cycle or to it, toward the ego if seen, or any."""
+    """Return the lane to take at the end of `lane`: round the cycle or to it, or any.
+
+    It leads toward the ego if that is `seen` (whether).
+    """
     roads, cycle = scene.roads, scene.agents.cycle
     team, agent = scene.agents.team[b], scene.agents.agent[b, n]
     place, first, last, net = agent.place, agent.first, agent.last, team.net
@@ -251,10 +255,10 @@ def choose(b: int, n: int, tick: int, lane: int, seen: bool, scene: Scene) -> in
     count = 0
     if seen:
         ego = _pose(scene.state, b, 0)
-        count = aim_for(lane_at(roads, net, ego[0], ego[1], ego[2], ego[3]), hops, queue, count)
+        count = aim_for(lane_at(roads, net, ego), hops, queue, count)
     for k in range(first, last):
         count = aim_for(cycle[k], hops, queue, count)
     spread(roads, net, hops, queue, count)
-    taken = nearer_exit(roads.arms, roads.degree, v, lane, hops)
+    taken = nearer_exit(roads, v, lane, hops)
     agent.place = place_of(taken, first, last, cycle)
     return taken

@@ -14,7 +14,7 @@ CHOICE_DRAW = 0
 
 @jit
 def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
-    """Return one of the lanes out of `v`, each equally likely, but the one back, which only a dead end gives."""
+    """Return a lane out of `v` for `car` (number), each equally likely; the one back only at a dead end."""
     arms, degree = roads.arms, roads.degree
     if degree[v] < 2:
         return lane ^ 1
@@ -28,8 +28,9 @@ def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick:
 
 
 @jit
-def nearer_exit(arms: Ints, degree: Ints, v: int, lane: int, hops: Ints) -> int:
-    """Return the lane out of `v` with the fewest hops to go; the one back where no other leads there."""
+def nearer_exit(roads: RoadTable, v: int, lane: int, hops: Ints) -> int:
+    """Return the lane out of `v` with the fewest of `hops` (L,) to go; the one back where no other leads there."""
+    arms, degree = roads.arms, roads.degree
     best = lane ^ 1
     fewest = FAR
     for k in range(degree[v]):

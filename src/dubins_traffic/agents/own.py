@@ -108,23 +108,10 @@ class OwnAgents:
 
 
 def _begun(instance: Instance, car: int, agent: EAgent) -> _Driven:
-    maker = outside.find(agent.type, _SEAM)
-    if not isinstance(maker, type):  # what a stranger's record names is not called unless it is such a class
-        raise _SEAM.refuse(f"{agent.type.rpartition(':')[2]} is not a class", agent.type, outside.CLASS)
-    for method in _SEAM.methods:
-        if not callable(getattr(maker, method, None)):
-            problem = f"{maker.__name__} is not a {_SEAM.name}: it lacks the method {method}"
-            raise _SEAM.refuse(problem, agent.type, _SEAM.signature)
-    driver = cast(OwnAgent, outside.make(maker, agent.type, _SEAM))
-    defaults = dict(getattr(driver, "parameters", {}))
-    for name in agent.parameters:
-        if name not in defaults:
-            expected = f"one of {', '.join(defaults)}" if defaults else "no parameters"
-            raise InputError(
-                "unknown parameter", field=f"e-agents[{car - 1}].parameters", value=name, expected=expected
-            )
+    driver = cast(OwnAgent, outside.make_strictly(outside.find(agent.type, _SEAM), agent.type, _SEAM))
+    parameters = outside.parameters_of(driver, agent.parameters, f"e-agents[{car - 1}].parameters")
     try:
-        driver.begin(instance, car, {**defaults, **agent.parameters})
+        driver.begin(instance, car, parameters)
     except Exception as error:
         problem = f"{agent.name} raised {outside.plainly(error)} in begin"
         raise _SEAM.refuse(problem, agent.type, "an e-agent that can begin") from error

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 from dubins_traffic.agents.tables import BARRED, SEES, TIGHT, Agent, Scene, Team
 from dubins_traffic.cars.near import candidates
-from dubins_traffic.kernels.boxes import nearest_in_box, separation
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.cars.tables import box_of
+from dubins_traffic.kernels.boxes import Box, nearest_in_box, separation
 from dubins_traffic.kernels.compile import jit
 
 COS_EDGE = -0.4161468365471424
@@ -17,30 +18,17 @@ ELBOW = 0.1
 """A car whose patience ended keeps this free ahead of its body, and what it drives in a tick, metres."""
 SHOULDER = 0.03
 """It keeps this free to either side of its body, metres."""
-Numbers = tuple[float, float, float, float]
-
-
-class Box(NamedTuple):
-    """A rounded box: its centre, its axis, its half extents along and across that, and by how much it is grown."""
-
-    x: float
-    y: float
-    c: float
-    s: float
-    half_length: float
-    half_width: float
-    rounding: float
 
 
 @jit
 def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
-    """Return whether a rounded box has a point nearer than `stop` to (x, y) and at most 2.0 rad off the heading.
+    """Return whether a rounded box has a point nearer than `stop` (m) to (x, y) and at most 2.0 rad off the heading.
 
     Exact: either the point of the box that is nearest lies in the sector, or else the nearest one in the sector
     lies on one of the sector's edges.
     """
-    ox, oy, oc, os, a, b, r = box
-    px, py = nearest_in_box(x, y, ox, oy, oc, os, a, b)
+    r = box.rounding
+    px, py = nearest_in_box(x, y, box)
     dx = px - x
     dy = py - y
     d = sqrt(dx * dx + dy * dy)
@@ -53,26 +41,24 @@ def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
         sine = SIN_EDGE if side == 0 else -SIN_EDGE
         ec = c * COS_EDGE - s * sine
         es = s * COS_EDGE + c * sine
-        gap, _, _, _, _ = separation(
-            x + half * ec, y + half * es, ec, es, half, 0.0, 0.0, ox, oy, oc, os, a, b, r
-        )  # fmt: skip
+        edge = Box(x + half * ec, y + half * es, ec, es, half, 0.0, 0.0)
+        gap, _, _, _, _ = separation(edge, box)
         if gap < 0.0:
             return True
     return False
 
 
 @jit
-def in_way(pose: Numbers, front: float, side: float, box: Box) -> bool:
-    """Return whether a rounded box meets the strip from a pose to `front` ahead, `side` to either side, metres."""
+def in_way(pose: Pose, front: float, side: float, box: Box) -> bool:
+    """Return whether a rounded box meets the strip from a pose to `front` (m) ahead, `side` (m) to either side."""
     x, y, c, s = pose
-    ox, oy, oc, os, a, b, r = box
     half = 0.5 * front
-    gap, _, _, _, _ = separation(x + half * c, y + half * s, c, s, half, side, 0.0, ox, oy, oc, os, a, b, r)
+    gap, _, _, _, _ = separation(Box(x + half * c, y + half * s, c, s, half, side, 0.0), box)
     return gap <= 0.0
 
 
 @jit
-def consider(pose: Numbers, team: Team, agent: Agent, box: Box) -> int:
+def consider(pose: Pose, team: Team, agent: Agent, box: Box) -> int:
     """Return the bits of `Workspace.held` that one body brings upon a car."""
     x, y, c, s = pose
     stop = agent.stop
@@ -87,7 +73,7 @@ def consider(pose: Numbers, team: Team, agent: Agent, box: Box) -> int:
     if in_way(pose, front, side, box):
         bits |= BARRED
     if half_length > 0.0:
-        px, py = nearest_in_box(x, y, box.x, box.y, box.c, box.s, box.half_length, box.half_width)
+        px, py = nearest_in_box(x, y, box)
         room = team.span - stop + SHOULDER + box.rounding
         if (px - x) * (px - x) + (py - y) * (py - y) < room * room:
             bits |= TIGHT
@@ -104,8 +90,8 @@ def look(scene: Scene, b: int) -> int:
     team = scene.agents.team[b]
     agents = scene.agents.agent
     span = team.span
-    found = candidates(state, b, span, obstacles, span, work.pair, work.head, work.link, work.cell)
-    if found > work.pair.shape[0]:
+    found = candidates(b, span, span, state, obstacles, work.search)
+    if found > work.search.pair.shape[0]:
         return found
     for n in range(state.count[b]):
         work.held[n] = 0
@@ -113,18 +99,16 @@ def look(scene: Scene, b: int) -> int:
     q = team.half_width
     r = team.rounding
     for k in range(found):
-        i = work.pair[k, 0]
-        j = work.pair[k, 1]
-        pose = (state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
+        i = work.search.pair[k].one
+        j = work.search.pair[k].other
+        pose = Pose(state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
         if j < 0:
-            row = obstacles.part[-1 - j]
-            box = Box(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
-            work.held[i] |= consider(pose, team, agents[b, i], box)
+            work.held[i] |= consider(pose, team, agents[b, i], box_of(obstacles.parts[-1 - j]))
             continue
-        other = (state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
+        other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         for _ in range(2):
             if work.held[i] == 0 or agents[b, i].patience >= 0:
-                box = Box(other[0], other[1], other[2], other[3], p, q, r)
+                box = Box(other.x, other.y, other.c, other.s, p, q, r)
                 work.held[i] |= consider(pose, team, agents[b, i], box)
             i, j = j, i
             pose, other = other, pose

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from dubins_traffic.cars.near import Search, search_room, widened
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Ints
@@ -169,10 +170,7 @@ class Agents(Tables):
 class Workspace(Tables):
     """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), why cars must stand, lanes."""
 
-    pair: Ints
-    head: Ints
-    link: Ints
-    cell: Ints
+    search: Search
     held: Ints
     hops: Ints
     queue: Ints
@@ -188,16 +186,15 @@ class Scene(Tables):
     space: Workspace
 
 
+def wider(space: Workspace) -> Workspace:
+    """Return scratch with room for four times as many pairs."""
+    return space.replace(search=widened(space.search))
+
+
 def workspace(cars: int, pairs: int, lanes: int) -> Workspace:
     """Return scratch for trials of up to `cars` cars, `pairs` pairs of neighbours and `lanes` lanes."""
-    buckets = 64
-    while buckets < 2 * cars:
-        buckets *= 2
     return Workspace(
-        pair=np.zeros((pairs, 2), dtype=np.int64),
-        head=np.zeros(buckets, dtype=np.int64),
-        link=np.zeros(cars, dtype=np.int64),
-        cell=np.zeros((cars, 2), dtype=np.int64),
+        search=search_room(cars, pairs),
         held=np.zeros(cars, dtype=np.int64),
         hops=np.zeros(lanes, dtype=np.int64),
         queue=np.zeros(lanes, dtype=np.int64),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import sqrt
 
 from dubins_traffic.agents.tables import STEP, Agent, Agents, Point, Team, Trail
+from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 
-Numbers = tuple[float, float, float, float]
 JUMP = 0.5
 """An ego that comes back into sight farther than this from where it was lost has left its path, metres."""
 JOIN = 0.75
@@ -25,23 +25,23 @@ STEEP = 1.0
 
 @jit
 def follow(
-    tick: int, b: int, n: int, pose: Numbers, ego: Numbers, free: bool, agents: Agents
+    tick: int, b: int, n: int, pose: Pose, ego: Pose, free: bool, agents: Agents
 ) -> tuple[bool, bool, float, float]:
     """Return whether the ego is in sight, whether the car shall drive on lanes, else its speed and yaw rate.
 
-    A car that is not `free` only looks.
+    A car that is not `free` (whether) only looks.
     """
     team, agent = agents.team[b], agents.agent[b, n]
     path, f = agents.point, agent.trail
     trail = agents.trail[f]
     scale = team.w / 0.3
     sight = agent.sight
-    dx = pose[0] - ego[0]
-    dy = pose[1] - ego[1]
+    dx = pose.x - ego.x
+    dy = pose.y - ego.y
     seen = dx * dx + dy * dy <= sight * sight
     if seen:
-        observe(tick, ego[0], ego[1], STEP * scale, path, f, trail)
-    if free and on_path(pose[0], pose[1], JOIN * scale, path, f, trail):
+        observe(tick, ego.x, ego.y, STEP * scale, path, f, trail)
+    if free and on_path(pose.x, pose.y, JOIN * scale, path, f, trail):
         agent.lane = -1
         speed, yaw_rate = track(pose, seen, team, agent, path, f, trail)
         return seen, False, speed, yaw_rate
@@ -50,7 +50,7 @@ def follow(
 
 @jit
 def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: int, trail: Trail) -> None:
-    """Remember the ego's place; one that comes back into sight elsewhere begins a new path."""
+    """Remember the ego's place every `step` (m) of row `f` (row); one that is back in sight elsewhere begins anew."""
     dx = x - trail.x
     dy = y - trail.y
     moved = sqrt(dx * dx + dy * dy)
@@ -77,7 +77,7 @@ def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: in
 
 @jit
 def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: Trail) -> bool:
-    """Return whether the car is on the ego's path: from when any point of it is near, the newest first."""
+    """Return whether the car is on the ego's path, row `f` (row): from when a point of it is within `near` (m)."""
     if trail.aimed < 0:
         written = trail.written
         for k in range(written - 1, max(written - path.shape[1], -1), -1):
@@ -92,10 +92,13 @@ def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: T
 
 @jit
 def track(
-    pose: Numbers, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
+    pose: Pose, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) along the ego's path; gives the path up at its end when the ego is out of sight."""
-    x, y, c, s = pose
+    """Return (speed, yaw rate) along the ego's path, row `f` (row).
+
+    The car gives it up at its end when the ego is not `seen` (whether).
+    """
+    x, y = pose.x, pose.y
     near = max(AHEAD * team.w / 0.3, team.radius)
     aimed = trail.aimed
     gx, gy, d = _aim(x, y, aimed, path, f)
@@ -114,11 +117,12 @@ def track(
         trail.aimed = -1
         trail.written = 0
         return 0.0, 0.0
+    most = Command(speed, yaw)
     if team.curves == 0:
-        _, turn = turn_then_drive(x, y, c, s, gx, gy, STEEP, NEVER, speed, yaw, team.period)
+        _, turn = turn_then_drive(pose, gx, gy, most, STEEP, NEVER, team.period)
         if turn != 0.0:
             return 0.0, turn
-    return pursue(x, y, c, s, gx, gy, speed, team.slowest, yaw, team.radius)
+    return pursue(pose, gx, gy, most, team.slowest, team.radius)
 
 
 @jit

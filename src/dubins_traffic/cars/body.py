@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from dubins_traffic.errors import InputError
 
 KOBUKI_RADIUS = 0.177
+DUBINS = "dubins"
+"""The car model that is built in: what is asked for holds at once and for the whole tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +99,15 @@ class Car:
     """A car; all cars of a trial are alike.
 
     `w` is the nominal width in metres that sets the roads: lanes are 2w wide, roads 4w (paper, II.A). The body
-    that collides is `body`.
+    that collides is `body`. `model` says how it moves (`cars.dynamics`): the name of a model or where its class is;
+    `parameters` are those given to it.
     """
 
     w: float = 0.3
     body: Body = field(default_factory=Disc)
     bounds: Bounds = field(default_factory=Bounds)
+    model: str = DUBINS
+    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any], hash=False)
 
     def __post_init__(self) -> None:
         _positive("w", self.w)

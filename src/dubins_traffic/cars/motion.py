@@ -6,42 +6,47 @@ Loops over trials and cars; the element functions are in `kernels.trig` and `ker
 from __future__ import annotations
 
 from dubins_traffic.cars.near import FEW, candidates
-from dubins_traffic.cars.partners import PARTNERS, VACANT, Workspace, part
+from dubins_traffic.cars.partners import PARTNERS, VACANT, Meeting, Workspace, part
 from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
 from dubins_traffic.cars.state import State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable
-from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.boxes import NEVER, box_contact, disc_contact, separation
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.boxes import (
+    NEVER,
+    Box,
+    Drive,
+    box_contact,
+    disc_contact,
+    driven,
+    held,
+    separation,
+)
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
 MOVED, FULL, CROWDED = range(3)
+"""What became of a trial: it has moved; there is no room for its contacts; there is none for its pairs."""
+
+
+class Motion(Tables):
+    """All that moving takes; while a tick is moved, `State.speed` and `State.yaw_rate` are the clipped commands."""
+
+    state: State
+    obstacles: ObstacleTable
+    cars: CarTable
+    rows: Rows
+    work: Workspace
 
 
 @jit
-def step(
-    first: int, dt: float, commands: Floats, state: State, cars: CarTable, obstacles: ObstacleTable, r: Rows,
-    work: Workspace,
-) -> int:  # fmt: skip
-    """Clip the commands in place and move trials `first`... for one tick of `dt` seconds.
+def step(first: int, dt: float, commands: Floats, motion: Motion) -> int:
+    """Clip the commands in place and move trials `first` (index)... for one tick.
 
-    Parameters
-    ----------
-    first : int
-        The first trial to move.
-    dt : float
-        Seconds.
-    commands : array (B, N, 2)
-        Speed and yaw rate of every car.
-    state, cars, obstacles, r, work
-        The batch.
-
-    Returns
-    -------
-    int
-        The number of trials B when all have moved, or the trial before which it stopped because the buffer of
-        contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
+    Returns the number of trials B when all have moved, or the trial before which it stopped because the buffer of
+    contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
     """
+    state, obstacles, r, work = motion.state, motion.obstacles, motion.rows, motion.work
     work.found[0] = 0
     trials, n = state.x.shape
     total = trials * n
@@ -59,69 +64,82 @@ def step(
             if n <= FEW and empty and not _any_close(r, k - b, n):
                 continue
             if work.found[0] + n > work.contact.shape[0]:
-                _pass_on(state, cars, obstacles, dt, work, begin, k)
+                _pass_on(begin, k, dt, motion)
                 return k
-            pairs = candidates(
-                state, k, 2.0 * r.far[k], obstacles, r.far[k], work.pair, work.head, work.link, work.cell
-            )
-            if pairs > work.pair.shape[0]:
-                _pass_on(state, cars, obstacles, dt, work, begin, k)
+            pairs = candidates(k, 2.0 * r.far[k], r.far[k], state, obstacles, work.search)
+            if pairs > work.search.pair.shape[0]:
+                _pass_on(begin, k, dt, motion)
                 return -1 - k
             if pairs > 0:
-                _pass_on(state, cars, obstacles, dt, work, begin, k)
-                _resolve(state, commands, cars, obstacles, dt, work, k, pairs)
-                part(state, cars, obstacles, work, k)
+                _pass_on(begin, k, dt, motion)
+                _resolve(k, pairs, dt, motion)
+                part(state, motion.cars, obstacles, work, k)
                 begin = k + 1
-        _pass_on(state, cars, obstacles, dt, work, begin, last)
+        _pass_on(begin, last, dt, motion)
         b = last
     return trials
 
 
 @jit
-def step_trial(
-    b: int,
-    dt: float,
-    least: float,
-    state: State,
-    commands: Floats,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    r: Rows,
-    work: Workspace,
-) -> int:
+def step_trial(b: int, dt: float, least: float, commands: Floats, motion: Motion) -> int:
     """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
 
     No two cars are nearer to each other than `least` (m), or nothing is known of that (0).
     Returns MOVED, or what is too small, FULL for the buffer of contacts or CROWDED for that of pairs: then nothing
     has moved.
     """
-    n = state.x.shape[1]
-    if work.found[0] + n > work.contact.shape[0]:
+    state, work = motion.state, motion.work
+    if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
         return FULL
+    clip(motion.rows, b, commands[b], state.speed[b], state.yaw_rate[b], 0, state.count[b])
+    return _move_trial(b, dt, least, motion)
+
+
+@jit
+def step_part(dt: float, arcs: Floats, stands: Ints, motion: Motion) -> int:
+    """Move trial 0 on arcs for a part of a tick, `dt` (s) long; add its contacts to those found.
+
+    `arcs` (1, N, 2), speed (m/s) and yaw rate (rad/s), are clipped in place; cars of which `stands` (N,) is not 0 have
+    been fixed by a contact before, and stand. `Workspace.until` tells of the cars that one fixes now.
+    """
+    state, work = motion.state, motion.work
+    if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
+        return FULL
+    clip(motion.rows, 0, arcs[0], state.speed[0], state.yaw_rate[0], 0, state.count[0])
+    for n in range(state.count[0]):
+        work.until[n] = NEVER
+        if stands[n] != 0:
+            state.speed[0, n] = 0.0
+            state.yaw_rate[0, n] = 0.0
+    return _move_trial(0, dt, 0.0, motion)
+
+
+@jit_inline
+def _move_trial(b: int, dt: float, least: float, motion: Motion) -> int:
+    """Move trial b, whose commands are clipped, as `step_trial` does."""
+    state, obstacles, r, work = motion.state, motion.obstacles, motion.rows, motion.work
+    n = state.x.shape[1]
     cars_here = state.count[b]
-    clip(r, b, commands[b], state.speed[b], state.yaw_rate[b], 0, cars_here)
     pairs = 0
     close = obstacles.off[b] != obstacles.off[b + 1]
     if not close and least <= 2.0 * r.far[b]:
         close = n > FEW or any_near(state.x[b], state.y[b], cars_here, r.near[b])
     if close:
-        pairs = candidates(
-            state, b, 2.0 * r.far[b], obstacles, r.far[b], work.pair, work.head, work.link, work.cell
-        )
-        if pairs > work.pair.shape[0]:
+        pairs = candidates(b, 2.0 * r.far[b], r.far[b], state, obstacles, work.search)
+        if pairs > work.search.pair.shape[0]:
             return CROWDED
     if pairs > 0:
-        _resolve(state, commands, cars, obstacles, dt, work, b, pairs)
-        part(state, cars, obstacles, work, b)
+        _resolve(b, pairs, dt, motion)
+        part(state, motion.cars, obstacles, work, b)
         return MOVED
+    x, y, c, s, speed, yaw = state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b]
     if n % TOGETHER == 0:
-        move_fours(state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt)
+        move_fours(x, y, c, s, speed, yaw, dt)
     else:
-        move(
-            state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b], dt, 0, cars_here
-        )  # fmt: skip
+        k = cars_here
+        move(x[:k], y[:k], c[:k], s[:k], speed[:k], yaw[:k], dt)
     if work.touching[b] > 0:
-        part(state, cars, obstacles, work, b)
+        part(state, motion.cars, obstacles, work, b)
     return MOVED
 
 
@@ -134,182 +152,158 @@ def _any_close(r: Rows, trial: int, n: int) -> bool:
 
 
 @jit
-def _pass_on(
-    state: State, cars: CarTable, obstacles: ObstacleTable, dt: float, work: Workspace, first: int, last: int
-) -> None:
+def _pass_on(first: int, last: int, dt: float, motion: Motion) -> None:
     """Move the trials first..last - 1, in which nothing can meet."""
+    state, work = motion.state, motion.work
     trials, n = state.x.shape
     total = trials * n
+    i, j = first * n, last * n
     move(
-        state.x.reshape(total), state.y.reshape(total), state.c.reshape(total), state.s.reshape(total),
-        state.speed.reshape(total), state.yaw_rate.reshape(total), dt, first * n, last * n,
+        state.x.reshape(total)[i:j], state.y.reshape(total)[i:j], state.c.reshape(total)[i:j],
+        state.s.reshape(total)[i:j], state.speed.reshape(total)[i:j], state.yaw_rate.reshape(total)[i:j], dt,
     )  # fmt: skip
     for b in range(first, last):
         if work.touching[b] > 0:
-            part(state, cars, obstacles, work, b)
+            part(state, motion.cars, motion.obstacles, work, b)
+
+
+@jit_inline
+def _drive(b: int, n: int, until: float, state: State) -> Drive:
+    return Drive(state.speed[b, n], state.yaw_rate[b, n], until)
 
 
 @jit
-def _move(state: State, b: int, i: int, speed: float, yaw: float, until: float, dt: float) -> None:
-    x, y, c, s = advance(
-        state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i], speed, yaw, min(until, dt)
-    )
-    state.x[b, i] = x
-    state.y[b, i] = y
-    state.c[b, i] = c
-    state.s[b, i] = s
-    state.speed[b, i] = speed if until >= dt else 0.0
-    state.yaw_rate[b, i] = yaw if until >= dt else 0.0
-
-
-@jit
-def _meet(
-    state: State,
-    commands: Floats,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    until: Floats,
-    b: int,
-    i: int,
-    j: int,
-    begin: float,
-    dt: float,
-) -> float:
+def _meet(b: int, i: int, j: int, begin: float, dt: float, motion: Motion) -> float:
     """Return when car i meets j, a car or obstacle part -1 - p, after `begin`; NEVER if not in this tick."""
-    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
-    x, y, c, s = state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i]
-    u, w = commands[b, i, 0], commands[b, i, 1]
+    state, cars, until = motion.state, motion.cars, motion.work.until
+    one, drive = box_at(b, i, state, cars), _drive(b, i, until[i], state)
     if j < 0:
-        p = obstacles.part[-1 - j]
-        return box_contact(
-            x, y, c, s, u, w, until[i], a, h, r,
-            p[0], p[1], p[2], p[3], 0.0, 0.0, 0.0, p[4], p[5], p[6], begin, dt,
-        )  # fmt: skip
-    if a + h == 0.0:
-        return disc_contact(
-            x, y, c, s, u, w, until[i],
-            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], commands[b, j, 0], commands[b, j, 1],
-            until[j], 2.0 * r, begin, dt,
-        )  # fmt: skip
-    return box_contact(
-        x, y, c, s, u, w, until[i], a, h, r,
-        state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], commands[b, j, 0], commands[b, j, 1],
-        until[j], a, h, r, begin, dt,
-    )  # fmt: skip
+        other = box_of(motion.obstacles.parts[-1 - j])
+        return box_contact(one, drive, other, Drive(0.0, 0.0, 0.0), begin, dt)
+    other = box_at(b, j, state, cars)
+    its = _drive(b, j, until[j], state)
+    if one.half_length + one.half_width == 0.0:
+        return disc_contact(one, drive, other, its, begin, dt)
+    return box_contact(one, drive, other, its, begin, dt)
 
 
 @jit
-def _resolve(
-    state: State,
-    commands: Floats,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    dt: float,
-    work: Workspace,
-    b: int,
-    pairs: int,
-) -> None:
+def _resolve(b: int, pairs: int, dt: float, motion: Motion) -> None:
     """Move trial b with its candidate pairs: fix both cars at the earliest contact, search on, then move all."""
-    until = work.until
-    for i in range(state.count[b]):
-        until[i] = NEVER
+    state, work = motion.state, motion.work
+    until, when, pair = work.until, work.when, work.search.pair
+    for n in range(state.count[b]):
+        until[n] = NEVER
     for k in range(pairs):
-        work.when[k] = _meet(
-            state, commands, cars, obstacles, until, b, work.pair[k, 0], work.pair[k, 1], 0.0, dt
-        )
+        when[k] = _meet(b, pair[k].one, pair[k].other, 0.0, dt, motion)
     while True:
         first = -1
         for k in range(pairs):
-            if work.when[k] < NEVER and (first < 0 or _before(work, k, first)):
+            if when[k] < NEVER and (first < 0 or _before(work, k, first)):
                 first = k
         if first < 0:
             break
-        now = work.when[first]
-        i = work.pair[first, 0]
-        j = work.pair[first, 1]
-        _note(state, commands, cars, obstacles, work, b, i, j, now)
+        now = when[first]
+        i = pair[first].one
+        j = pair[first].other
+        _note(b, i, j, now, motion)
         until[i] = min(until[i], now)
         if j >= 0:
             until[j] = min(until[j], now)
         for k in range(pairs):
-            m = work.pair[k, 0]
-            o = work.pair[k, 1]
+            m = pair[k].one
+            o = pair[k].other
             if i in (m, o) or (j >= 0 and j in (m, o)):
                 fixed = until[m] <= now and (o < 0 or until[o] <= now)
-                work.when[k] = NEVER
+                when[k] = NEVER
                 if not fixed:
-                    work.when[k] = _meet(state, commands, cars, obstacles, until, b, m, o, now, dt)
-    for i in range(state.count[b]):
-        _move(state, b, i, commands[b, i, 0], commands[b, i, 1], until[i], dt)
+                    when[k] = _meet(b, m, o, now, dt, motion)
+    for n in range(state.count[b]):
+        _move(b, n, until[n], dt, state)
+
+
+@jit
+def _move(b: int, n: int, until: float, dt: float, state: State) -> None:
+    speed, yaw = state.speed[b, n], state.yaw_rate[b, n]
+    x, y, c, s = advance(
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw, min(until, dt)
+    )
+    state.x[b, n] = x
+    state.y[b, n] = y
+    state.c[b, n] = c
+    state.s[b, n] = s
+    state.speed[b, n] = speed if until >= dt else 0.0
+    state.yaw_rate[b, n] = yaw if until >= dt else 0.0
 
 
 @jit
 def _before(work: Workspace, k: int, m: int) -> bool:
     if work.when[k] != work.when[m]:
         return work.when[k] < work.when[m]
-    if work.pair[k, 0] != work.pair[m, 0]:
-        return work.pair[k, 0] < work.pair[m, 0]
-    return work.pair[k, 1] < work.pair[m, 1]
+    one, other = work.search.pair[k], work.search.pair[m]
+    return one.one < other.one if one.one != other.one else one.other < other.other
+
+
+@jit_inline
+def _moved(box: Box, drive: Drive) -> int:
+    """Return 1 if a body moves or, being a rectangle, turns, else 0."""
+    turned = drive.yaw_rate != 0.0 and box.half_length > 0.0
+    return 1 if drive.speed != 0.0 or turned else 0
 
 
 @jit
-def _pose(
-    state: State, commands: Floats, until: Floats, b: int, i: int, now: float
-) -> tuple[float, float, float, float]:
-    return advance(
-        state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i],
-        commands[b, i, 0], commands[b, i, 1], min(now, until[i]),
-    )  # fmt: skip
-
-
-@jit
-def _moved(cars: CarTable, b: int, speed: float, yaw: float) -> float:
-    turned = yaw != 0.0 and cars.half_length[b] > 0.0
-    return 1.0 if speed != 0.0 or turned else 0.0
-
-
-@jit
-def _note(
-    state: State,
-    commands: Floats,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    work: Workspace,
-    b: int,
-    i: int,
-    j: int,
-    now: float,
-) -> None:
-    """Write down the contact of car i with j (a car, or obstacle part -1 - p), unless they touched already."""
-    other = j if j >= 0 else -1 - obstacles.owner[-1 - j]
+def _enter(b: int, i: int, other: int, work: Workspace) -> bool:
+    """Let car i touch `other`, a car or obstacle -1 - k; tell whether it did not before."""
     free = -1
     for k in range(PARTNERS):
         if work.partner[b, i, k] == other:
-            return
+            return False
         if free < 0 and work.partner[b, i, k] == VACANT:
             free = k
     if free >= 0:
         work.partner[b, i, free] = other
         work.touching[b] += 1
-    a, h, r = cars.half_length[b], cars.half_width[b], cars.rounding[b]
-    x0, y0, c0, s0 = _pose(state, commands, work.until, b, i, now)
-    v0, w0 = (commands[b, i, 0], commands[b, i, 1]) if now < work.until[i] else (0.0, 0.0)
+    return True
+
+
+@jit
+def _note(b: int, i: int, j: int, now: float, motion: Motion) -> None:
+    """Write down the contact of car i with j (a car, or obstacle part -1 - p), unless they touched already."""
+    state, cars, work = motion.state, motion.cars, motion.work
+    other = j if j >= 0 else -1 - motion.obstacles.parts[-1 - j].owner
+    if not _enter(b, i, other, work):
+        return
+    drive = _drive(b, i, work.until[i], state)
+    own = driven(box_at(b, i, state, cars), drive, now)
+    its = Drive(0.0, 0.0, 0.0)
     if j >= 0:
-        x1, y1, c1, s1 = _pose(state, commands, work.until, b, j, now)
-        v1, w1 = (commands[b, j, 0], commands[b, j, 1]) if now < work.until[j] else (0.0, 0.0)
-        _, nx, ny, px, py = separation(x0, y0, c0, s0, a, h, r, x1, y1, c1, s1, a, h, r)
-        moved = _moved(cars, b, commands[b, j, 0], commands[b, j, 1])
+        its = _drive(b, j, work.until[j], state)
+        hit = driven(box_at(b, j, state, cars), its, now)
     else:
-        p = obstacles.part[-1 - j]
-        x1, y1, c1, s1, v1, w1, moved = p[0], p[1], p[2], p[3], 0.0, 0.0, 0.0
-        _, nx, ny, px, py = separation(x0, y0, c0, s0, a, h, r, x1, y1, c1, s1, p[4], p[5], p[6])
-    row = work.contact[work.found[0]]
-    row[0], row[1], row[2], row[3] = b, i, other, now
-    row[4], row[5], row[6], row[7] = px, py, nx, ny
-    turn0 = w0 if a > 0.0 else 0.0
-    turn1 = w1 if a > 0.0 else 0.0
-    row[8] = nx * (v0 * c0 - turn0 * (py - y0)) + ny * (v0 * s0 + turn0 * (px - x0))
-    row[9] = -(nx * (v1 * c1 - turn1 * (py - y1)) + ny * (v1 * s1 + turn1 * (px - x1)))
-    row[10] = _moved(cars, b, commands[b, i, 0], commands[b, i, 1])
-    row[11] = moved
+        hit = box_of(motion.obstacles.parts[-1 - j])
+    _, nx, ny, px, py = separation(own, hit)
+    number: int = work.found[0]
+    row = work.contact[number]
+    row.b = b
+    row.car = i
+    row.other = other
+    row.time = now
+    row.px = px
+    row.py = py
+    row.nx = nx
+    row.ny = ny
+    row.closing = _closing(own, drive, now, row)
+    row.other_closing = -_closing(hit, its, now, row)
+    row.moved = _moved(own, drive)
+    row.other_moved = _moved(hit, its)
     work.found[0] += 1
+
+
+@jit
+def _closing(box: Box, drive: Drive, now: float, row: Meeting) -> float:
+    """Return the speed of a body's point of contact along the normal, m/s."""
+    speed, yaw, _ = held(drive, now)
+    turn = yaw if box.half_length > 0.0 else 0.0
+    return row.nx * (speed * box.c - turn * (row.py - box.y)) + row.ny * (
+        speed * box.s + turn * (row.px - box.x)
+    )

@@ -10,6 +10,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 
 FEW = 24
@@ -22,12 +23,58 @@ LONG = 1e6
 """Ticks beyond which it does not matter how many they are."""
 
 
+@record
+class Pair:
+    """Two that may meet: car `one`, and `other`, a car or part -1 - p of an obstacle."""
+
+    one: int
+    other: int
+
+
+@record
+class Place:
+    """The cell (`kx`, `ky`) in which a car is."""
+
+    kx: int
+    ky: int
+
+
+class Search(Tables):
+    """Room in which pairs are looked for.
+
+    `pair` (P,). `head` (H,), H a power of two, `link` (N,) and `cell` (N,): the cars in buckets of cells.
+    """
+
+    pair: Rows[Pair]
+    head: Ints
+    link: Ints
+    cell: Rows[Place]
+
+
+def search_room(cars: int, pairs: int) -> Search:
+    """Return room in which `pairs` pairs of `cars` cars can be found."""
+    buckets = 64
+    while buckets < 2 * cars:
+        buckets *= 2
+    return Search(
+        table(Pair, pairs),
+        np.zeros(buckets, dtype=np.int64),
+        np.zeros(cars, dtype=np.int64),
+        table(Place, cars),
+    )
+
+
+def widened(search: Search) -> Search:
+    """Return room for four times as many pairs."""
+    return search.replace(pair=table(Pair, 4 * len(search.pair)))
+
+
 class Spacing(Tables):
     """How far apart the cars of a batch are, as of frame `since` (B,) of each trial.
 
     `apart` (B, N): distance from each car's centre to the nearest other one's, metres, or less; `least` (B,): the least
     of these; `drift` (B,): metres
-    that a car can move in a tick. `head` (B, H), `link` (B, N) and `cell` (B, N, 2): the cars in buckets of cells, with
+    that a car can move in a tick. `head` (B, H), `link` (B, N) and `cell` (B, N): the cars in buckets of cells, with
     H = 0 where there are few or nothing is known; `near` (N,): scratch.
     """
 
@@ -37,7 +84,7 @@ class Spacing(Tables):
     drift: Floats
     head: Ints
     link: Ints
-    cell: Ints
+    cell: Grid[Place]
     near: Ints
 
 
@@ -53,7 +100,7 @@ def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
         drift,
         np.zeros((trials, buckets), dtype=np.int64),
         np.zeros((trials, cars), dtype=np.int64),
-        np.zeros((trials, cars, 2), dtype=np.int64),
+        table(Place, (trials, cars)),
         np.zeros(cars, dtype=np.int64),
     )
 
@@ -99,18 +146,18 @@ def _bucket(kx: int, ky: int, size: int) -> int:
 
 
 @jit_inline
-def _first_in_cell(n: int, kx: int, ky: int, link: Ints, cell: Ints) -> int:
+def _first_in_cell(n: int, kx: int, ky: int, link: Ints, cell: Rows[Place]) -> int:
     """Return the first car of cell (kx, ky) among car n and those after it in its bucket; -1 if there is none."""
-    while n >= 0 and not (cell[n, 0] == kx and cell[n, 1] == ky):
+    while n >= 0 and not (cell[n].kx == kx and cell[n].ky == ky):
         n = link[n]
     return n
 
 
 @jit_inline
-def _enter_cell(n: int, kx: int, ky: int, head: Ints, link: Ints, cell: Ints) -> None:
+def _enter_cell(n: int, kx: int, ky: int, head: Ints, link: Ints, cell: Rows[Place]) -> None:
     """Put car n into the bucket of cell (kx, ky)."""
-    cell[n, 0] = kx
-    cell[n, 1] = ky
+    cell[n].kx = kx
+    cell[n].ky = ky
     here = _bucket(kx, ky, head.shape[0])
     link[n] = head[here]
     head[here] = n
@@ -139,7 +186,7 @@ def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
 
 
 @jit
-def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Ints, cell: Ints) -> None:
+def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Ints, cell: Rows[Place]) -> None:
     """Lower `apart` (N,) to the squared distances to the nearest cars, where they are less; fill the buckets."""
     size = head.shape[0]
     for k in range(size):
@@ -181,44 +228,40 @@ def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, o
 
 @jit
 def candidates(
-    state: State,
-    b: int,
-    distance: float,
-    obstacles: ObstacleTable,
-    margin: float,
-    pair: Ints,
-    head: Ints,
-    link: Ints,
-    cell: Ints,
+    b: int, distance: float, margin: float, state: State, obstacles: ObstacleTable, search: Search
 ) -> int:
-    """Write the pairs of trial b that may meet into `pair` (P, 2) and return how many there are.
+    """Write the pairs of trial b that may meet into `Search.pair` and return how many there are.
 
     Cars i < j whose centres are nearer than `distance` (m), and (i, -1 - p) for obstacle part p whose reach plus
-    `margin` (m) holds the centre of i. If more than P, the surplus is counted but not written. `head` (H,), H a power
-    of two, `link` (N,) and `cell` (N, 2) are scratch.
+    `margin` (m) holds the centre of i. If there are more than there is room for, the surplus is counted but not
+    written.
     """
     if state.count[b] <= FEW:
-        found = _all_pairs(state, b, distance, pair)
+        found = _all_pairs(state, b, distance, search.pair)
     else:
-        found = _cell_pairs(state, b, distance, pair, head, link, cell)
-    first = obstacles.off[b]
-    last = obstacles.off[b + 1]
-    for p in range(first, last):
-        row = obstacles.part[p]
-        far = row[7] + margin
+        found = _cell_pairs(state, b, distance, search)
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        part = obstacles.parts[p]
+        far = part.reach + margin
         for i in range(state.count[b]):
-            dx = state.x[b, i] - row[0]
-            dy = state.y[b, i] - row[1]
+            dx = state.x[b, i] - part.x
+            dy = state.y[b, i] - part.y
             if dx * dx + dy * dy < far * far:
-                if found < pair.shape[0]:
-                    pair[found, 0] = i
-                    pair[found, 1] = -1 - p
+                _keep_pair(found, i, -1 - p, search.pair)
                 found += 1
     return found
 
 
+@jit_inline
+def _keep_pair(found: int, i: int, j: int, pair: Rows[Pair]) -> None:
+    """Write pair number `found`, if there is room for it."""
+    if found < pair.shape[0]:
+        pair[found].one = i
+        pair[found].other = j
+
+
 @jit
-def _all_pairs(state: State, b: int, distance: float, pair: Ints) -> int:
+def _all_pairs(state: State, b: int, distance: float, pair: Rows[Pair]) -> int:
     n = state.count[b]
     x = state.x[b]
     y = state.y[b]
@@ -239,15 +282,14 @@ def _all_pairs(state: State, b: int, distance: float, pair: Ints) -> int:
             dx = x[j] - x[i]
             dy = y[j] - y[i]
             if dx * dx + dy * dy < limit:
-                if found < pair.shape[0]:
-                    pair[found, 0] = i
-                    pair[found, 1] = j
+                _keep_pair(found, i, j, pair)
                 found += 1
     return found
 
 
 @jit
-def _cell_pairs(state: State, b: int, distance: float, pair: Ints, head: Ints, link: Ints, cell: Ints) -> int:
+def _cell_pairs(state: State, b: int, distance: float, search: Search) -> int:
+    head, link, cell = search.head, search.link, search.cell
     n = state.count[b]
     size = head.shape[0]
     scale = 1.0 / distance
@@ -263,9 +305,7 @@ def _cell_pairs(state: State, b: int, distance: float, pair: Ints, head: Ints, l
                 i = _first_in_cell(head[_bucket(mx, my, size)], mx, my, link, cell)
                 while i >= 0:
                     if _distance2(state, b, i, j) < limit:
-                        if found < pair.shape[0]:
-                            pair[found, 0] = i
-                            pair[found, 1] = j
+                        _keep_pair(found, i, j, search.pair)
                         found += 1
                     i = _first_in_cell(link[i], mx, my, link, cell)
         _enter_cell(j, kx, ky, head, link, cell)

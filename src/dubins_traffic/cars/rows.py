@@ -133,17 +133,13 @@ def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
 
 
 @jit
-def move(
-    x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float, first: int, last: int
-) -> None:
-    """Move the cars `first` (index) to before `last` (index) along their arcs for `dt` seconds.
+def move(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
+    """Move cars along their arcs for `dt` seconds.
 
-    `x` (B * N,) and `y` (B * N,) are centres, metres; `c` (B * N,) and `s` (B * N,) headings; `speed` (B * N,), m/s,
-    and `yaw` (B * N,), rad/s, what they hold.
+    `x` (K,) and `y` (K,) are centres, metres; `c` (K,) and `s` (K,) headings; `speed` (K,), m/s, and `yaw` (K,), rad/s,
+    what they hold.
     """
-    x, y, c, s = x[first:last], y[first:last], c[first:last], s[first:last]
-    speed, yaw = speed[first:last], yaw[first:last]
-    for f in range(last - first):
+    for f in range(x.shape[0]):
         x[f], y[f], c[f], s[f] = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
 
 

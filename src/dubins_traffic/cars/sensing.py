@@ -2,112 +2,159 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from dubins_traffic.cars.state import NONE, Labels, State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable
-from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.boxes import NEVER
+from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.boxes import NEVER, Box
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import bell
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import sincos
 
 POSITION_DRAW = 200
 HEADING_DRAW = 206
-SEEN_REALS = 6
-SEEN_WHOLES = 6
+
+
+@record
+class SeenPose:
+    """A car that is seen: its centre, m, its heading, a unit vector, its speed, m/s, and yaw rate, rad/s."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+    speed: float
+    yaw_rate: float
+
+
+@record
+class SeenLabels:
+    """The same car: its index and its `cars.state.Propositions`; NONE where no car is."""
+
+    car: int = NONE
+    segment: int = NONE
+    at: int = NONE
+    crosses: int = NONE
+    lane: int = NONE
+    bits: int = NONE
+
+
+class Seen(Tables):
+    """What a car sees: both tables (N,), a row for each car, itself first."""
+
+    poses: Rows[SeenPose]
+    labels: Rows[SeenLabels]
+
+
+@record
+class Ray:
+    """The direction of a laser's ray in the car's frame: a unit vector."""
+
+    c: float
+    s: float
+
+
+class Surroundings(Tables):
+    """What a laser may meet: the cars of a batch, and its obstacles."""
+
+    state: State
+    cars: CarTable
+    obstacles: ObstacleTable
+
+
+def nothing_seen(cars: int) -> Seen:
+    """Return room for what a car sees of up to `cars` cars."""
+    return Seen(table(SeenPose, cars), table(SeenLabels, cars))
+
+
+def rays_at(angles: Iterable[float]) -> Rows[Ray]:
+    """Return the rays at some bearings, radians."""
+    directions = [sincos(float(angle)) for angle in angles]
+    rays = table(Ray, len(directions))
+    for ray, (c, s) in enumerate(directions):
+        rays[ray].c = c
+        rays[ray].s = s
+    return rays
 
 
 @jit
-def neighbours(
-    b: int, viewer: int, radius: float, reals: Floats, wholes: Ints, state: State, labels: Labels
-) -> int:
-    """Write car `viewer` (index), then the others within `radius` (m), by index, into two arrays; return how many.
+def neighbours(b: int, viewer: int, radius: float, seen: Seen, state: State, labels: Labels) -> int:
+    """Write car `viewer` (index), then the others within `radius` (m), by index, into `seen`; return how many.
 
-    A row of `reals` (N, SEEN_REALS) is x, y, cos, sin, speed, yaw rate; one of `wholes` (N, SEEN_WHOLES) is index,
-    segment, at, crosses, lane, bits, and the first row that is free begins with NONE. Where `wholes` was
-    as it is now already, minus the number is returned.
+    The first row that is free has no car. Where the labels were as they are now already, minus the number is returned.
     """
     limit = radius * radius
     x = state.x[b, viewer]
     y = state.y[b, viewer]
-    other = _view(state, labels, b, viewer, reals[0], wholes[0])
+    other = _view(b, viewer, 0, seen, state, labels)
     count = 1
     for n in range(state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         if n != viewer and dx * dx + dy * dy <= limit:
-            other |= _view(state, labels, b, n, reals[count], wholes[count])
+            other |= _view(b, n, count, seen, state, labels)
             count += 1
-    if count < wholes.shape[0]:
-        other |= wholes[count, 0] ^ NONE
-        wholes[count, 0] = NONE
+    if count < seen.labels.shape[0]:
+        other |= seen.labels[count].car ^ NONE
+        seen.labels[count].car = NONE
     return count if other != 0 else -count
 
 
 @jit
-def _view(state: State, labels: Labels, b: int, n: int, reals: Floats, wholes: Ints) -> int:
-    """Write car n into a row of each array; return 0 if that of `wholes` stays as it was."""
-    reals[0] = state.x[b, n]
-    reals[1] = state.y[b, n]
-    reals[2] = state.c[b, n]
-    reals[3] = state.s[b, n]
-    reals[4] = state.speed[b, n]
-    reals[5] = state.yaw_rate[b, n]
+def _view(b: int, n: int, row: int, seen: Seen, state: State, labels: Labels) -> int:
+    """Write car n into a row; return 0 if its labels stay as they were."""
+    pose = seen.poses[row]
+    pose.x = state.x[b, n]
+    pose.y = state.y[b, n]
+    pose.c = state.c[b, n]
+    pose.s = state.s[b, n]
+    pose.speed = state.speed[b, n]
+    pose.yaw_rate = state.yaw_rate[b, n]
+    own = seen.labels[row]
     bits = np.int64(labels.bits[b, n])
-    other = (wholes[0] ^ n) | (wholes[1] ^ labels.segment[b, n]) | (wholes[2] ^ labels.at[b, n])
-    other |= (wholes[3] ^ labels.crosses[b, n]) | (wholes[4] ^ labels.lane[b, n]) | (wholes[5] ^ bits)
-    wholes[0] = n
-    wholes[1] = labels.segment[b, n]
-    wholes[2] = labels.at[b, n]
-    wholes[3] = labels.crosses[b, n]
-    wholes[4] = labels.lane[b, n]
-    wholes[5] = bits
+    other = (own.car ^ n) | (own.segment ^ labels.segment[b, n]) | (own.at ^ labels.at[b, n])
+    other |= (own.crosses ^ labels.crosses[b, n]) | (own.lane ^ labels.lane[b, n]) | (own.bits ^ bits)
+    own.car = n
+    own.segment = labels.segment[b, n]
+    own.at = labels.at[b, n]
+    own.crosses = labels.crosses[b, n]
+    own.lane = labels.lane[b, n]
+    own.bits = int(bits)
     return other
 
 
 @jit
-def blur(
-    reals: Floats, wholes: Ints, count: int, seed: Any, trial: int, tick: int, position: float, heading: float
-) -> None:
+def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: float, heading: float) -> None:
     """Add noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad).
 
-    The first `count` (count) rows of `reals` (N, SEEN_REALS) and `wholes` (N, SEEN_WHOLES) are those of `neighbours`.
+    The first `count` (count) rows of `seen` are those of `neighbours`.
     """
     for k in range(count):
-        row = reals[k]
-        car = wholes[k, 0]
-        row[0] += position * bell(seed, trial, car, tick, POSITION_DRAW)
-        row[1] += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
+        pose = seen.poses[k]
+        car = seen.labels[k].car
+        pose.x += position * bell(seed, trial, car, tick, POSITION_DRAW)
+        pose.y += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
         c, s = sincos(heading * bell(seed, trial, car, tick, HEADING_DRAW))
-        row[2], row[3] = row[2] * c - row[3] * s, row[3] * c + row[2] * s
+        pose.c, pose.s = pose.c * c - pose.s * s, pose.s * c + pose.c * s
 
 
 @jit
-def ray_box(
-    px: float,
-    py: float,
-    ex: float,
-    ey: float,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    a: float,
-    b: float,
-    r: float,
-) -> float:
+def ray_box(px: float, py: float, ex: float, ey: float, box: Box) -> float:
     """Return how far the ray from (px, py) along a unit vector goes to a rounded box, metres, or NEVER.
 
-    The vector has the components `ex` (unit) and `ey` (unit); the box has half length `a` (m), half width `b` (m) and
-    rounding `r` (m). A rounded box is the union of two crossed boxes and four discs at the corners. 0 if the ray begins
-    inside.
-    """  # fmt: skip
-    dx = px - x
-    dy = py - y
+    The vector has the components `ex` (unit) and `ey` (unit). A rounded box is the union of two crossed boxes and four
+    discs at the corners. 0 if the ray begins inside.
+    """
+    _, _, c, s, a, b, r = box
+    dx = px - box.x
+    dy = py - box.y
     u = dx * c + dy * s
     v = dy * c - dx * s
     eu = ex * c + ey * s
@@ -154,52 +201,48 @@ def _ray_slab(u: float, v: float, eu: float, ev: float, a: float, b: float) -> f
 
 @jit
 def scan(
-    state: State,
     b: int,
     viewer: int,
-    cars: CarTable,
-    obstacles: ObstacleTable,
-    rays: Floats,
     shortest: float,
     longest: float,
+    rays: Rows[Ray],
     ranges: Floats,
+    around: Surroundings,
 ) -> None:
     """Write the laser ranges of car `viewer` (index) in metres into `ranges` (R,).
 
-    `rays` (R, 2) are unit vectors in the car's frame. As REP 117 of ROS says, a ray that meets nothing within
-    `longest` (m) reads +inf, and one that meets something nearer than `shortest` (m) reads -inf.
-    """  # fmt: skip
-    x, y = state.x[b, viewer], state.y[b, viewer]
-    c, s = state.c[b, viewer], state.s[b, viewer]
-    count = rays.shape[0]
-    for k in range(count):
+    As REP 117 of ROS says, of the rays `rays` (R,) one that meets nothing within `longest` (m) reads +inf, and one that
+    meets something nearer than `shortest` (m) reads -inf.
+    """
+    state, cars, obstacles = around.state, around.cars, around.obstacles
+    own = box_at(b, viewer, state, cars)
+    for k in range(rays.shape[0]):
         ranges[k] = NEVER
     far = longest + cars.reach[b]
     for n in range(state.count[b]):
-        dx = state.x[b, n] - x
-        dy = state.y[b, n] - y
+        dx = state.x[b, n] - own.x
+        dy = state.y[b, n] - own.y
         if n != viewer and dx * dx + dy * dy < far * far:
-            for k in range(count):
-                ex = rays[k, 0] * c - rays[k, 1] * s
-                ey = rays[k, 0] * s + rays[k, 1] * c
-                hit = ray_box(
-                    x, y, ex, ey, state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n],
-                    cars.half_length[b], cars.half_width[b], cars.rounding[b],
-                )  # fmt: skip
-                ranges[k] = min(ranges[k], hit)
+            _sweep(own, box_at(b, n, state, cars), rays, ranges)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        dx = row[0] - x
-        dy = row[1] - y
-        far = longest + row[7]
+        part = obstacles.parts[p]
+        dx = part.x - own.x
+        dy = part.y - own.y
+        far = longest + part.reach
         if dx * dx + dy * dy < far * far:
-            for k in range(count):
-                ex = rays[k, 0] * c - rays[k, 1] * s
-                ey = rays[k, 0] * s + rays[k, 1] * c
-                hit = ray_box(x, y, ex, ey, row[0], row[1], row[2], row[3], row[4], row[5], row[6])
-                ranges[k] = min(ranges[k], hit)
-    for k in range(count):
+            _sweep(own, box_of(part), rays, ranges)
+    for k in range(rays.shape[0]):
         if ranges[k] > longest:
             ranges[k] = np.inf
         elif ranges[k] < shortest:
             ranges[k] = -np.inf
+
+
+@jit
+def _sweep(own: Box, box: Box, rays: Rows[Ray], ranges: Floats) -> None:
+    """Lower the ranges to what one body leaves of them."""
+    for k in range(rays.shape[0]):
+        ray = rays[k]
+        ex = ray.c * own.c - ray.s * own.s
+        ey = ray.c * own.s + ray.s * own.c
+        ranges[k] = min(ranges[k], ray_box(own.x, own.y, ex, ey, box))

@@ -12,12 +12,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from dubins_traffic.cars.body import Car, Disc, DiscObstacle, Obstacle
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.boxes import Box
+from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 
 
 class CarTable(Tables):
-    """The car of each trial; all arrays (B,), metres, m/s, rad/s."""
+    """The car of each trial; all arrays (B,), metres, m/s, rad/s.
+
+    `half_length`, `half_width` and `rounding` are those of its body (`kernels.boxes.Box`).
+    """
 
     reach: Floats
     half_length: Floats
@@ -30,16 +37,51 @@ class CarTable(Tables):
     w: Floats
 
 
+@record
+class Part:
+    """A part of a static obstacle: a rounded box, m and a unit vector, that reaches `reach` metres from its centre."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+    half_length: float
+    half_width: float
+    rounding: float
+    reach: float
+    owner: int
+    """Number of the obstacle in its trial."""
+
+
 class ObstacleTable(Tables):
     """The static obstacles of each trial: those of trial b are the parts off[b] to off[b + 1] - 1.
 
-    `off` (B + 1,); `part` (P, 8): x, y, cos, sin, half_length, half_width, rounding, reach; `owner` (P,): number
-    of the obstacle to which the part belongs.
+    `off` (B + 1,); `parts` (P,); `part` (P, 8): the same as columns x, y, cos, sin, half_length, half_width, rounding,
+    reach.
     """
 
     off: Ints
+    parts: Rows[Part]
     part: Floats
-    owner: Ints
+
+
+_SHAPE = ("x", "y", "c", "s", "half_length", "half_width", "rounding", "reach")
+"""Fields of a part, in the order in which `_parts` returns them."""
+
+
+@jit_inline
+def box_of(part: Part) -> Box:
+    """Return the box of an obstacle's part."""
+    return Box(part.x, part.y, part.c, part.s, part.half_length, part.half_width, part.rounding)
+
+
+@jit_inline
+def box_at(b: int, n: int, state: State, cars: CarTable) -> Box:
+    """Return the body of car n of trial b where it is."""
+    return Box(
+        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n],
+        cars.half_length[b], cars.half_width[b], cars.rounding[b],
+    )  # fmt: skip
 
 
 def pack_cars(cars: Sequence[Car]) -> CarTable:
@@ -52,19 +94,22 @@ def pack_cars(cars: Sequence[Car]) -> CarTable:
 def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     """Return the table of one sequence of obstacles per trial."""
     if not any(obstacles):
-        nothing = np.zeros(len(obstacles) + 1, dtype=np.int64)
-        return ObstacleTable(nothing, np.zeros((0, 8)), np.zeros(0, dtype=np.int64))
+        return ObstacleTable(np.zeros(len(obstacles) + 1, dtype=np.int64), table(Part, 0), np.zeros((0, 8)))
     off = [0]
     parts: list[tuple[float, ...]] = []
     owners: list[int] = []
     for own in obstacles:
         for number, obstacle in enumerate(own):
-            rows = _parts(obstacle)
-            parts += rows
-            owners += [number] * len(rows)
+            found = _parts(obstacle)
+            parts += found
+            owners += [number] * len(found)
         off.append(len(parts))
-    part = np.array(parts, dtype=np.float64).reshape(len(parts), 8)
-    return ObstacleTable(np.array(off, dtype=np.int64), part, np.array(owners, dtype=np.int64))
+    columns = np.array(parts, dtype=np.float64).reshape(len(parts), 8)
+    rows = table(Part, len(parts))
+    for name, column in zip(_SHAPE, columns.T, strict=True):
+        rows[name] = column
+    rows["owner"] = owners
+    return ObstacleTable(np.array(off, dtype=np.int64), rows, columns)
 
 
 def _car_row(car: Car) -> tuple[float, ...]:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.partners import PARTED
 from dubins_traffic.cars.state import Contact, State
-from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.cars.tables import box_of, pack_cars, pack_obstacles
+from dubins_traffic.kernels.boxes import Box, separation
 
 STANDING = 0.02
 """Speed, m/s, up to which a body counts as standing: poses that are measured always shiver a little."""
@@ -32,9 +32,10 @@ class Bodies:
         cars, standing = pack_cars([car]), pack_obstacles([obstacles])
         self.box = (float(cars.half_length[0]), float(cars.half_width[0]), float(cars.rounding[0]))
         self.reach = float(cars.reach[0])
-        self.parts: dict[int, list[list[float]]] = {}
-        for owner, part in zip(standing.owner.tolist(), standing.part.tolist(), strict=True):
-            self.parts.setdefault(-1 - owner, []).append(part)
+        self.parts: dict[int, list[Box]] = {}
+        for k in range(len(standing.parts)):
+            part = standing.parts[k]
+            self.parts.setdefault(-1 - part.owner, []).append(box_of(part))
 
     @property
     def turns(self) -> bool:
@@ -43,10 +44,10 @@ class Bodies:
 
     def separation(self, state: State, car: int, other: int) -> Separation:
         """Return gap, normal and point of `kernels.boxes.separation` for a car and another, or obstacle -1 - k."""
-        own = (*_pose(state, car), *self.box)
+        own = Box(*_pose(state, car), *self.box)
         if other >= 0:
-            return separation(*own, *_pose(state, other), *self.box)
-        return min(separation(*own, *part[:7]) for part in self.parts[other])
+            return separation(own, Box(*_pose(state, other), *self.box))
+        return min(separation(own, part) for part in self.parts[other])
 
 
 class Touching:

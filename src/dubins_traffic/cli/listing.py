@@ -27,6 +27,7 @@ class Subject(StrEnum):
     """The catalogues that `list` prints."""
 
     AGENTS = "agents"
+    CAR_MODELS = "car-models"
     CONFIGURATIONS = "configurations"
     CONTROLLERS = "controllers"
     MAP_FORMATS = "map-formats"

@@ -1,7 +1,7 @@
 """The controller `lanes`: the shortest round through the goals in the right lane, with regard for other cars.
 
 Planning is plain Python and rare: once at the start, and when the way has been blocked for long. What happens every
-tick is the compiled law `policies.lanes.policy`.
+tick is the compiled policy `policies.lanes.policy`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from math import hypot, inf
 import numpy as np
 
 from dubins_traffic.cars.state import Command, Observation, Pose
-from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.policies.lanes import knowledge as columns
-from dubins_traffic.policies.lanes.gaps import NOBODY, O_SEEN, O_STILL, OTHER_FIELDS, SAMPLE_FIELDS, SAMPLES
-from dubins_traffic.policies.lanes.knowledge import Knowledge
-from dubins_traffic.policies.lanes.paths import FIELDS, LANE, LENGTH, PathMaker
+from dubins_traffic.kernels.records import table
+from dubins_traffic.policies.lanes.knowledge import NOBODY, Follower, Knowledge, Manner, Sample, SeenCar
+from dubins_traffic.policies.lanes.paths import PathMaker, PathRow
 from dubins_traffic.policies.lanes.policy import decide
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, can_pivot
+from dubins_traffic.policies.rules.tables import vehicles_of
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import pack
 from dubins_traffic.routing.tours import LaneGraph, Round, find_round
@@ -32,6 +32,8 @@ FORGET = 60.0
 TURN_ROUND = 15.0
 """What turning round on the road counts, metres, when the way is blocked; at the start it counts as BREACH."""
 BREACH = 1e3
+SAMPLES = 46
+"""At so many places the path ahead is looked at."""
 
 
 class Lanes:
@@ -78,17 +80,14 @@ class Lanes:
             self._decide = bound(decide)
         elif self._blocked or self._closed:
             known = self._known = self._remember(known, observation)
-        ego, others = known.ego[0], known.others[0]
-        ego[:] = observation.pose
-        others[:, O_SEEN] = 0.0
+        ego, tick = known.follower, observation.tick
+        others = np.asarray(known.other)  # to write all of a row at once
         for car in observation.others:
-            others[car.index - 1, :O_STILL] = (*car.pose, *car.twist)
-            others[car.index - 1, O_SEEN] = 1.0
-        self._decide(known, self._roads)
-        if known.blocker[0] != NOBODY:
-            self._detour(observation, int(known.blocker[0]))
-        speed, yaw_rate = known.command[0].tolist()
-        return Command(speed, yaw_rate)
+            others[car.index - 1] = (*car.pose, *car.twist, tick)
+        self._decide(tick, *observation.pose, known, self._roads)
+        if ego.blocker != NOBODY:
+            self._detour(observation, ego.blocker)
+        return Command(ego.speed, ego.yaw_rate)
 
     def _find_round(self) -> Round | None:
         goals = self._problem.goal_vertices
@@ -102,37 +101,20 @@ class Lanes:
 
     def _furnish(self, pose: Pose) -> Knowledge:
         problem = self._problem
-        car = pack_cars([problem.car])
-        obstacles = pack_obstacles([problem.obstacles])
-        row = np.zeros((1, columns.CAR_FIELDS))
-        reach = float(car.reach[0])
-        row[0] = (
-            car.half_length[0],
-            car.half_width[0],
-            car.rounding[0],
-            reach,
-            car.speed_low[0],
-            car.speed_high[0],
-            car.yaw_rate[0],
-            car.turning_radius[0],
-            problem.intersection_radius,
-            problem.period,
-            max(FOLLOW, 2.0 * reach + 0.5),
-        )
+        vehicle = vehicles_of([problem])[0]
+        manner = table(Manner, 1)[0]
+        manner.follow = max(FOLLOW, 2.0 * vehicle.reach + 0.5)
+        others = len(problem.e_agents)
         known = Knowledge(
-            path=np.zeros((1, FIELDS)),
-            span=np.zeros((1, 3), dtype=np.int64),
-            row=np.zeros(1, dtype=np.int64),
-            memory=np.zeros((1, columns.MEMORY_FIELDS)),
-            ego=np.zeros((1, 4)),
-            others=np.zeros((1, len(problem.e_agents), OTHER_FIELDS)),
-            car=row,
-            part=obstacles.part,
-            part_off=obstacles.off,
-            net=np.zeros(1, dtype=np.int64),
-            sample=np.zeros((SAMPLES, SAMPLE_FIELDS)),
-            command=np.zeros((1, 2)),
-            blocker=np.full(1, NOBODY, dtype=np.int64),
+            path=table(PathRow, 1),
+            follower=table(Follower, 1)[0],
+            vehicle=vehicle,
+            manner=manner,
+            other=table(SeenCar, others),
+            still=np.zeros(others),
+            gap=np.zeros(others),
+            obstacles=pack_obstacles([problem.obstacles]),
+            sample=table(Sample, SAMPLES),
         )
         return self._plan(known, pose)
 
@@ -156,12 +138,11 @@ class Lanes:
             approach += self._graph.route(lane, target, tables[k])
         lanes = [*approach, *tours.lanes[place + 1 :], *tours.lanes[: place + 1]]
         path = self._maker.path(lanes, progress, len(approach))
-        memory = np.zeros((1, columns.MEMORY_FIELDS))
-        memory[0, columns.BEGIN] = memory[0, columns.LEFT] = left
-        memory[0, columns.RAMP] = 0.2 + 0.8 * abs(left)
-        memory[0, columns.UNTIL] = memory[0, columns.RAMP]
-        span = np.array([[0, len(path.rows), path.loop]], dtype=np.int64)
-        return known.replace(path=path.rows, span=span, row=np.zeros(1, dtype=np.int64), memory=memory)
+        follower = table(Follower, 1)[0]
+        follower.loop = path.loop
+        follower.begin = follower.left = left
+        follower.ramp = follower.until = 0.2 + 0.8 * abs(left)
+        return known.replace(path=path.rows, follower=follower)
 
     def _entries(self, pose: Pose) -> list[tuple[int, float, float, float]]:
         """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""
@@ -215,8 +196,8 @@ class Lanes:
         """
         time = observation.time
         old = [place for places in (self._blocked, self._closed) for place in places if places[place] <= time]
-        row = known.path[known.row[0]]
-        if not old or row[LANE] < 0 or known.memory[0, columns.SIGMA] > 0.3 * row[LENGTH]:
+        row = known.path[known.follower.row]
+        if not old or row.lane < 0 or known.follower.sigma > 0.3 * row.length:
             return known
         self._blocked = {lane: until for lane, until in self._blocked.items() if until > time}
         self._closed = {vertex: until for vertex, until in self._closed.items() if until > time}
@@ -226,9 +207,9 @@ class Lanes:
         """Note where the way is blocked, and plan again."""
         known = self._known
         assert known is not None
-        x, y = known.others[0, blocker, :2] if blocker >= 0 else known.part[-1 - blocker, :2]
+        body = known.other[blocker] if blocker >= 0 else known.obstacles.parts[-1 - blocker]
+        point = np.array((body.x, body.y))
         until = observation.time + FORGET
-        point = np.array((float(x), float(y)))
         vertex, far = self._network.nearest_intersection(point)
         pose = observation.pose
         if float(far) < self._problem.intersection_radius + self._problem.car.body.reach:

@@ -1,48 +1,27 @@
-"""Ego controllers by name: those that come with the package, and a user's own."""
+"""Ego controllers by name, under the shield or without."""
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Callable, Mapping
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
-from dubins_traffic import outside
 from dubins_traffic.cars.state import Observation
-from dubins_traffic.controllers import blame
+from dubins_traffic.controllers import named
 from dubins_traffic.errors import InputError
-from dubins_traffic.outside import ConstructionError, Seam
+from dubins_traffic.outside import ConstructionError
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Controller
 
-_BUILT_IN = {
-    "keyboard": ("dubins_traffic.controllers.keyboard", "Keyboard"),
-    "lanes": ("dubins_traffic.controllers.lanes", "Lanes"),
-    "rules": ("dubins_traffic.controllers.rules", "Rules"),
-    "simple": ("dubins_traffic.controllers.simple", "Simple"),
-    "synthesized": ("dubins_traffic.controllers.synthesized", "Synthesized"),
-}
-_DESCRIPTIONS = {
-    "keyboard": "you, with the arrow keys, in real time; the map is drawn in the terminal",
-    "lanes": "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
-    "rules": "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
-    "simple": "the reference of 2016: round the goals in order, straight across country, blind to cars",
-    "synthesized": "plays a winning strategy of the game of cells, found at the start; drives as rules does",
-}
+if TYPE_CHECKING:
+    from dubins_traffic.shield.tables import Overtakes
+
 COMPILED = "rules"
 """The controller that is compiled: in a batch no Python runs between two ticks of its trials."""
 SHIELDED = "+shield"
 """What ends the name of a controller that drives under the shield (`controllers.shield`); behind it there may be a
 colon and when the ego may overtake, as in ``lanes+shield:never``."""
 _SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
-_SEAM = Seam(
-    "--controller",
-    "controller",
-    ("start", "act"),
-    "start(problem) and act(observation) -> (speed, yaw rate)",
-    blame.error_text,
-)
-_EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
 
 class Unmade:
@@ -81,7 +60,7 @@ def made(make: Callable[[], Controller]) -> Controller:
 
 def names() -> Mapping[str, str]:
     """Return the built-in controllers: name to one line of description."""
-    return dict(_DESCRIPTIONS)
+    return {name: text for name, (_, text) in named.BUILT_IN.items()}
 
 
 def load(spec: str) -> Controller:
@@ -105,18 +84,7 @@ def load(spec: str) -> Controller:
     """
     if is_shielded(spec):
         return under_shield(load(_SHIELD.sub("", spec)), spec)
-    if spec in _BUILT_IN:
-        module, name = _BUILT_IN[spec]
-        return cast(Controller, getattr(importlib.import_module(module), name)())
-    if spec.endswith(".mcap"):
-        return cast(Controller, importlib.import_module("dubins_traffic.controllers.scripted").replay(spec))
-    if spec.endswith(".npz"):
-        return cast(
-            Controller, importlib.import_module("dubins_traffic.controllers.synthesized").player(spec)
-        )
-    if not outside.is_place(spec):
-        raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(sorted(_BUILT_IN))))
-    return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))
+    return named.load(spec)
 
 
 def is_shielded(spec: str) -> bool:
@@ -139,6 +107,6 @@ def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
     """
     ending = _SHIELD.search(spec)
     given = None if ending is None else ending["overtakes"]
-    more = {} if given is None else {"overtakes": given}
-    shield = importlib.import_module("dubins_traffic.controllers.shield").Shield
-    return cast(Controller, shield(controller, **more))
+    from dubins_traffic.controllers.shield import Shield
+
+    return Shield(controller) if given is None else Shield(controller, overtakes=cast("Overtakes", given))

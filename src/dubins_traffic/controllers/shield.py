@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Command, Observation
-from dubins_traffic.controllers import registry
+from dubins_traffic.controllers import named
 from dubins_traffic.protocols import Closes, Controller, Reports
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.shield.filter import ShieldFilter
@@ -22,7 +22,7 @@ class Shield:
     Parameters
     ----------
     controller : Controller or str
-        Whatever drives; by name as `controllers.registry.load` takes it.
+        Whatever drives; by name as `controllers.named.load` takes it, without a shield.
     overtakes : {"sure", "law", "never"}
         When the ego may cross the centre line to pass what stands: only where it is sure to be back in time whatever
         the others do, by default; wherever the law of the road would, as the controller `rules` does; or never.
@@ -51,7 +51,7 @@ class Shield:
     """
 
     def __init__(self, controller: Controller | str, *, overtakes: Overtakes = "sure") -> None:
-        self._controller = registry.load(controller) if isinstance(controller, str) else controller
+        self._controller = named.load(controller) if isinstance(controller, str) else controller
         self.shield_filter = ShieldFilter(overtakes=overtakes)
         self._events: list[tuple[str, str]] = []
 

@@ -10,12 +10,9 @@ import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.tables import Scene
-from dubins_traffic.cars.motion import FULL, MOVED, step_trial
+from dubins_traffic.cars.motion import FULL, MOVED, Motion, step_trial
 from dubins_traffic.cars.near import Spacing, keep_apart, lost
-from dubins_traffic.cars.partners import Workspace
-from dubins_traffic.cars.rows import Rows
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
@@ -57,12 +54,9 @@ class Progress(Tables):
     place: Floats
 
 
-class World(Scene, Traffic):
+class World(Scene, Traffic, Motion):
     """All tables of a batch."""
 
-    cars: CarTable
-    rows: Rows
-    work: Workspace
     beside: ObstacleLanes
     rules: TableOf[TrialRules]
     terms: TableOf[RefereeParameters]
@@ -117,9 +111,7 @@ def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> No
             return
         before = world.work.found[0]
         least = world.spacing.least[b] - lost(world.spacing, b, tick)
-        moved = step_trial(
-            b, dt, least, world.state, commands, world.cars, world.obstacles, world.rows, world.work
-        )
+        moved = step_trial(b, dt, least, commands, world)
         if moved != MOVED:
             own[STATUS] = NO_CONTACTS if moved == FULL else NO_PAIRS
             return
@@ -171,8 +163,8 @@ def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
     """Note tick and flags of the contacts found from row `first` on; tell whether one is the ego's."""
     ego_hit = False
     for k in range(first, world.work.found[0]):
-        car = int(world.work.contact[k, 1])
-        other = int(world.work.contact[k, 2])
+        car = world.work.contact[k].car
+        other = world.work.contact[k].other
         note = world.progress.contact[k]
         note[0] = tick
         note[1] = np.int64(world.labels.bits[b, car])

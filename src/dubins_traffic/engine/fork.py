@@ -105,12 +105,12 @@ def ragged(off: Ints, trials: Ints) -> Ragged:
 
 
 def _copied(table: Table) -> Table:
-    return type(table)(*(array.copy() for array in table))
+    return type(table)(*(_copied(own) if isinstance(own, Tables) else own.copy() for own in table))
 
 
 def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
     own = ragged(table.off, trials)
-    return ObstacleTable(own.off, table.part[own.row], table.owner[own.row])
+    return ObstacleTable(own.off, table.parts[own.row], table.part[own.row])
 
 
 def _goals(terms: Rows[RefereeParameters]) -> Ints:

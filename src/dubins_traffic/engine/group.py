@@ -11,8 +11,9 @@ import numpy as np
 
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
 from dubins_traffic.agents.lawful import pack_drivers
-from dubins_traffic.agents.tables import workspace as agent_workspace
+from dubins_traffic.agents.tables import wider, workspace
 from dubins_traffic.cars.near import spacing
+from dubins_traffic.cars.partners import enlarged
 from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
@@ -56,7 +57,7 @@ from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally import new_tally
-from dubins_traffic.simulators.embedded import Embedded, contact_of, enlarged
+from dubins_traffic.simulators.embedded import Embedded, contact_of
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.forking import reseeded
 
@@ -117,7 +118,7 @@ class Group:
         labeller.begin(trials, places)
         roads, beside, rules = labeller.tables
         net = rules["net"].copy()
-        cars, obstacles, rows, work = simulator.tables
+        _, obstacles, cars, rows, work = simulator.motion
         terms, goals = terms_of(problems)
         breach_log = BreachLog.empty(trials, places, goals)
         most = MOST * places + int((terms["goals_end"] - terms["goals_begin"]).max())
@@ -133,7 +134,7 @@ class Group:
             state=self.state, cars=cars, obstacles=obstacles, rows=rows, work=work, roads=roads, beside=beside,
             rules=rules, terms=terms, labels=labeller.labels, memory=labeller.memory, breach_log=breach_log,
             drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments),
-            agents=pack_agents(instances, places, net), space=agent_workspace(places, PAIRS, 2 * segments),
+            agents=pack_agents(instances, places, net), space=workspace(places, PAIRS, 2 * segments),
             tally=new_tally(instances, net, places), progress=self._progress(len(work.contact), len(breach_log.row)),
             spacing=apart, labelling=labelling, judging=judging,
         )  # fmt: skip
@@ -315,8 +316,7 @@ class Group:
         if (status == NO_PAIRS).any():
             self._world = self._world.replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
-            room = np.zeros((4 * len(self._world.space.pair), 2), dtype=np.int64)
-            self._world = self._world.replace(space=self._world.space.replace(pair=room))
+            self._world = self._world.replace(space=wider(self._world.space))
         for b, why in zip(map(int, active), status.tolist(), strict=True):
             if why == ENDED:
                 self.end(b, End.DURATION)
@@ -330,10 +330,10 @@ class Group:
     def _drain(self) -> None:
         """Take over the contacts and breaches that have been found, and make room."""
         world = self._world
-        found, rows = int(world.work.found[0]), world.breach_log.found()
-        notes = zip(world.work.contact[:found].tolist(), world.progress.contact[:found].tolist(), strict=True)
+        found, rows = world.work.meetings(), world.breach_log.found()
+        notes = zip(found, world.progress.contact[: len(found)].tolist(), strict=True)
         for row, (tick, own, other, own_seen, other_seen) in notes:
-            b, contact = int(row[0]), contact_of(row, tick, self._rate)
+            b, contact = row.b, contact_of(row, tick, self._rate)
             self._contacts[b].append(with_fault_by(contact, own, other))
             pair = ((contact.car, own_seen), (contact.other, other_seen))
             self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)

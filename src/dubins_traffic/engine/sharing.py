@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from dubins_traffic.cars.body import DUBINS
 from dubins_traffic.errors import InputError
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.problem.kinds import ALONE, KEEP_RULES
@@ -31,7 +32,8 @@ def fitness() -> Callable[[Instance], bool]:
 def can_share(instance: Instance) -> bool:
     """Tell whether a trial can be stepped with others, whatever drives its ego."""
     apart = any(agent.kind in ALONE for agent in instance.e_agents)
-    return instance.simulator == "embedded" and not instance.problem.formulas and not apart
+    plain = instance.simulator == "embedded" and instance.problem.car.model == DUBINS
+    return plain and not instance.problem.formulas and not apart
 
 
 def _is_fit(instance: Instance) -> bool:

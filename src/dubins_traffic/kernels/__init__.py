@@ -37,6 +37,7 @@ seed             Any      seed of the trial, uint64
 trial            int      number of the trial by which random numbers are drawn
 others           int      number of e-agents in a game of cells
 commands         Floats   (B, N, 2) speed (m/s) and yaw rate (rad/s)
+command, most    Command  what is asked for, or the most that is: speed, m/s, and yaw rate, rad/s
 tables           Any      all tables that the kernel's room takes; their classes state shapes and units
 vertex           int      intersection, 0 to V - 1, or -1
 lateral          float    left of a lane's centre line positive, m

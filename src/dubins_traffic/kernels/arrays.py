@@ -12,6 +12,8 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 Ints: TypeAlias = npt.NDArray[np.int64]
 Bits: TypeAlias = npt.NDArray[np.uint32]
 
+INFINITE = float("inf")
+"""So far, so long: where there is none."""
 BLOCK = 32
 """Cars whose columns stand together where a kernel takes several at once; the columns are so many numbers apart."""
 WIDE = 8

@@ -1,14 +1,14 @@
 """Rounded boxes: distances, and the instant at which two of them meet while each moves on an arc.
 
-A rounded box is given by its centre (x, y), its axis (c, s), its half extents (a, b) along and across the axis and
-the radius r by which it is grown. A disc has a = b = 0, an edge b = 0.
+A rounded box is a rectangle grown by a radius (`Box`): a disc has no length and no width, an edge no width.
 """
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 
 TOUCH = 1e-9
@@ -24,112 +24,125 @@ _FACE = 1.0 + 1e-6
 _CAP = 4096
 
 
-@jit
-def corner(k: int, x: float, y: float, c: float, s: float, a: float, b: float) -> tuple[float, float]:
-    """Return corner `k` (0 to 3) of a box of half length `a` (m) and half width `b` (m), without its rounding."""
-    p = a if k < 2 else -a
-    q = b if k % 2 == 0 else -b
-    return x + (p * c - q * s), y + (p * s + q * c)
+class Box(NamedTuple):
+    """A rounded box: centre (`x`, `y`) in metres, axis (`c`, `s`), and the shape about it, in metres.
+
+    `half_length` lies along the axis and `half_width` across it; `rounding` is the radius by which that is grown.
+    """
+
+    x: float
+    y: float
+    c: float
+    s: float
+    half_length: float
+    half_width: float
+    rounding: float
+
+
+class Drive(NamedTuple):
+    """How a body moves in a tick: `speed` (m/s) and `yaw_rate` (rad/s), held for `until` seconds; then it stands."""
+
+    speed: float
+    yaw_rate: float
+    until: float
+
+
+@jit_inline
+def driven(box: Box, drive: Drive, t: float) -> Box:
+    """Return where a body is `t` (s) after the tick's beginning."""
+    x, y, c, s = advance(box.x, box.y, box.c, box.s, drive.speed, drive.yaw_rate, min(t, drive.until))
+    return Box(x, y, c, s, box.half_length, box.half_width, box.rounding)
+
+
+@jit_inline
+def held(drive: Drive, t: float) -> Drive:
+    """Return how a body moves at `t` (s) after the tick's beginning."""
+    moves = t < drive.until
+    return Drive(drive.speed if moves else 0.0, drive.yaw_rate if moves else 0.0, drive.until)
 
 
 @jit
-def nearest_in_box(
-    px: float, py: float, x: float, y: float, c: float, s: float, a: float, b: float
-) -> tuple[float, float]:
-    """Return the point nearest to (px, py) of a box without its rounding: half length `a` (m), half width `b` (m)."""
-    dx = px - x
-    dy = py - y
-    u = min(max(dx * c + dy * s, -a), a)
-    v = min(max(dy * c - dx * s, -b), b)
-    return x + (u * c - v * s), y + (u * s + v * c)
+def corner(k: int, box: Box) -> tuple[float, float]:
+    """Return corner `k` (0 to 3) of a box without its rounding."""
+    p = box.half_length if k < 2 else -box.half_length
+    q = box.half_width if k % 2 == 0 else -box.half_width
+    return box.x + (p * box.c - q * box.s), box.y + (p * box.s + q * box.c)
 
 
 @jit
-def _face_axis(
-    x0: float,
-    y0: float,
-    c0: float,
-    s0: float,
-    a0: float,
-    b0: float,
-    x1: float,
-    y1: float,
-    c1: float,
-    s1: float,
-    a1: float,
-    b1: float,
-) -> tuple[float, float, float]:
-    """Return (separation, nx, ny) of the face normal, of four, that best separates box 0 from box 1."""
+def nearest_in_box(px: float, py: float, box: Box) -> tuple[float, float]:
+    """Return the point nearest to (px, py) of a box without its rounding."""
+    dx = px - box.x
+    dy = py - box.y
+    u = min(max(dx * box.c + dy * box.s, -box.half_length), box.half_length)
+    v = min(max(dy * box.c - dx * box.s, -box.half_width), box.half_width)
+    return box.x + (u * box.c - v * box.s), box.y + (u * box.s + v * box.c)
+
+
+@jit
+def _face_axis(one: Box, other: Box) -> tuple[float, float, float]:
+    """Return (separation, nx, ny) of the face normal, of four, that best separates one box from another."""
     best = -NEVER
     nx = 1.0
     ny = 0.0
-    dx = x1 - x0
-    dy = y1 - y0
+    dx = other.x - one.x
+    dy = other.y - one.y
     for k in range(4):
         if k == 0:
-            ex, ey = c0, s0
+            ex, ey = one.c, one.s
         elif k == 1:
-            ex, ey = -s0, c0
+            ex, ey = -one.s, one.c
         elif k == 2:
-            ex, ey = c1, s1
+            ex, ey = other.c, other.s
         else:
-            ex, ey = -s1, c1
+            ex, ey = -other.s, other.c
         along = dx * ex + dy * ey
         if along < 0.0:
             along, ex, ey = -along, -ex, -ey
-        own = a0 * abs(c0 * ex + s0 * ey) + b0 * abs(c0 * ey - s0 * ex)
-        other = a1 * abs(c1 * ex + s1 * ey) + b1 * abs(c1 * ey - s1 * ex)
-        if along - own - other > best:
-            best = along - own - other
+        half = _half_extent(one, ex, ey)
+        across = _half_extent(other, ex, ey)
+        if along - half - across > best:
+            best = along - half - across
             nx = ex
             ny = ey
     return best, nx, ny
 
 
+@jit_inline
+def _half_extent(box: Box, ex: float, ey: float) -> float:
+    """Return half the extent of a box, without its rounding, along a unit vector."""
+    return box.half_length * abs(box.c * ex + box.s * ey) + box.half_width * abs(box.c * ey - box.s * ex)
+
+
 @jit
-def separation(
-    x0: float,
-    y0: float,
-    c0: float,
-    s0: float,
-    a0: float,
-    b0: float,
-    r0: float,
-    x1: float,
-    y1: float,
-    c1: float,
-    s1: float,
-    a1: float,
-    b1: float,
-    r1: float,
-) -> tuple[float, float, float, float, float]:
+def separation(one: Box, other: Box) -> tuple[float, float, float, float, float]:
     """Return (gap, nx, ny, px, py): the gap between two rounded boxes (negative: overlap), the unit normal from
     the first to the second, and the point of the first nearest to the second.
     """
     best = NEVER
-    px = x0
-    py = y0
-    qx = x1
-    qy = y1
+    px = one.x
+    py = one.y
+    qx = other.x
+    qy = other.y
     for k in range(4):
-        ex, ey = corner(k, x0, y0, c0, s0, a0, b0)
-        fx, fy = nearest_in_box(ex, ey, x1, y1, c1, s1, a1, b1)
+        ex, ey = corner(k, one)
+        fx, fy = nearest_in_box(ex, ey, other)
         d2 = (fx - ex) * (fx - ex) + (fy - ey) * (fy - ey)
         if d2 < best:
             best, px, py, qx, qy = d2, ex, ey, fx, fy
-        fx, fy = corner(k, x1, y1, c1, s1, a1, b1)
-        ex, ey = nearest_in_box(fx, fy, x0, y0, c0, s0, a0, b0)
+        fx, fy = corner(k, other)
+        ex, ey = nearest_in_box(fx, fy, one)
         d2 = (fx - ex) * (fx - ex) + (fy - ey) * (fy - ey)
         if d2 < best:
             best, px, py, qx, qy = d2, ex, ey, fx, fy
-    face, nx, ny = _face_axis(x0, y0, c0, s0, a0, b0, x1, y1, c1, s1, a1, b1)
+    face, nx, ny = _face_axis(one, other)
     core = sqrt(best)
     if core > _NUMB and core > face * _FACE > 0.0:
         nx = (qx - px) / core
         ny = (qy - py) / core
     else:
         core = face
-    return core - r0 - r1, nx, ny, px + nx * r0, py + ny * r0
+    return core - one.rounding - other.rounding, nx, ny, px + nx * one.rounding, py + ny * one.rounding
 
 
 @jit
@@ -144,44 +157,26 @@ def _lower_root(gap: float, rate: float, bend: float) -> float:
 
 
 @jit
-def disc_contact(
-    x0: float,
-    y0: float,
-    c0: float,
-    s0: float,
-    u0: float,
-    w0: float,
-    until0: float,
-    x1: float,
-    y1: float,
-    c1: float,
-    s1: float,
-    u1: float,
-    w1: float,
-    until1: float,
-    reach: float,
-    begin: float,
-    end: float,
-) -> float:
+def disc_contact(one: Box, drive: Drive, other: Box, its: Drive, begin: float, end: float) -> float:
     """Return the first instant from `begin` (s) to `end` (s) of a tick at which two discs touch and close, or NEVER.
 
-    Disc i starts the tick at (xi, yi, ci, si), holds (ui, wi) until `untili` and stands from then on; `reach` is
-    the sum of the radii. The distance of the centres bends downward by at most the sum of the accelerations
-    |u w|, so each step goes to where a parabola below it meets zero: no step can jump over a contact, and the
-    steps converge like Newton's.
+    Each starts the tick in its box, of which only centre, axis and rounding count. The distance of the centres bends
+    downward by at most the sum of the accelerations |u w|, so each step goes to where a parabola below it meets zero:
+    no step can jump over a contact, and the steps converge like Newton's.
     """
+    reach = one.rounding + other.rounding
     t = begin
     for _ in range(_CAP):
-        px, py, pc, ps = advance(x0, y0, c0, s0, u0, w0, min(t, until0))
-        qx, qy, qc, qs = advance(x1, y1, c1, s1, u1, w1, min(t, until1))
-        v0 = u0 if t < until0 else 0.0
-        v1 = u1 if t < until1 else 0.0
-        dx = qx - px
-        dy = qy - py
+        p = driven(one, drive, t)
+        q = driven(other, its, t)
+        u0, w0, _ = held(drive, t)
+        u1, w1, _ = held(its, t)
+        dx = q.x - p.x
+        dy = q.y - p.y
         d = sqrt(dx * dx + dy * dy)
         nx, ny = (dx / d, dy / d) if d > 0.0 else (1.0, 0.0)
-        rate = nx * (v1 * qc - v0 * pc) + ny * (v1 * qs - v0 * ps)
-        bend = abs(v0 * w0) + abs(v1 * w1)
+        rate = nx * (u1 * q.c - u0 * p.c) + ny * (u1 * q.s - u0 * p.s)
+        bend = abs(u0 * w0) + abs(u1 * w1)
         gap = d - reach
         if gap <= TOUCH:
             if rate < -CLOSING:
@@ -196,41 +191,29 @@ def disc_contact(
 
 
 @jit
-def _box_step(
-    nx: float,
-    ny: float,
-    x0: float,
-    y0: float,
-    c0: float,
-    s0: float,
-    v0: float,
-    w0: float,
-    a0: float,
-    b0: float,
-    r0: float,
-    x1: float,
-    y1: float,
-    c1: float,
-    s1: float,
-    v1: float,
-    w1: float,
-    a1: float,
-    b1: float,
-    r1: float,
-) -> float:
+def _corner_motion(
+    k: int, box: Box, nx: float, ny: float, u: float, w: float
+) -> tuple[float, float, float, float]:
+    """Return a corner of a box that drives at u, w: place, speed along a normal, distance from the centre."""
+    x, y = corner(k, box)
+    arm = sqrt((x - box.x) * (x - box.x) + (y - box.y) * (y - box.y))
+    out = nx * (u * box.c - w * (y - box.y)) + ny * (u * box.s + w * (x - box.x))
+    return x, y, out, arm
+
+
+@jit
+def _box_step(nx: float, ny: float, one: Box, drive: Drive, other: Box, its: Drive) -> float:
     """Return a time during which no two corners can meet along the normal, or -1 if two touch and close."""
+    u0, w0 = drive.speed, drive.yaw_rate
+    u1, w1 = its.speed, its.yaw_rate
     step = NEVER
     for i in range(4):
-        ex, ey = corner(i, x0, y0, c0, s0, a0, b0)
-        arm0 = sqrt((ex - x0) * (ex - x0) + (ey - y0) * (ey - y0))
-        out0 = nx * (v0 * c0 - w0 * (ey - y0)) + ny * (v0 * s0 + w0 * (ex - x0))
-        bend0 = abs(v0 * w0) + w0 * w0 * arm0
+        ex, ey, out0, arm0 = _corner_motion(i, one, nx, ny, u0, w0)
+        bend0 = abs(u0 * w0) + w0 * w0 * arm0
         for j in range(4):
-            fx, fy = corner(j, x1, y1, c1, s1, a1, b1)
-            arm1 = sqrt((fx - x1) * (fx - x1) + (fy - y1) * (fy - y1))
-            out1 = nx * (v1 * c1 - w1 * (fy - y1)) + ny * (v1 * s1 + w1 * (fx - x1))
-            bend = bend0 + abs(v1 * w1) + w1 * w1 * arm1
-            gap = nx * (fx - ex) + ny * (fy - ey) - r0 - r1
+            fx, fy, out1, arm1 = _corner_motion(j, other, nx, ny, u1, w1)
+            bend = bend0 + abs(u1 * w1) + w1 * w1 * arm1
+            gap = nx * (fx - ex) + ny * (fy - ey) - one.rounding - other.rounding
             rate = out1 - out0
             if gap <= TOUCH:
                 if rate < -CLOSING:
@@ -243,30 +226,7 @@ def _box_step(
 
 
 @jit
-def box_contact(
-    x0: float,
-    y0: float,
-    c0: float,
-    s0: float,
-    u0: float,
-    w0: float,
-    until0: float,
-    a0: float,
-    b0: float,
-    r0: float,
-    x1: float,
-    y1: float,
-    c1: float,
-    s1: float,
-    u1: float,
-    w1: float,
-    until1: float,
-    a1: float,
-    b1: float,
-    r1: float,
-    begin: float,
-    end: float,
-) -> float:
+def box_contact(one: Box, drive: Drive, other: Box, its: Drive, begin: float, end: float) -> float:
     """Return the first instant from `begin` (s) to `end` (s) at which two rounded boxes touch and close, or NEVER.
 
     As `disc_contact`: along the normal between the nearest features, the gap of every two corners is bounded
@@ -274,14 +234,10 @@ def box_contact(
     """
     t = begin
     for _ in range(_CAP):
-        px, py, pc, ps = advance(x0, y0, c0, s0, u0, w0, min(t, until0))
-        qx, qy, qc, qs = advance(x1, y1, c1, s1, u1, w1, min(t, until1))
-        v0, yaw0 = (u0, w0) if t < until0 else (0.0, 0.0)
-        v1, yaw1 = (u1, w1) if t < until1 else (0.0, 0.0)
-        _, nx, ny, _, _ = separation(px, py, pc, ps, a0, b0, r0, qx, qy, qc, qs, a1, b1, r1)
-        step = _box_step(
-            nx, ny, px, py, pc, ps, v0, yaw0, a0, b0, r0, qx, qy, qc, qs, v1, yaw1, a1, b1, r1
-        )  # fmt: skip
+        p = driven(one, drive, t)
+        q = driven(other, its, t)
+        _, nx, ny, _, _ = separation(p, q)
+        step = _box_step(nx, ny, p, held(drive, t), q, held(its, t))
         if step < 0.0:
             return t
         t += step

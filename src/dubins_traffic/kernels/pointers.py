@@ -30,7 +30,7 @@ class TablesType(types.Type):
     name : str
         Of the class.
     fields : tuple of (str, type)
-        Names and types of its arrays.
+        Names and types of its arrays, rows and groups.
     """
 
     def __init__(self, name: str, fields: tuple[tuple[str, Any], ...]) -> None:
@@ -44,13 +44,20 @@ class TablesType(types.Type):
         for name, kind in self.fields:
             if name == field:
                 return kind, WORD * words
-            words += kind.words if isinstance(kind, TablesType) else 1 + kind.ndim
+            words += _words(kind)
         raise AttributeError(field)
 
     @property
     def words(self) -> int:
         """How many numbers are known of all of its arrays."""
-        return sum(kind.words if isinstance(kind, TablesType) else 1 + kind.ndim for _, kind in self.fields)
+        return sum(_words(kind) for _, kind in self.fields)
+
+
+def _words(kind: Any) -> int:
+    """Return how many numbers are known of a field: of a row only where it is."""
+    if isinstance(kind, TablesType):
+        return kind.words
+    return 1 if isinstance(kind, types.Record) else 1 + kind.ndim
 
 
 @extending.register_model(TablesType)
@@ -73,8 +80,12 @@ def _read(context: Any, builder: Any, kind: TablesType, pointer: Any, name: str)
     start = builder.gep(pointer, [ir.IntType(64)(begin)])
     if isinstance(field, TablesType):
         return start
-    words = builder.bitcast(start, ir.IntType(64).as_pointer())
     steady = builder.module.add_metadata([])
+    if isinstance(field, types.Record):
+        row = builder.load(builder.bitcast(start, context.get_value_type(field).as_pointer()), align=WORD)
+        row.set_metadata("invariant.load", steady)
+        return row
+    words = builder.bitcast(start, ir.IntType(64).as_pointer())
 
     def word(k: int) -> Any:
         value = builder.load(builder.gep(words, [ir.IntType(64)(k)]), align=WORD)

@@ -163,6 +163,7 @@ def record(kind: type[R]) -> type[R]:
         "__qualname__": kind.__qualname__,
         "__slots__": (),
         "__setattr__": _set,
+        "__reduce__": _reduced,
         "FIRST_VALUES": {name: vars(kind)[name] for name in fields if name in vars(kind)},
     }
     row: Any = type(kind.__name__, (ctypes.Structure,), members)
@@ -177,6 +178,15 @@ def _set(row: Any, name: str, value: Any) -> None:
         object.__setattr__(row, name, value)
     except TypeError:
         object.__setattr__(row, name, int(value))
+
+
+def _reduced(row: Any) -> tuple[Any, ...]:
+    """Be copied and pickled with its values, as a row of its own."""
+    return _copied, (type(row), bytes(row))
+
+
+def _copied(kind: Any, data: bytes) -> Any:
+    return kind.from_buffer_copy(data)
 
 
 def _wrapping(name: str) -> property:
@@ -213,3 +223,14 @@ def stack(tables: Sequence[Rows[R]]) -> Any:
     """Return a table of which each row of the first axis is one of some tables of equal lengths."""
     rows: Any = np.stack([cast(Any, own) for own in tables])
     return rows.view(type(tables[0]))
+
+
+def join(tables: Sequence[Rows[R]]) -> Rows[R]:
+    """Return a table of the rows of some tables, one after another."""
+    rows: Any = np.concatenate([cast(Any, own) for own in tables])
+    return rows.view(type(tables[0]))
+
+
+def numbers(rows: Rows[Any], kind: type[np.generic]) -> npt.NDArray[Any]:
+    """Return a table whose fields are all of one kind as an array of numbers, with a column for each field: a view."""
+    return np.asarray(rows).view(kind).reshape(*rows.shape, -1)

@@ -15,6 +15,7 @@ the place where all that is known of its arrays stands (`kernels.pointers`), how
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, ClassVar, NoReturn, Self, dataclass_transform
@@ -26,7 +27,7 @@ from dubins_traffic.kernels.arrays import Ints
 
 @dataclass_transform(frozen_default=True)
 class Tables:
-    """A group of arrays, and of other such groups, with names; these are the annotations of the class.
+    """A group of arrays, single rows, and other such groups, with names; these are the annotations of the class.
 
     It can't be changed: what kernels know of the arrays is written down once.
     """
@@ -68,7 +69,7 @@ class Tables:
 
     @cached_property
     def description(self) -> Ints:
-        """What kernels read: of each array its first element's address and its lengths, one after another."""
+        """What kernels read: of each array its first element's address and its lengths, of a row its address."""
         words: list[int] = []
         for value in self:
             words += value.description.tolist() if isinstance(value, Tables) else _words(value)
@@ -82,6 +83,8 @@ class Tables:
 
 def _words(array: Any) -> list[int]:
     """Return an array's address and lengths; kernels take only those whose elements follow each other."""
+    if isinstance(array, ctypes.Structure):
+        return [ctypes.addressof(array)]
     if not array.flags.c_contiguous:
         raise TypeError("the elements of a table follow each other in memory")
     return [array.ctypes.data, *array.shape]

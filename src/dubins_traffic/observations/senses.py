@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from dubins_traffic.cars.sensing import SEEN_REALS, SEEN_WHOLES, blur, neighbours, scan
+from dubins_traffic.cars.sensing import Surroundings, blur, neighbours, nothing_seen, rays_at, scan
 from dubins_traffic.cars.state import (
     EGO,
-    NONE,
     Labels,
     Observation,
     Pose,
@@ -22,7 +21,7 @@ from dubins_traffic.cars.state import (
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.kernels.trig import sincos
+from dubins_traffic.kernels.records import numbers
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Laser
@@ -67,35 +66,33 @@ class Senses:
         self._body = problem.car.body
         self._radius = problem.sensing_radius if radius is None else radius
         self._rate = problem.rate
-        self._reals = np.zeros((len(instance.starts), SEEN_REALS))
-        self._wholes = np.full((len(instance.starts), SEEN_WHOLES), NONE, dtype=np.int64)
+        self._view = nothing_seen(len(instance.starts))
         self._seen: list[tuple[str, int, Propositions]] = []
         noise = instance.disturbances
         self._noisy = car == EGO and (noise.position_noise > 0.0 or noise.heading_noise > 0.0)
         self._laser = laser or problem.laser
         if self._laser is not None:
             angles = np.linspace(self._laser.angle_min, self._laser.angle_max, self._laser.rays)
-            self._rays = np.array([sincos(float(angle)) for angle in angles])
+            self._rays = rays_at(angles)
             self._cars = pack_cars([problem.car])
             self._obstacles = pack_obstacles([problem.obstacles])
+            self._around: Surroundings | None = None
             self._latest = -1
         self._scan: Floats | None = None
 
     def observe(self, tick: int, state: State, labels: Labels) -> Observation:
         """Return what the car's driver knows at the beginning of the tick that starts in `state`."""
-        count = self._look(0, self._car, self._radius, self._reals, self._wholes, state, labels)
+        count = self._look(0, self._car, self._radius, self._view, state, labels)
         if count > 0:
             self._seen = self._labelled(count)
         count = len(self._seen)
         if self._noisy:
             noise = self._instance.disturbances
-            blur(
-                self._reals, self._wholes, count, np.uint64(self._instance.seed), self._instance.trial, tick,
-                noise.position_noise, noise.heading_noise,
-            )  # fmt: skip
+            seed, trial = np.uint64(self._instance.seed), self._instance.trial
+            blur(self._view, count, seed, trial, tick, noise.position_noise, noise.heading_noise)
         if self._laser is not None:
             self._sweep(tick, state, self._laser)
-        reals: list[list[float]] = self._reals[:count].tolist()
+        reals: list[list[float]] = numbers(self._view.poses, np.float64)[:count].tolist()
         body = self._body
         others = tuple(
             [
@@ -111,7 +108,7 @@ class Senses:
 
     def _labelled(self, count: int) -> list[tuple[str, int, Propositions]]:
         """Return name, index and propositions of the first `count` cars seen, which stay the same for most ticks."""
-        wholes: list[list[int]] = self._wholes[:count].tolist()
+        wholes: list[list[int]] = numbers(self._view.labels, np.int64)[:count].tolist()
         return [(self._names[whole[0]], whole[0], new(Propositions, whole[1:])) for whole in wholes]
 
     def sweep(self, state: State) -> Floats:
@@ -126,19 +123,12 @@ class Senses:
         if laser is None:
             raise ValueError("no laser")
         if self._scanner is not None:
-            return _cut(self._scanner.scan(self._car, self._rays, laser.range_max), laser)
+            rays = numbers(self._rays, np.float64)
+            return _cut(self._scanner.scan(self._car, rays, laser.range_max), laser)
+        if self._around is None or self._around.state is not state:
+            self._around = Surroundings(state, self._cars, self._obstacles)
         ranges = np.zeros(laser.rays)
-        scan(
-            state,
-            0,
-            self._car,
-            self._cars,
-            self._obstacles,
-            self._rays,
-            laser.range_min,
-            laser.range_max,
-            ranges,
-        )
+        scan(0, self._car, laser.range_min, laser.range_max, self._rays, ranges, self._around)
         return ranges
 
     def _sweep(self, tick: int, state: State, laser: Laser) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.boxes import separation
+from typing import Protocol
+
+from dubins_traffic.cars.state import Command, Pose
+from dubins_traffic.cars.tables import ObstacleTable, box_of
+from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import nearest_segment
@@ -17,106 +20,119 @@ VERGE = 0.02
 """What an ego's centre keeps from the edge of the road whatever happens, metres."""
 
 
+class Mover(Protocol):
+    """A car's body, a rounded box, and what it can do.
+
+    Attributes
+    ----------
+    half_length, half_width, rounding, reach : float
+        The box, and the farthest of its points, metres.
+    slowest, fastest : float
+        Its smallest and largest speed, m/s.
+    yaw_most : float
+        Its largest yaw rate, rad/s.
+    tightest : float
+        Its least turning radius, metres.
+    period : float
+        Seconds of a tick.
+    """
+
+    half_length: float
+    half_width: float
+    rounding: float
+    reach: float
+    slowest: float
+    fastest: float
+    yaw_most: float
+    tightest: float
+    period: float
+
+
+@jit_inline
+def body_at(pose: Pose, car: Mover) -> Box:
+    """Return the body of a car at a pose."""
+    return Box(pose.x, pose.y, pose.c, pose.s, car.half_length, car.half_width, car.rounding)
+
+
+@jit_inline
+def travel_of(car: Mover) -> float:
+    """Return how far any point of a car may get in a tick, metres."""
+    travel = max(car.fastest, -car.slowest) * car.period
+    if car.half_length > 0.0:
+        travel += car.yaw_most * car.reach * car.period
+    return travel
+
+
 @jit
-def leaves_road(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    speed: float,
-    yaw_rate: float,
-    period: float,
-    edge: float,
-    roads: RoadTable,
-    net: int,
-) -> bool:
-    """Whether a motion for one tick takes the centre farther than `edge` from all roads, or farther beyond it."""
-    nx, ny, _, _ = advance(x, y, c, s, speed, yaw_rate, period)
+def leaves_road(pose: Pose, command: Command, period: float, roads: RoadTable, net: int) -> bool:
+    """Whether a motion for one tick takes the centre to VERGE from the road's edge, or farther beyond that."""
+    edge = float(roads.half_width[net]) - VERGE
+    nx, ny, _, _ = advance(pose.x, pose.y, pose.c, pose.s, command.speed, command.yaw_rate, period)
     _, after = nearest_segment(roads, net, nx, ny)
     if after <= edge * edge:
         return False
-    _, before = nearest_segment(roads, net, x, y)
+    _, before = nearest_segment(roads, net, pose.x, pose.y)
     return after >= before
 
 
 @jit
-def motion_is_safe(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    speed: float,
-    yaw_rate: float,
-    period: float,
-    half_length: float,
-    half_width: float,
-    rounding: float,
-    reach: float,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    o_length: float,
-    o_width: float,
-    o_rounding: float,
-    o_travel: float,
-) -> bool:
-    """Whether a motion for one tick can't touch another body, or leads away from it.
+def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
+    """Whether a motion of a car for one tick can't touch another body, or leads away from it.
 
-    Parameters
-    ----------
-    x, y, c, s, speed, yaw_rate, period : float
-        Pose and command of the car that looks, and the tick's length.
-    half_length, half_width, rounding, reach : float
-        Its body (a rounded box) and the farthest of its points.
-    ox, oy, oc, os, o_length, o_width, o_rounding : float
-        The other body.
-    o_travel : float
-        How far any point of the other may get in the tick, 0 if it can't move.
+    No point of the other gets farther than `travel` (m) in the tick, 0 if it can't move.
 
     Notes
     -----
     A car that stands is never at fault in a collision, and neither is one that moves away.
     """
-    turns = abs(yaw_rate) * reach if half_length + half_width > 0.0 else 0.0
+    x, y, c, s = pose
+    speed, yaw_rate = command
+    period = car.period
+    turns = abs(yaw_rate) * car.reach if car.half_length + car.half_width > 0.0 else 0.0
     own = (abs(speed) + turns) * period
     if own == 0.0:
         return True
-    gap, _, _, _, _ = separation(
-        x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-    )
-    if gap > own + o_travel + GUARD:
+    gap, _, _, _, _ = separation(body_at(pose, car), other)
+    if gap > own + travel + GUARD:
         return True
     least = gap
     last = gap
     for k in range(1, 5):
         nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, 0.25 * k * period)
-        last, _, _, _, _ = separation(
-            nx, ny, nc, ns, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-        )
+        last, _, _, _, _ = separation(body_at(Pose(nx, ny, nc, ns), car), other)
         least = min(least, last)
-    return least > o_travel + GUARD or (least == gap and last - gap > 0.2 * own)
+    return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
+
+
+@jit_inline
+def may_meet(pose: Pose, command: Command, car: Mover, other: Pose, travel: float) -> bool:
+    """Whether a motion for one tick might touch a car of the same kind at a pose, if that is within NEAR.
+
+    The rest is as in `motion_is_safe`; `travel` (m).
+    """
+    dx = other.x - pose.x
+    dy = other.y - pose.y
+    far = 2.0 * car.reach + NEAR
+    return dx * dx + dy * dy < far * far and not motion_is_safe(
+        pose, command, car, body_at(other, car), travel
+    )
 
 
 @jit_inline
 def may_hit(
-    x: float, y: float, c: float, s: float, speed: float, yaw_rate: float, period: float, half_length: float,
-    half_width: float, rounding: float, reach: float, parts: Floats, first: int, last: int, near: float,
-    spread: float,
-) -> bool:  # fmt: skip
-    """Whether a motion for one tick might touch an obstacle: the rows `first` to `last` - 1 of `ObstacleTable.part`.
+    b: int, pose: Pose, command: Command, car: Mover, obstacles: ObstacleTable, near: float, spread: float
+) -> bool:
+    """Whether a motion for one tick might touch an obstacle of trial b.
 
-    Looked at are those within `near` of what the car reaches; each is kept clear by `spread`, metres, more than GUARD.
+    Looked at are those within `near` (m) of what the car reaches; each is kept clear by `spread` (m) more than GUARD.
     The rest is as in `motion_is_safe`.
     """
-    for k in range(first, last):
-        row = parts[k]
-        dx = row[0] - x
-        dy = row[1] - y
-        far = reach + row[7] + near
-        if dx * dx + dy * dy < far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, half_length, half_width, rounding, reach,
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], spread,
-        ):  # fmt: skip
+    for k in range(obstacles.off[b], obstacles.off[b + 1]):
+        part = obstacles.parts[k]
+        dx = part.x - pose.x
+        dy = part.y - pose.y
+        far = car.reach + part.reach + near
+        is_near = dx * dx + dy * dy < far * far
+        if is_near and not motion_is_safe(pose, command, car, box_of(part), spread):
             return True
     return False

@@ -4,44 +4,34 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.compile import jit
 
 TAN_WANDER = 0.07011455787200271
 """Tangent of 0.07 rad, the bearing tolerance of the 2016 e-agent."""
 TAN_SIMPLE = 0.10033467208545055
 """Tangent of 0.1 rad, the bearing tolerance of the 2016 ego controller."""
-_SHARPEST = 1e3
 
 
 @jit
 def turn_then_drive(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    goal_x: float,
-    goal_y: float,
-    tangent: float,
-    miss: float,
-    speed: float,
-    yaw_rate: float,
-    period: float,
+    pose: Pose, goal_x: float, goal_y: float, most: Command, tangent: float, miss: float, period: float
 ) -> tuple[float, float]:
     """Return (speed, yaw rate): turn in place while the bearing error is too large, else drive straight.
 
     Parameters
     ----------
-    x, y, c, s : float
-        Pose of the car, metres, heading as a unit vector.
+    pose : Pose
+        Of the car.
     goal_x, goal_y : float
         The point to drive to, metres.
+    most : Command
+        How fast to drive (m/s) and to turn (rad/s).
     tangent : float
-        Tangent of the bearing error beyond which the car turns.
+        Tangent of the bearing error beyond which the car turns, in rad.
     miss : float
         Largest lateral distance of the goal from the line ahead, metres, that is left alone: it tightens the
         tolerance for goals farther than ``miss / tangent``. Infinite for the plain law.
-    speed, yaw_rate : float
-        How fast to drive (m/s) and to turn (rad/s).
     period : float
         Seconds of a tick. Neither motion overshoots within a tick, so the law works at any control rate; where
         ``yaw_rate * period`` is below the tolerance, as at 30 Hz, this changes nothing.
@@ -50,10 +40,11 @@ def turn_then_drive(
     -----
     With the goal straight behind, the car turns right, as in 2016 (an error of pi is wrapped to -pi).
     """
-    dx = goal_x - x
-    dy = goal_y - y
-    ahead = c * dx + s * dy
-    left = c * dy - s * dx
+    speed, yaw_rate = most
+    dx = goal_x - pose.x
+    dy = goal_y - pose.y
+    ahead = pose.c * dx + pose.s * dy
+    left = pose.c * dy - pose.s * dx
     if ahead > 0.0 and abs(left) <= min(tangent * ahead, miss):
         return speed if speed * period <= ahead else ahead / period, 0.0
     if ahead <= 0.0 and left == 0.0:
@@ -69,32 +60,26 @@ def turn_then_drive(
 
 @jit
 def pursue(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    goal_x: float,
-    goal_y: float,
-    speed: float,
-    slowest: float,
-    yaw_rate: float,
-    radius: float,
+    pose: Pose, goal_x: float, goal_y: float, most: Command, slowest: float, radius: float
 ) -> tuple[float, float]:
     """Return (speed, yaw rate) of the arc through the goal that leaves along the heading (pure pursuit).
 
-    The arc is never tighter than `radius` (0: any); with the goal behind, the tightest one is taken, to the left
-    when it lies straight behind. Where the arc asks for more than `yaw_rate`, the car slows, to `slowest` at least.
+    The goal is (`goal_x` (m), `goal_y` (m)). The arc is never tighter than `radius` (m; 0: any, down to a millimetre);
+    with the goal behind, the tightest one is taken, to the left when it lies straight behind. `most` (m/s and rad/s)
+    says how fast to drive and to turn; where the arc asks for a larger yaw rate, the car slows, to `slowest` (m/s) at
+    least.
 
     Source: R. C. Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992.
     """
-    dx = goal_x - x
-    dy = goal_y - y
+    speed, yaw_rate = most
+    dx = goal_x - pose.x
+    dy = goal_y - pose.y
     d2 = dx * dx + dy * dy
     if d2 <= 0.0:
         return speed, 0.0
-    ahead = c * dx + s * dy
-    left = c * dy - s * dx
-    sharpest = 1.0 / radius if radius > 1.0 / _SHARPEST else _SHARPEST
+    ahead = pose.c * dx + pose.s * dy
+    left = pose.c * dy - pose.s * dx
+    sharpest = 1.0 / max(radius, 1e-3)
     bend = min(2.0 * abs(left) / d2, sharpest)
     if ahead < 0.0:
         bend = sharpest

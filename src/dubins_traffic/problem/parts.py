@@ -26,6 +26,8 @@ from dubins_traffic.cars.body import (
     PolygonObstacle,
     Rectangle,
 )
+from dubins_traffic.cars.dynamics import check_name
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault
 from dubins_traffic.problem.instance import Disturbances, Laser
@@ -104,16 +106,28 @@ class BoundsModel(Strict):
         return Bounds(self.speed, self.yaw_rate, self.speed_min, self.turning_radius)
 
 
+def _known_model(spec: str) -> str:
+    try:
+        check_name(spec)
+    except InputError as error:
+        raise fault(error.problem, error.expected or "") from None
+    return spec
+
+
 class CarModel(Strict):
     """The car; all cars of a trial are alike."""
 
     w: Width = Field(default=_CAR.w, description="nominal width that sets the roads (lanes 2w, roads 4w), m")
     body: BodyModel = Field(default=BodyModel(disc=DiscModel()), description="the body that collides")
     bounds: BoundsModel = Field(default=BoundsModel(), description="bounds on commands")
+    model: Annotated[str, AfterValidator(_known_model)] = Field(
+        default=_CAR.model, description="how it moves: dubins, or module:Class of a car model of one's own"
+    )
+    parameters: dict[str, Any] = Field(default={}, description="parameters of that model")
 
     def core(self) -> Car:
         """Return the car itself."""
-        return Car(self.w, self.body.core(), self.bounds.core())
+        return Car(self.w, self.body.core(), self.bounds.core(), self.model, self.parameters)
 
     @staticmethod
     def document(car: Car) -> dict[str, Any]:
@@ -129,7 +143,10 @@ class CarModel(Strict):
             "speed_min": bounds.speed_min,
             "turning_radius": bounds.turning_radius,
         }
-        return {"w": car.w, "body": shape, "bounds": limits_}
+        found: dict[str, Any] = {"w": car.w, "body": shape, "bounds": limits_}
+        if car.model != _CAR.model:
+            found |= {"model": car.model, "parameters": dict(car.parameters)}
+        return found
 
 
 class LaserModel(Strict):

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import record
 from dubins_traffic.roads.road_raster import MIXED, ON
 from dubins_traffic.roads.table import RoadTable
 
-INFINITE = float("inf")
 CERTAIN = 1e-6
 """What rounding can't make up, metres."""
 FORKED = 1.2
@@ -22,28 +22,27 @@ FORKED = 1.2
 
 @jit_inline
 def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
-    """Return the squared distance from a point to segment s."""
-    k = t.seg_off[net] + s
-    rx = x - t.seg[k, 0]
-    ry = y - t.seg[k, 1]
-    tx = t.seg[k, 2]
-    ty = t.seg[k, 3]
-    qx = x - t.seg[k, 5]
-    qy = y - t.seg[k, 6]
-    along = rx * tx + ry * ty
-    across = tx * ry - ty * rx
-    beyond = qx * qx + qy * qy if along >= t.seg[k, 4] else across * across
+    """Return the squared distance from a point to segment `s` (segment)."""
+    row: int = t.seg_off[net] + s
+    own = t.segment[row]
+    rx = x - own.x
+    ry = y - own.y
+    qx = x - own.end_x
+    qy = y - own.end_y
+    along = rx * own.tx + ry * own.ty
+    across = own.tx * ry - own.ty * rx
+    beyond = qx * qx + qy * qy if along >= own.length else across * across
     return rx * rx + ry * ry if along <= 0.0 else beyond
 
 
 @jit_inline
 def cell_of(t: RoadTable, net: int, x: float, y: float) -> int:
     """Return the number of the cell that holds a point, -1 outside the box of cells."""
-    u = (x - t.cell_box[net, 0]) * t.cell_box[net, 2]
-    v = (y - t.cell_box[net, 1]) * t.cell_box[net, 2]
-    nx = t.cell_dim[net, 0]
-    if u >= 0.0 and v >= 0.0 and u < nx and v < t.cell_dim[net, 1]:
-        return t.cell_dim[net, 2] + int(v) * nx + int(u)
+    grid = t.grid[net]
+    u = (x - grid.x0) * grid.scale
+    v = (y - grid.y0) * grid.scale
+    if u >= 0.0 and v >= 0.0 and u < grid.nx and v < grid.ny:
+        return grid.first + int(v) * grid.nx + int(u)
     return -1
 
 
@@ -70,12 +69,12 @@ def nearest_segment(t: RoadTable, net: int, x: float, y: float) -> tuple[int, fl
 @jit_inline
 def on_road(t: RoadTable, net: int, x: float, y: float) -> bool:
     """Whether a point lies within the roads' half width of a segment (its ends capped by discs)."""
-    u = (x - t.cell_box[net, 0]) * t.pave_scale[net]
-    v = (y - t.cell_box[net, 1]) * t.pave_scale[net]
-    nx = t.pave_dim[net, 0]
+    grid = t.grid[net]
+    u = (x - grid.x0) * grid.pave_scale
+    v = (y - grid.y0) * grid.pave_scale
     pave: int = MIXED
-    if u >= 0.0 and v >= 0.0 and u < nx and v < t.pave_dim[net, 1]:
-        pave = int(t.pave[t.pave_dim[net, 2] + int(v) * nx + int(u)])
+    if u >= 0.0 and v >= 0.0 and u < grid.pave_nx and v < grid.pave_ny:
+        pave = int(t.pave[grid.pave_first + int(v) * grid.pave_nx + int(u)])
     least = INFINITE
     if pave == ON:
         least = 0.0
@@ -89,9 +88,10 @@ def on_road(t: RoadTable, net: int, x: float, y: float) -> bool:
 @jit_inline
 def vertex_distance2(t: RoadTable, net: int, v: int, x: float, y: float) -> float:
     """Return the squared distance from a point to intersection v."""
-    k = t.vert_off[net] + v
-    rx = x - t.vert[k, 0]
-    ry = y - t.vert[k, 1]
+    row: int = t.vert_off[net] + v
+    own = t.vertex[row]
+    rx = x - own.x
+    ry = y - own.y
     return rx * rx + ry * ry
 
 
@@ -163,8 +163,9 @@ def _nearest_segments(
             best = s
         second = min(second, max(d2, least))
         least = min(d2, least)
-        row = t.seg_off[net] + s
-        if v not in (t.ends[row, 0], t.ends[row, 1]):
+        row: int = t.seg_off[net] + s
+        own = t.segment[row]
+        if v not in (own.first, own.second):
             other = min(other, d2)
     return best, sqrt(least), sqrt(second), sqrt(other)
 
@@ -206,9 +207,10 @@ def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, cell: 
         segment = -1
         second = other
     half = 0.7 * 0.5 * min(spare, second - near) - CERTAIN
-    side = 1.0 / t.cell_box[net, 2]
-    left = t.cell_box[net, 0] + side * int((x - t.cell_box[net, 0]) * t.cell_box[net, 2])
-    low = t.cell_box[net, 1] + side * int((y - t.cell_box[net, 1]) * t.cell_box[net, 2])
+    grid = t.grid[net]
+    side = 1.0 / grid.scale
+    left = grid.x0 + side * int((x - grid.x0) * grid.scale)
+    low = grid.y0 + side * int((y - grid.y0) * grid.scale)
     cell.low_x = max(x - half, left + CERTAIN)
     cell.high_x = min(x + half, left + side - CERTAIN)
     cell.low_y = max(y - half, low + CERTAIN)
@@ -220,23 +222,32 @@ def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, cell: 
 @jit_inline
 def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float]:
     """Return (s, l) of a point: metres along a lane from its start, metres left of the segment's centre line."""
-    k = t.seg_off[net] + (lane >> 1)
-    rx = x - t.seg[k, 0]
-    ry = y - t.seg[k, 1]
-    along = rx * t.seg[k, 2] + ry * t.seg[k, 3]
-    left = t.seg[k, 2] * ry - t.seg[k, 3] * rx
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    rx = x - own.x
+    ry = y - own.y
+    along = rx * own.tx + ry * own.ty
+    left = own.tx * ry - own.ty * rx
     if lane & 1:
-        return t.seg[k, 4] - along, -left
+        return own.length - along, -left
     return along, left
 
 
 @jit_inline
 def lane_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
     """Return the unit vector along a lane."""
-    k = t.seg_off[net] + (lane >> 1)
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
     if lane & 1:
-        return -t.seg[k, 2], -t.seg[k, 3]
-    return t.seg[k, 2], t.seg[k, 3]
+        return -own.tx, -own.ty
+    return own.tx, own.ty
+
+
+@jit_inline
+def lane_length(t: RoadTable, net: int, lane: int) -> float:
+    """Return the length of a lane, metres."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    return t.segment[row].length
 
 
 @jit_inline

@@ -10,9 +10,55 @@ import numpy.typing as npt
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.records import Rows, join, record, table
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.cells import RoadRaster
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.road_raster import road_raster
+from dubins_traffic.roads.surface import Cells
+
+
+@record
+class Segment:
+    """A segment: its first end, the unit vector along it, its length, its second end, m; the vertices at its ends."""
+
+    x: float
+    y: float
+    tx: float
+    ty: float
+    length: float
+    end_x: float
+    end_y: float
+    first: int
+    second: int
+
+
+@record
+class Vertex:
+    """An intersection, m."""
+
+    x: float
+    y: float
+
+
+@record
+class CellGrid:
+    """The cells of a network: cell (cx, cy) is number first + cy * nx + cx; the finer ones of `pave` are alike."""
+
+    x0: float
+    """Lower corner of the box of cells, m."""
+    y0: float
+    scale: float
+    """1 / side of a cell, 1/m."""
+    nx: int
+    """Columns of cells."""
+    ny: int
+    first: int
+    pave_scale: float
+    """1 / side of a cell of `pave`, 1/m."""
+    pave_nx: int
+    pave_ny: int
+    pave_first: int
 
 
 class RoadTable(Tables):
@@ -26,28 +72,26 @@ class RoadTable(Tables):
         First row of each network in `seg` and `ends`.
     seg : array (S, 7)
         First end ax, ay; unit tangent tx, ty; length; second end bx, by.
+    segment : table (S,) of Segment
+        The same, with names.
     ends : array (S, 2)
         Intersections at the ends.
     vert_off : array (K + 1,)
         First row of each network in `vert`, `arms` and `degree`.
     vert : array (V, 2)
         Intersections, metres.
+    vertex : table (V,) of Vertex
+        The same, with names.
     arms : array (V, 4)
         Lanes out of an intersection, counter-clockwise, then -1.
     degree : array (V,)
         Number of roads at an intersection.
-    cell_box : array (K, 3)
-        Lower corner x0, y0 of the box of cells, and 1 / side of a cell.
-    cell_dim : array (K, 3)
-        Columns and rows of cells, and the number of the first cell; cell (cx, cy) is number first + cy * nx + cx.
+    grid : table (K,) of CellGrid
+        The cells.
     seg_start, vert_start : arrays (C + 1,)
         Where the candidates of each cell begin in `seg_item`, `vert_item`.
     seg_item, vert_item : arrays
         What may be nearest to a point of the cell, in ascending order.
-    pave_scale : array (K,)
-        1 / side of a cell of `pave`; these finer cells begin at x0, y0 too.
-    pave_dim : array (K, 3)
-        Columns and rows of the cells of `pave`, and the number of the first.
     pave : array
         What the road makes of a cell, see `roads.road_raster`.
     """
@@ -55,20 +99,23 @@ class RoadTable(Tables):
     half_width: Floats
     seg_off: Ints
     seg: Floats
+    segment: Rows[Segment]
     ends: Ints
     vert_off: Ints
     vert: Floats
+    vertex: Rows[Vertex]
     arms: Ints
     degree: Ints
-    cell_box: Floats
-    cell_dim: Ints
+    grid: Rows[CellGrid]
     seg_start: Ints
     seg_item: Ints
     vert_start: Ints
     vert_item: Ints
-    pave_scale: Floats
-    pave_dim: Ints
     pave: Ints
+
+
+_NUMBERED = frozenset({"seg_off", "segment", "vert_off", "vertex", "grid", "seg_start", "vert_start"})
+"""What is not just put one after another where several networks are."""
 
 
 def pack_distinct(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> tuple[RoadTable, Ints]:
@@ -78,8 +125,8 @@ def pack_distinct(networks: Sequence[RoadNetwork], half_widths: Sequence[float])
         numbers.setdefault((id(network), width), len(numbers))
     given = [numbers[id(network), width] for network, width in zip(networks, half_widths, strict=True)]
     first = [given.index(number) for number in range(len(numbers))]
-    table = pack([networks[k] for k in first], [half_widths[k] for k in first])
-    return table, np.array(given, dtype=np.int64)
+    packed = pack([networks[k] for k in first], [half_widths[k] for k in first])
+    return packed, np.array(given, dtype=np.int64)
 
 
 def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadTable:
@@ -96,14 +143,20 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     tables = [_table(network, width) for network, width in zip(networks, half_widths, strict=True)]
     if len(tables) == 1:
         return tables[0]
-    joined = RoadTable(*(np.concatenate(columns) for columns in zip(*tables, strict=True)))
-    return joined.replace(
-        seg_off=_offsets([len(table.seg) for table in tables]),
-        vert_off=_offsets([len(table.vert) for table in tables]),
-        cell_dim=_dimensions(joined.cell_dim),
-        seg_start=_starts([table.seg_start for table in tables]),
-        vert_start=_starts([table.vert_start for table in tables]),
-        pave_dim=_dimensions(joined.pave_dim),
+    plain = {
+        name: np.concatenate([getattr(own, name) for own in tables])
+        for name in RoadTable.field_names
+        if name not in _NUMBERED
+    }
+    return RoadTable(
+        **plain,
+        seg_off=_offsets([len(own.seg) for own in tables]),
+        vert_off=_offsets([len(own.vert) for own in tables]),
+        segment=join([own.segment for own in tables]),
+        vertex=join([own.vertex for own in tables]),
+        grid=_grids([own.grid for own in tables]),
+        seg_start=_starts([own.seg_start for own in tables]),
+        vert_start=_starts([own.vert_start for own in tables]),
     )
 
 
@@ -116,19 +169,18 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
             half_width=np.array([half_width], dtype=np.float64),
             seg_off=_offsets([len(network.segments)]),
             seg=_segments(network),
+            segment=_named_segments(network),
             ends=network.ends.copy(),
             vert_off=_offsets([len(network.points)]),
             vert=network.points.copy(),
+            vertex=_vertices(network),
             arms=_arms(network),
             degree=network.degrees.copy(),
-            cell_box=np.array([[cells.x0, cells.y0, cells.scale]], dtype=np.float64),
-            cell_dim=np.array([[cells.nx, cells.ny, 0]], dtype=np.int64),
+            grid=_grid(cells, raster),
             seg_start=cells.seg_start,
             seg_item=cells.seg_item,
             vert_start=cells.vert_start,
             vert_item=cells.vert_item,
-            pave_scale=np.array([raster.scale], dtype=np.float64),
-            pave_dim=np.array([[raster.nx, raster.ny, 0]], dtype=np.int64),
             pave=raster.pave,
         )
     return cast(RoadTable, network.known[key])
@@ -137,6 +189,37 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
 def _segments(network: RoadNetwork) -> Floats:
     first, second = network.points[network.ends[:, 0]], network.points[network.ends[:, 1]]
     return np.concatenate([first, network.tangents, network.lengths[:, None], second], axis=1)
+
+
+def _named_segments(network: RoadNetwork) -> Rows[Segment]:
+    rows = table(Segment, len(network.segments))
+    names = ("x", "y", "tx", "ty", "length", "end_x", "end_y")
+    for name, column in zip(names, _segments(network).T, strict=True):
+        rows[name] = column
+    rows["first"], rows["second"] = network.ends.T
+    return rows
+
+
+def _vertices(network: RoadNetwork) -> Rows[Vertex]:
+    rows = table(Vertex, len(network.points))
+    rows["x"], rows["y"] = network.points.T
+    return rows
+
+
+def _grid(cells: Cells, raster: RoadRaster) -> Rows[CellGrid]:
+    rows = table(CellGrid, 1)
+    own = rows[0]
+    own.x0, own.y0, own.scale, own.nx, own.ny = cells.x0, cells.y0, cells.scale, cells.nx, cells.ny
+    own.pave_scale, own.pave_nx, own.pave_ny = raster.scale, raster.nx, raster.ny
+    return rows
+
+
+def _grids(grids: Sequence[Rows[CellGrid]]) -> Rows[CellGrid]:
+    """Return the cells of several networks, numbered one after another."""
+    rows = join(grids)
+    rows["first"] = _offsets(rows["nx"] * rows["ny"])[:-1]
+    rows["pave_first"] = _offsets(rows["pave_nx"] * rows["pave_ny"])[:-1]
+    return rows
 
 
 def _arms(network: RoadNetwork) -> Ints:
@@ -149,11 +232,6 @@ def _arms(network: RoadNetwork) -> Ints:
 
 def _offsets(counts: Sequence[int] | Ints) -> Ints:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-
-
-def _dimensions(sizes: Ints) -> Ints:
-    """Return columns and rows of cells with the number of the first."""
-    return np.concatenate([sizes[:, :2], _offsets(sizes[:, 0] * sizes[:, 1])[:-1, None]], axis=1)
 
 
 def _starts(starts: Sequence[npt.NDArray[np.int64]]) -> Ints:

@@ -6,10 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit
 
-INFINITE = float("inf")
 ARMS = 4
 """Most lanes that end in one intersection."""
 
@@ -35,7 +34,7 @@ class LaneTables(NamedTuple):
 class Search(NamedTuple):
     """Room for the search through n goals on L lanes.
 
-    `far` (4 n, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
+    `far` (n, 4, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
     from the lanes into one goal to those into another; `total`, `other` (4, 4) and `to_go` (n + 1, 4): what is reckoned
     with; `order`, `best` (n,): orders of the goals; `queue`, `waits` (L,); and what is found: `lane` (n L,), `arrival`
     (n,).
@@ -57,7 +56,7 @@ class Search(NamedTuple):
 def room(goals: int, lanes: int) -> Search:
     """Return room for a search."""
     return Search(
-        far=np.zeros((ARMS * goals, lanes)),
+        far=np.zeros((goals, ARMS, lanes)),
         leg=np.full((goals, goals, ARMS, ARMS), np.inf),
         total=np.zeros((ARMS, ARMS)),
         other=np.zeros((ARMS, ARMS)),
@@ -142,7 +141,7 @@ def _fill_legs(goals: Ints, g: LaneTables, own: Search) -> None:
     count = goals.shape[0]
     for b in range(count):
         for j in range(_arms(goals, g, b)):
-            far = own.far[ARMS * b + j]
+            far = own.far[b, j]
             metres_to(g.into[g.into_off[goals[b]] + j], g, far, own.queue, own.waits)
             for a in range(count):
                 if a == b and count > 1:
@@ -243,7 +242,7 @@ def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
         target = g.into[g.into_off[goals[b]] + following]
         begin = done
         while done == begin or lane != target:
-            lane, _ = _step(lane, g, own.far[ARMS * b + following])
+            lane, _ = _step(lane, g, own.far[b, following])
             own.lane[done] = lane
             done += 1
         own.arrival[k] = done - 1

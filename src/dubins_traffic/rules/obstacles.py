@@ -64,7 +64,7 @@ def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> O
         base.append(len(start) - 1)
         for segment in roads.seg[roads.seg_off[net] : roads.seg_off[net + 1]]:
             part, reaches = _on_segment(
-                obstacles.part[own], obstacles.owner[own], segment, float(roads.half_width[net])
+                obstacles.part[own], obstacles.parts["owner"][own], segment, float(roads.half_width[net])
             )
             parts.append(part[reaches])
             start.append(start[-1] + int(reaches.sum()))

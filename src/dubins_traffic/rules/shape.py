@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.boxes import nearest_in_box
+from dubins_traffic.kernels.boxes import Box, nearest_in_box
 from dubins_traffic.kernels.compile import jit
 
 
@@ -11,7 +11,7 @@ def distance2_to_body(
     px: float, py: float, x: float, y: float, c: float, s: float, half_length: float, half_width: float
 ) -> float:
     """Return the squared distance of (px, py) from a body without its rounding."""
-    qx, qy = nearest_in_box(px, py, x, y, c, s, half_length, half_width)
+    qx, qy = nearest_in_box(px, py, Box(x, y, c, s, half_length, half_width, 0.0))
     return (px - qx) * (px - qx) + (py - qy) * (py - qy)
 
 

@@ -14,6 +14,7 @@ from typing import Any, Final
 from pydantic_core import PydanticUndefined
 
 from dubins_traffic.agents.registry import names as agent_names
+from dubins_traffic.cars.dynamics import names as car_model_names
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
@@ -134,6 +135,11 @@ def metrics() -> tuple[Entry, ...]:
         told = (f"{own.name}: {own.meaning or own.heading}" for own in columns([name]))
         found.append(Entry(name, line, (), tuple(told)))
     return tuple(found)
+
+
+def car_models() -> tuple[Entry, ...]:
+    """Return the car models of this and other packages."""
+    return tuple(Entry(name, line) for name, line in car_model_names().items())
 
 
 def map_formats() -> tuple[Entry, ...]:

@@ -4,61 +4,42 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.kernels.boxes import Box
 from dubins_traffic.kernels.compile import jit
 
 
 @jit
-def box_gap(
-    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
-    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
-) -> float:  # fmt: skip
-    """Return the distance between two oriented boxes in metres, 0 where they overlap.
-
-    Parameters
-    ----------
-    ax, ay, ac, az, a_length, a_width : float
-        The first box: its centre (m), the cosine and sine of its heading, its half length and half width (m).
-    bx, by, bc, bz, b_length, b_width : float
-        The second box, in the same units: m, and a unit vector.
-    """
-    if _overlap(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width):
+def box_gap(one: Box, other: Box) -> float:
+    """Return the distance between two oriented boxes without their rounding, in metres, 0 where they overlap."""
+    if _overlap(one, other):
         return 0.0
-    return min(
-        _corners_to_box(ax, ay, ac, az, a_length, a_width, bx, by, bc, bz, b_length, b_width),
-        _corners_to_box(bx, by, bc, bz, b_length, b_width, ax, ay, ac, az, a_length, a_width),
-    )
+    return min(_corners_to_box(one, other), _corners_to_box(other, one))
 
 
 @jit
-def _corners_to_box(
-    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
-    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
-) -> float:  # fmt: skip
+def _corners_to_box(one: Box, other: Box) -> float:
     best = 1e300
     for k in range(4):
-        along = a_length if k < 2 else -a_length
-        across = a_width if k % 2 == 0 else -a_width
-        x = ax + ac * along - az * across - bx
-        y = ay + az * along + ac * across - by
-        dx = max(abs(bc * x + bz * y) - b_length, 0.0)
-        dy = max(abs(bc * y - bz * x) - b_width, 0.0)
+        along = one.half_length if k < 2 else -one.half_length
+        across = one.half_width if k % 2 == 0 else -one.half_width
+        x = one.x + one.c * along - one.s * across - other.x
+        y = one.y + one.s * along + one.c * across - other.y
+        dx = max(abs(other.c * x + other.s * y) - other.half_length, 0.0)
+        dy = max(abs(other.c * y - other.s * x) - other.half_width, 0.0)
         best = min(best, sqrt(dx * dx + dy * dy))
     return best
 
 
 @jit
-def _overlap(
-    ax: float, ay: float, ac: float, az: float, a_length: float, a_width: float,
-    bx: float, by: float, bc: float, bz: float, b_length: float, b_width: float,
-) -> bool:  # fmt: skip
+def _overlap(one: Box, other: Box) -> bool:
     """Tell whether no side of either box separates them."""
-    x = bx - ax
-    y = by - ay
-    c = abs(ac * bc + az * bz)
-    s = abs(ac * bz - az * bc)
+    x = other.x - one.x
+    y = other.y - one.y
+    c = abs(one.c * other.c + one.s * other.s)
+    s = abs(one.c * other.s - one.s * other.c)
     return (
-        abs(ac * x + az * y) <= a_length + c * b_length + s * b_width
-        and abs(ac * y - az * x) <= a_width + s * b_length + c * b_width
-        and abs(bc * x + bz * y) <= b_length + c * a_length + s * a_width
-        and abs(bc * y - bz * x) <= b_width + s * a_length + c * a_width
+        abs(one.c * x + one.s * y) <= one.half_length + c * other.half_length + s * other.half_width
+        and abs(one.c * y - one.s * x) <= one.half_width + s * other.half_length + c * other.half_width
+        and abs(other.c * x + other.s * y) <= other.half_length + c * one.half_length + s * one.half_width
+        and abs(other.c * y - other.s * x) <= other.half_width + s * one.half_length + c * one.half_width
     )

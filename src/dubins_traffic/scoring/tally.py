@@ -11,7 +11,7 @@ import numpy as np
 
 from dubins_traffic.cars.near import Spacing, ticks_within
 from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.tables import Tables
@@ -214,11 +214,7 @@ def _look_closer(b: int, near2: float, state: State, cars: CarTable, tally: Tall
 
 @jit
 def _car_gap(b: int, n: int, state: State, cars: CarTable) -> float:
-    half_length, half_width = cars.half_length[b], cars.half_width[b]
-    apart = box_gap(
-        state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO], half_length, half_width,
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], half_length, half_width,
-    )  # fmt: skip
+    apart = box_gap(box_at(b, EGO, state, cars), box_at(b, n, state, cars))
     return apart - 2.0 * cars.rounding[b]
 
 
@@ -229,16 +225,13 @@ def _look_at_obstacles(
     """Keep the smallest gap to the obstacles."""
     x, y = state.x[b, EGO], state.y[b, EGO]
     for k in range(obstacles.off[b], obstacles.off[b + 1]):
-        p = obstacles.part[k]
-        dx = p[0] - x
-        dy = p[1] - y
-        far = floats[CLEARANCE] + cars.reach[b] + p[7] + 1e-9
+        part = obstacles.parts[k]
+        dx = part.x - x
+        dy = part.y - y
+        far = floats[CLEARANCE] + cars.reach[b] + part.reach + 1e-9
         if floats[CLEARANCE] > 0.0 and dx * dx + dy * dy <= far * far:
-            apart = box_gap(
-                x, y, state.c[b, EGO], state.s[b, EGO], cars.half_length[b], cars.half_width[b],
-                p[0], p[1], p[2], p[3], p[4], p[5],
-            )  # fmt: skip
-            floats[CLEARANCE] = min(floats[CLEARANCE], apart - cars.rounding[b] - p[6])
+            apart = box_gap(box_at(b, EGO, state, cars), box_of(part))
+            floats[CLEARANCE] = min(floats[CLEARANCE], apart - cars.rounding[b] - part.rounding)
 
 
 @jit_inline

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import Pose, State
+from dubins_traffic.cars.state import Command, Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
-from dubins_traffic.policies.safety import GUARD, may_hit, motion_is_safe
+from dubins_traffic.policies.safety import GUARD, body_at, may_hit, motion_is_safe, travel_of
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
@@ -52,15 +52,6 @@ def bounded(speed: float, yaw_rate: float, vehicle: Vehicle) -> tuple[float, flo
 
 
 @jit_inline
-def travel_of(vehicle: Vehicle) -> float:
-    """Return how far any point of a car may get in a tick, metres."""
-    travel = max(vehicle.fastest, -vehicle.slowest) * vehicle.period
-    if vehicle.half_length > 0.0:
-        travel += vehicle.yaw_most * vehicle.reach * vehicle.period
-    return travel
-
-
-@jit_inline
 def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch: Scratch) -> int:
     """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
     far = 2.0 * (vehicle.reach + 1.2 * travel_of(vehicle)) + GUARD
@@ -83,23 +74,18 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
     of its way, which GUARD covers unless ticks are long.
     """
     state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
-    x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
-    p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach
-    period = vehicle.period
+    pose = Pose(state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO])
+    command = Command(speed, yaw_rate)
     travel = travel_of(vehicle)
-    own = (abs(speed) + (abs(yaw_rate) * reach if p > 0.0 else 0.0)) * period
+    turns = abs(yaw_rate) * vehicle.reach if vehicle.half_length > 0.0 else 0.0
+    own = (abs(speed) + turns) * vehicle.period
     between = max(own / 8.0 - GUARD, 0.0)
     for k in range(near):
         j = scratch.near[k]
-        if not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel + between,
-        ):  # fmt: skip
+        other = body_at(Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j]), vehicle)
+        if not motion_is_safe(pose, command, vehicle, other, travel + between):
             return True
-    return may_hit(
-        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-        obstacles.part, obstacles.off[b], obstacles.off[b + 1], travel + between + GUARD, between,
-    )  # fmt: skip
+    return may_hit(b, pose, command, vehicle, obstacles, travel + between + GUARD, between)
 
 
 @jit

@@ -16,13 +16,13 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.policy import decide_trial
 from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
-from dubins_traffic.policies.safety import GUARD
+from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
-from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch, travel_of
+from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch
 from dubins_traffic.shield.tables import (
     EGO,
     Guards,

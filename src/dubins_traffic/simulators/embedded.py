@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dubins_traffic.cars.motion import step
-from dubins_traffic.cars.partners import Workspace, workspace
-from dubins_traffic.cars.rows import Rows, rows
+from dubins_traffic.cars.body import DUBINS
+from dubins_traffic.cars.motion import Motion, step
+from dubins_traffic.cars.partners import Meeting, enlarged, workspace
+from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.state import Contact, State
-from dubins_traffic.cars.tables import CarTable, ObstacleTable, pack_cars, pack_obstacles
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.protocols import Capabilities
+from dubins_traffic.simulators.modelled import ModelledCars
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -29,7 +31,8 @@ ABSENT = 1e9
 class Embedded:
     """Moves every car on the exact arc of its command and finds every contact of the interval in order of time.
 
-    The order of events is that of `docs/semantics.md`; the method is in `kernels.boxes` and `cars.motion`.
+    The order of events is that of `docs/semantics.md`; the method is in `kernels.boxes` and `cars.motion`. Cars of
+    another model than the Dubins car are moved by `simulators.modelled`, one trial at a time.
     """
 
     capabilities = Capabilities(batched=True, deterministic=True, lockstep=True, forks=True)
@@ -45,8 +48,6 @@ class Embedded:
                 "a batch has one control rate", field="rate", value=sorted(rates), expected="one"
             )
         self._rate = rates.pop()
-        self._cars = pack_cars([instance.problem.car for instance in instances])
-        self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         counts = [len(instance.starts) for instance in instances]
         places = -(-max(counts) // grain) * grain
         state = State.zeros(len(instances), places)
@@ -58,11 +59,18 @@ class Embedded:
         for k, array in enumerate((state.x, state.y, state.c, state.s)):
             array[present] = starts[:, k]
         self.state = state
-        self._work = workspace(len(instances), places)
+        cars = pack_cars([instance.problem.car for instance in instances])
+        self.motion = Motion(
+            state=state,
+            obstacles=pack_obstacles([instance.problem.obstacles for instance in instances]),
+            cars=cars,
+            rows=rows(cars, places, 1.0 / self._rate),
+            work=workspace(len(instances), places),
+        )
         self._none: list[tuple[Contact, ...]] = [()] * len(instances)
-        self._rows = rows(self._cars, places, 1.0 / self._rate)
         self._tick = 0
         self._move = bound(step)
+        self._modelled = self._models(instances)
         return state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -75,48 +83,50 @@ class Embedded:
         trials = len(self._none)
         contacts: list[tuple[Contact, ...]] = self._none
         self._tick += 1
+        if self._modelled is not None:
+            return [self._modelled.step(commands, lambda row: contact_of(row, self._tick, self._rate))]
         done = 0
         while done < trials:
-            reached = self._move(done, 1.0 / self._rate, commands, self.state, *self.tables)
-            if self._work.found[0]:
+            reached = self._move(done, 1.0 / self._rate, commands, self.motion)
+            if self.motion.work.found[0]:
                 contacts = self._collect(contacts)
             done = -1 - reached if reached < 0 else reached
             if reached < 0:
-                self._work = enlarged(self._work)
+                self.motion = self.motion.replace(work=enlarged(self.motion.work))
         return contacts
-
-    @property
-    def tables(self) -> tuple[CarTable, ObstacleTable, Rows, Workspace]:
-        """The tables with which the kernels of `cars.motion` move this batch."""
-        return self._cars, self._obstacles, self._rows, self._work
 
     def close(self) -> None:
         """Nothing is held outside memory."""
 
+    def _models(self, instances: Sequence[Instance]) -> ModelledCars | None:
+        """Return what moves the cars if they are not Dubins cars: of one trial, since Python moves them."""
+        others = [
+            instance.problem.car.model for instance in instances if instance.problem.car.model != DUBINS
+        ]
+        if not others:
+            return None
+        if len(instances) > 1:
+            raise InputError("trials with a car model run by themselves", field="car.model", value=others[0])
+        return ModelledCars(instances[0], self.motion)
+
     def _collect(self, contacts: list[tuple[Contact, ...]]) -> list[tuple[Contact, ...]]:
         contacts = list(contacts)
-        for row in self._work.contact[: self._work.found[0]].tolist():
-            contacts[int(row[0])] += (contact_of(row, self._tick, self._rate),)
+        for row in self.motion.work.meetings():
+            contacts[row.b] += (contact_of(row, self._tick, self._rate),)
         return contacts
 
 
-def contact_of(row: Sequence[float], tick: int, rate: float) -> Contact:
+def contact_of(row: Meeting, tick: int, rate: float) -> Contact:
     """Return the contact in a row of `Workspace.contact`, of the tick that ends in frame `tick`."""
     return Contact(
         tick=tick,
-        time=(tick - 1) / rate + row[3],
-        car=int(row[1]),
-        other=int(row[2]),
-        x=row[4],
-        y=row[5],
-        nx=row[6],
-        ny=row[7],
-        closing=(row[8], row[9]),
-        moved=(row[10] != 0, row[11] != 0),
+        time=(tick - 1) / rate + row.time,
+        car=row.car,
+        other=row.other,
+        x=row.px,
+        y=row.py,
+        nx=row.nx,
+        ny=row.ny,
+        closing=(row.closing, row.other_closing),
+        moved=(row.moved != 0, row.other_moved != 0),
     )
-
-
-def enlarged(work: Workspace) -> Workspace:
-    """Return the workspace with more room for pairs."""
-    pairs = 4 * len(work.when)
-    return work.replace(pair=np.zeros((pairs, 2), dtype=np.int64), when=np.zeros(pairs))

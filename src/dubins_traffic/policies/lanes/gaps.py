@@ -3,213 +3,152 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
-from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.cars.tables import box_of
+from dubins_traffic.kernels.boxes import Box, separation
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.policies.lanes.paths import GATE_X, GATE_Y, HIGH, LENGTH, LOW, NO_STOP, STOP
-from dubins_traffic.policies.lanes.tracking import next_row, place_on
-
-SAMPLES = 46
-SPACING = 0.1
-"""The path is looked at every 0.1 m, 4.5 m ahead."""
-RETURN = 0.7
-"""Metres in which a car that has passed something returns to its path."""
-
-PX, PY, TX, TY, P_LOW, P_HIGH = range(6)
-SAMPLE_FIELDS = 6
-
-OX, OY, OC, OS, O_SPEED, O_YAW, O_STILL, O_SEEN, O_GAP = range(9)
-OTHER_FIELDS = 9
-"""Another car: pose, speed, yaw rate, seconds since it last moved, whether it is seen, the gap to it now."""
-NOBODY = -(2**40)
+from dubins_traffic.policies.lanes.knowledge import NOBODY, Follower, Knowledge, SeenCar
+from dubins_traffic.policies.lanes.tracking import ahead_on, next_row, place_on
+from dubins_traffic.policies.safety import body_at
 
 
-@jit
-def sample_path(
-    path: Floats, row: int, sigma: float, first: int, end: int, loop: int, sample: Floats
-) -> None:
-    """Fill `sample` (SAMPLES, SAMPLE_FIELDS) with points, tangents and bounds of the offset ahead on a path."""
-    for k in range(sample.shape[0]):
-        for _ in range(64):
-            if sigma <= path[row, LENGTH]:
-                break
-            sigma -= path[row, LENGTH]
-            row = next_row(row, first, end, loop)
-        px, py, tx, ty = place_on(path, row, sigma)
-        sample[k, PX] = px
-        sample[k, PY] = py
-        sample[k, TX] = tx
-        sample[k, TY] = ty
-        sample[k, P_LOW] = path[row, LOW]
-        sample[k, P_HIGH] = path[row, HIGH]
-        sigma += SPACING
+class Manoeuvre(NamedTuple):
+    """A way aside and back: an offset to the left that goes from `begin` metres to `aim` metres within `ramp` metres.
 
-
-@jit
-def offset_at(distance: float, begin: float, aim: float, ramp: float, until: float) -> float:
-    """Return the offset to the left of a manoeuvre after `distance` metres: from `begin` to `aim` within `ramp`,
-    and from `until` on back to 0 within RETURN.
+    From `until` metres on it goes back to 0 within `Manner.returns`.
     """
-    if distance >= until:
-        return aim * max(0.0, 1.0 - (distance - until) / RETURN)
-    if distance >= ramp:
-        return aim
-    return begin + (aim - begin) * max(distance, 0.0) / ramp
+
+    begin: float
+    aim: float
+    ramp: float
+    until: float
 
 
 @jit
-def gap_to(
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    half_length: float,
-    half_width: float,
-    rounding: float,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    o_length: float,
-    o_width: float,
-    o_rounding: float,
-) -> float:
+def manoeuvre_of(ego: Follower) -> Manoeuvre:
+    """Return what the ego is about."""
+    return Manoeuvre(ego.begin, ego.aim, ego.ramp, ego.until)
+
+
+@jit
+def offset_at(distance: float, manoeuvre: Manoeuvre, returns: float) -> float:
+    """Return the offset to the left after `distance` (m) of a manoeuvre; `returns` (m) is `Manner.returns`."""
+    if distance >= manoeuvre.until:
+        return manoeuvre.aim * max(0.0, 1.0 - (distance - manoeuvre.until) / returns)
+    if distance >= manoeuvre.ramp:
+        return manoeuvre.aim
+    return manoeuvre.begin + (manoeuvre.aim - manoeuvre.begin) * max(distance, 0.0) / manoeuvre.ramp
+
+
+@jit
+def sample_path(known: Knowledge) -> None:
+    """Fill the samples with what lies ahead of the ego."""
+    row, sigma = known.follower.row, known.follower.sigma
+    for k in range(known.sample.shape[0]):
+        row, sigma = ahead_on(known, row, sigma, False)
+        piece = known.path[row]
+        sample = known.sample[k]
+        sample.x, sample.y, sample.tx, sample.ty = place_on(piece, sigma)
+        sample.low = piece.low
+        sample.high = piece.high
+        sigma += known.manner.spacing
+
+
+@jit
+def gap_between(one: Box, other: Box) -> float:
     """Return the gap between two rounded boxes; for two discs without ado."""
-    if half_length + half_width + o_length + o_width == 0.0:
-        return sqrt((ox - x) * (ox - x) + (oy - y) * (oy - y)) - rounding - o_rounding
-    gap, _, _, _, _ = separation(
-        x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-    )
+    if one.half_length + one.half_width + other.half_length + other.half_width == 0.0:
+        dx = other.x - one.x
+        dy = other.y - one.y
+        return sqrt(dx * dx + dy * dy) - one.rounding - other.rounding
+    gap, _, _, _, _ = separation(one, other)
     return gap
 
 
 @jit
-def first_conflict(
-    sample: Floats,
-    last: int,
-    done: float,
-    begin: float,
-    aim: float,
-    ramp: float,
-    until: float,
-    half_length: float,
-    half_width: float,
-    rounding: float,
-    reach: float,
-    others: Floats,
-    parts: Floats,
-    part_from: int,
-    part_to: int,
-    still_margin: float,
-    moving_margin: float,
-) -> tuple[int, int, int]:
-    """Return (first, who, nearest): the first of the samples 1..`last` at which a car that follows them comes nearer
-    to a body than the margin, that body (part p: -1 - p), and the sample nearest to it; (-1, NOBODY, -1) if none.
+def pose_of(car: SeenCar) -> Pose:
+    """Return where a car is."""
+    return Pose(car.x, car.y, car.c, car.s)
 
-    `done` metres of the manoeuvre (`begin`, `aim`, `ramp`, `until`: see `offset_at`) are behind. `others`
-    (N, OTHER_FIELDS) are cars with the same body; `parts` rounded boxes that never move. Where a gap is smaller than
-    the margin already, it may stay so.
-    """  # fmt: skip
-    px = py = pc = ps = 0.0
+
+@jit
+def first_conflict(
+    known: Knowledge, last: int, done: float, manoeuvre: Manoeuvre, still_margin: float, moving_margin: float
+) -> tuple[int, int, int]:
+    """Return (first, who, nearest): where a car that follows the samples first comes too near to a body.
+
+    It is the first of the samples 1 to `last` (number) at which it comes nearer than the margin, that body (part p:
+    -1 - p), and the sample nearest to that; (-1, NOBODY, -1) if there is none. Of the manoeuvre `done` (m) are behind.
+    Kept are `still_margin` (m) from what stands and `moving_margin` (m) from what moves; where a gap is smaller
+    already, it may stay so.
+    """
+    vehicle, obstacles, tick = known.vehicle, known.obstacles, known.follower.tick
+    before = body_at(Pose(0.0, 0.0, 0.0, 0.0), vehicle)
     for k in range(last + 1):
-        row = sample[k]
-        offset = offset_at(done + SPACING * k, begin, aim, ramp, until)
+        place = known.sample[k]
+        offset = offset_at(done + known.manner.spacing * k, manoeuvre, known.manner.returns)
         if k > 0:
-            offset = min(max(offset, row[P_LOW]), row[P_HIGH])
-        tx = row[TX]
-        ty = row[TY]
-        x = row[PX] - offset * ty
-        y = row[PY] + offset * tx
-        for n in range(others.shape[0]):
-            o = others[n]
-            margin = still_margin if o[O_STILL] > 0.0 else moving_margin
-            margin = min(margin, max(o[O_GAP] - 0.005, 0.0))
-            dx = o[OX] - x
-            dy = o[OY] - y
-            near = 2.0 * reach + margin
-            if o[O_SEEN] != 0.0 and k > 0 and dx * dx + dy * dy < near * near and comes_nearer(
-                px, py, pc, ps, x, y, tx, ty, half_length, half_width, rounding,
-                o[OX], o[OY], o[OC], o[OS], half_length, half_width, rounding, margin,
-            ):  # fmt: skip
-                return k, n, nearest_sample(sample, k, o[OX], o[OY])
-        for p in range(part_from, part_to):
-            o = parts[p]
-            dx = o[0] - x
-            dy = o[1] - y
-            near = reach + o[7] + still_margin
-            if k > 0 and dx * dx + dy * dy < near * near and comes_nearer(
-                px, py, pc, ps, x, y, tx, ty, half_length, half_width, rounding,
-                o[0], o[1], o[2], o[3], o[4], o[5], o[6], still_margin,
-            ):  # fmt: skip
-                return k, -1 - p, nearest_sample(sample, k, o[0], o[1])
-        px, py, pc, ps = x, y, tx, ty
+            offset = min(max(offset, place.low), place.high)
+        x = place.x - offset * place.ty
+        y = place.y + offset * place.tx
+        body = body_at(Pose(x, y, place.tx, place.ty), vehicle)
+        for n in range(known.other.shape[0]):
+            car = known.other[n]
+            margin = still_margin if known.still[n] > 0.0 else moving_margin
+            margin = min(margin, max(known.gap[n] - 0.005, 0.0))
+            dx = car.x - x
+            dy = car.y - y
+            near = 2.0 * vehicle.reach + margin
+            is_near = car.tick == tick and k > 0 and dx * dx + dy * dy < near * near
+            if is_near and comes_nearer(before, body, body_at(pose_of(car), vehicle), margin):
+                return k, n, nearest_sample(known, k, car.x, car.y)
+        for p in range(obstacles.parts.shape[0]):
+            part = obstacles.parts[p]
+            dx = part.x - x
+            dy = part.y - y
+            near = vehicle.reach + part.reach + still_margin
+            is_near = k > 0 and dx * dx + dy * dy < near * near
+            if is_near and comes_nearer(before, body, box_of(part), still_margin):
+                return k, -1 - p, nearest_sample(known, k, part.x, part.y)
+        before = body
     return -1, NOBODY, -1
 
 
 @jit
-def comes_nearer(
-    px: float,
-    py: float,
-    pc: float,
-    ps: float,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    half_length: float,
-    half_width: float,
-    rounding: float,
-    ox: float,
-    oy: float,
-    oc: float,
-    os: float,
-    o_length: float,
-    o_width: float,
-    o_rounding: float,
-    margin: float,
-) -> bool:
-    """Whether a body comes nearer than `margin` to another in going from the pose (px, ..) to (x, ..)."""
-    gap = gap_to(x, y, c, s, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding)
-    if gap >= margin:
-        return False
-    before = gap_to(
-        px, py, pc, ps, half_length, half_width, rounding, ox, oy, oc, os, o_length, o_width, o_rounding
-    )
-    return gap < before
+def comes_nearer(before: Box, after: Box, other: Box, margin: float) -> bool:
+    """Whether a body that goes from `before` to `after` comes nearer than `margin` (m) to another."""
+    gap = gap_between(after, other)
+    return gap < margin and gap < gap_between(before, other)
 
 
 @jit
-def nearest_sample(sample: Floats, k: int, x: float, y: float) -> int:
-    """Return the sample from `k` on, as long as they come nearer, that is nearest to a point."""
+def nearest_sample(known: Knowledge, k: int, x: float, y: float) -> int:
+    """Return the sample from `k` (number) on, as long as they come nearer, that is nearest to a point."""
     best = 1e300
-    for m in range(k, sample.shape[0]):
-        dx = x - sample[m, PX]
-        dy = y - sample[m, PY]
+    for m in range(k, known.sample.shape[0]):
+        dx = x - known.sample[m].x
+        dy = y - known.sample[m].y
         d2 = dx * dx + dy * dy
         if d2 > best:
             return m - 1
         best = d2
-    return sample.shape[0] - 1
+    return known.sample.shape[0] - 1
 
 
 @jit
-def next_gate(
-    path: Floats, row: int, sigma: float, behind: float, first: int, end: int, loop: int
-) -> tuple[float, float, float]:
-    """Return (distance, x, y): metres to the next line to wait at, and the intersection behind it.
-
-    A line up to `behind` metres behind counts too. The distance is NO_STOP if there is none within 4 m.
-    """
-    far = -sigma
+def next_gate(known: Knowledge) -> tuple[int, float]:
+    """Return the row of the path with the next line to wait at within 4 m, and the metres to that; (-1, 0) if none."""
+    row = known.follower.row
+    far = -known.follower.sigma
     for _ in range(64):
-        to_line = far + path[row, STOP]
-        if path[row, STOP] < NO_STOP and to_line >= -behind:
-            if to_line > 4.0:
-                break
-            return to_line, path[row, GATE_X], path[row, GATE_Y]
-        far += path[row, LENGTH]
+        piece = known.path[row]
+        to_line = far + piece.stop
+        if piece.waits != 0 and to_line >= -known.manner.past_line:
+            return (row, to_line) if to_line <= 4.0 else (-1, 0.0)
+        far += piece.length
         if far > 4.0:
             break
-        row = next_row(row, first, end, loop)
-    return NO_STOP, 0.0, 0.0
+        row = next_row(row, known)
+    return -1, 0.0

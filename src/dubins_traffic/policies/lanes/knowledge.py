@@ -1,75 +1,183 @@
-"""What the controller `lanes` knows and remembers, as arrays over a batch, and its constants."""
+"""What the controller `lanes` knows and remembers, and how it drives."""
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.cars.tables import ObstacleTable
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.records import Rows, record
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.policies.lanes.paths import WAITING_GAP, PathRow
+from dubins_traffic.policies.rules.tables import Vehicle
 
-# These numbers are compiled into functions with @jit: the mark puts this file into the fingerprint of their cache.
-HALF_LENGTH, HALF_WIDTH, ROUNDING, REACH, SLOWEST, FASTEST, YAW_MOST, RADIUS, DISC, PERIOD, FOLLOW = range(11)
-CAR_FIELDS = 11
+NOBODY = -(2**40)
+"""In place of a car's number, or of -1 - p for an obstacle's part p."""
 
-SIGMA, ODO, LEFT, BEGIN, AIM, FROM, RAMP, UNTIL, WAITED, BACKING, TRIED, SHUFFLED, STUCK, MARK = range(14)
-MEMORY_FIELDS = 14
 
-NEAR = 1.06
-"""Within this of the ego, centre to centre, a cautious car does not move, metres."""
-CLEAR = 1.2
-"""So far the ego backs up from it."""
-GAIN = 2.0
-"""Speed falls by this much per metre of missing gap, 1/s."""
-BACK_SPEED = 0.3
-"""Speed backwards, m/s; PASSING_SPEED is that past what stands."""
-PASSING_SPEED = 0.45
-STANDS = 1.0
-"""A car counts as standing when it has neither moved nor turned for so long, seconds."""
-PATIENCE = 2.5
-"""Seconds to wait before passing what stands."""
-RETRY = 0.5
-"""Seconds between two looks for a way past."""
-DESPAIR = 5.0
-"""Seconds to wait before asking for another route."""
-SIDESTEP = 0.1
-"""Offsets are tried in steps of this, metres."""
-STILL_MARGIN = 0.05
-PASSING_MARGIN = 0.09
-MOVING_MARGIN = 0.1
-WARY_MARGIN = 0.5
-"""Gaps kept: from what stands, the same when a way past is chosen, from what moves, and the same when passing."""
-PROGRESS = 0.3
-"""Metres that the car must get on for its waits to be forgotten."""
-TURN_SHARE = 0.1
-"""Seconds of standing that a radian of turning in place counts."""
-HELD_UP = 0.4
-"""Seconds without leave to move after which the car looks for another way."""
-BARRED = -1.0
-"""The car has backed up, or tried to, and moves on first."""
-MOVES, TURNS = 0.02, 0.05
-SHUTTLE = 10
-"""Ticks of each stroke of a car that has to shuttle to turn round."""
+@record
+class Manner:
+    """How the controller drives."""
+
+    follow: float
+    """Gap kept behind cars, centre to centre, metres."""
+    near: float = 1.06
+    """Within this of the ego, centre to centre, a cautious car does not move, metres."""
+    clear: float = 1.2
+    """So far the ego backs up from it, metres."""
+    gain: float = 2.0
+    """Speed falls by this much per metre of missing gap, 1/s."""
+    back_speed: float = 0.3
+    """Speed backwards, m/s."""
+    passing_speed: float = 0.45
+    """Speed past what stands, m/s."""
+    stands: float = 1.0
+    """A car counts as standing when it has neither moved nor turned for so long, seconds."""
+    moves: float = 0.02
+    """A car moves that is faster than this, m/s."""
+    turns: float = 0.05
+    """A car turns that turns faster than this, rad/s."""
+    patience: float = 2.5
+    """Seconds to wait before passing what stands."""
+    retry: float = 0.5
+    """Seconds between two looks for a way past."""
+    despair: float = 5.0
+    """Seconds to wait before asking for another route."""
+    held_up: float = 0.4
+    """Seconds without leave to move after which the car looks for another way."""
+    progress: float = 0.3
+    """Metres that the car must get on for its waits to be forgotten."""
+    turn_share: float = 0.1
+    """Seconds of standing that a radian of turning in place counts."""
+    shuttle: int = 10
+    """Ticks of each stroke of a car that has to shuttle to turn round."""
+    still_margin: float = 0.05
+    """Gap kept from what stands, metres."""
+    moving_margin: float = 0.1
+    """Gap kept from what moves, metres."""
+    passing_margin: float = 0.09
+    """Gap kept from what stands when a way past is chosen, metres."""
+    wary_margin: float = 0.5
+    """Gap kept from what moves when a way past is chosen, metres."""
+    sidestep: float = 0.1
+    """Offsets are tried in steps of this, metres."""
+    returns: float = 0.7
+    """Metres in which a car that has passed something returns to its path."""
+    spacing: float = 0.1
+    """Between two places at which the path ahead is looked at, metres."""
+    ahead: float = 0.2
+    """How far ahead on its path a car aims, metres."""
+    reached: float = 0.02
+    """A corner counts as reached within this, metres."""
+    past_line: float = WAITING_GAP - 0.02
+    """A car this far beyond a line waits for it still, metres."""
+
+
+@record
+class Follower:
+    """The ego: where it is, where on its path, what it is about, what it remembers, and what it decides."""
+
+    tick: int
+    """The tick for which it decides."""
+    x: float
+    """Its centre, metres."""
+    y: float
+    """Its centre, metres."""
+    c: float
+    """Cosine of its heading."""
+    s: float
+    """Sine of its heading."""
+    row: int
+    """The row of its path that it is on."""
+    loop: int
+    """The row that follows the last."""
+    sigma: float
+    """Metres along the row."""
+    left: float
+    """Metres left of it."""
+    odometer: float
+    """Metres along the path since it was planned."""
+    begin: float
+    """`Manoeuvre.begin` of what it is about, metres."""
+    aim: float
+    """`Manoeuvre.aim`, metres."""
+    ramp: float
+    """`Manoeuvre.ramp`, metres."""
+    until: float
+    """`Manoeuvre.until`, metres."""
+    since: float
+    """What the odometer showed when that began, metres."""
+    waited: float
+    """For how long it has been kept waiting, seconds."""
+    tried: float
+    """For how long since it last looked for a way past, seconds."""
+    stuck: float
+    """For how long it has wanted to move and has not, seconds."""
+    mark: float
+    """What the odometer showed when it last got on, metres."""
+    backs_from: int = -1
+    """The car that it backs up from, or -1."""
+    is_barred: int
+    """1 if it has backed up, or tried to, and moves on first."""
+    shuffled: int
+    """Ticks of shuttling."""
+    speed: float
+    """What it decides, m/s."""
+    yaw_rate: float
+    """What it decides, rad/s."""
+    blocker: int = NOBODY
+    """Who has kept it waiting for too long: a new path is asked for."""
+
+
+@record
+class SeenCar:
+    """Another car as the ego sees it."""
+
+    x: float
+    """Its centre, metres."""
+    y: float
+    """Its centre, metres."""
+    c: float
+    """Cosine of its heading."""
+    s: float
+    """Sine of its heading."""
+    speed: float
+    """m/s."""
+    yaw_rate: float
+    """rad/s."""
+    tick: int = -1
+    """The tick in which it was last seen."""
+
+
+@record
+class Sample:
+    """A place of the path ahead."""
+
+    x: float
+    """Where it is, metres."""
+    y: float
+    """Where it is, metres."""
+    tx: float
+    """Of the unit vector along the path."""
+    ty: float
+    """Of the unit vector along the path."""
+    low: float
+    """`PathRow.low` there, metres."""
+    high: float
+    """`PathRow.high` there, metres."""
 
 
 class Knowledge(Tables):
-    """What the law knows and remembers of each trial of a batch.
+    """What the policy knows and remembers of a trial.
 
-    `path` (rows, paths.FIELDS): all trials' paths; `span` (B, 3): first row, end, and number of the row after the
-    last; `row` (B,): the row a car is on. `memory` (B, MEMORY_FIELDS), `ego` (B, 4): pose; `others`
-    (B, N, gaps.OTHER_FIELDS); `car` (B, CAR_FIELDS): body, bounds, radius of discs, period, gap to follow at.
-    `part` and `part_off`: obstacles as in `cars.tables`. `net` (B,): number of the network in
-    the table of roads. `sample`: a workspace. `command` (B, 2): the answer.
-    `blocker` (B,): who has kept the car waiting for too long (a car, -1 - part, or NOBODY): a new path is asked for.
+    `path` (rows,); `other` (N,): the other cars, `still` (N,): for how long each has stood, seconds, and `gap` (N,):
+    how far it is, metres; `sample` (K,): a workspace.
     """
 
-    path: Floats
-    span: Ints
-    row: Ints
-    memory: Floats
-    ego: Floats
-    others: Floats
-    car: Floats
-    part: Floats
-    part_off: Ints
-    net: Ints
-    sample: Floats
-    command: Floats
-    blocker: Ints
+    path: Rows[PathRow]
+    follower: Follower
+    vehicle: Vehicle
+    manner: Manner
+    other: Rows[SeenCar]
+    still: Floats
+    gap: Floats
+    obstacles: ObstacleTable
+    sample: Rows[Sample]

@@ -1,7 +1,7 @@
-"""Paths: routes along lanes as rows of numbers that compiled laws follow.
+"""Paths: routes along lanes as rows that compiled policies follow.
 
-A path is an array (rows, FIELDS). Each row is a piece: a line or a short arc, along the middle of a right lane or
-through an intersection. After the last row comes row `loop`, so that a path has no end.
+Each row is a piece: a line or a short arc, along the middle of a right lane or through an intersection. After the last
+row comes row `loop`, so that a path has no end.
 """
 
 from __future__ import annotations
@@ -12,26 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.policies.lanes.turns import Piece, Site, Turn, along, angle_between, shape
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
-# These numbers are compiled into functions with @jit: the mark puts this file into the fingerprint of their cache.
-X, Y, C, S, LENGTH, BEND = range(6)
-"""Start, unit heading, metres and curvature of a piece."""
-LOW, HIGH = 6, 7
-"""How far a car may keep left of the piece (right: negative) and stay on the road, metres."""
-PIVOT = 8
-"""Not 0: the end has to be reached before the next piece is begun, where the car turns in place."""
-STOP, GATE_X, GATE_Y = 9, 10, 11
-"""Metres along the piece to the line at which to wait for the intersection at (GATE_X, GATE_Y), or NO_STOP."""
-LANE = 12
-"""Number of the lane, -1 in a turn."""
-FIELDS = 13
-
-NO_STOP = 1e9
 EDGE = 0.15
 """What an evading car's centre keeps from the edge of the road, in units of w."""
 WAITING_GAP = 0.3
@@ -39,11 +25,45 @@ WAITING_GAP = 0.3
 and keeps a metre away from those that wait can still leave."""
 
 
+@record
+class PathRow:
+    """A piece of a path."""
+
+    x: float
+    """Its start, metres."""
+    y: float
+    """Its start, metres."""
+    c: float
+    """Its unit heading there."""
+    s: float
+    """Its unit heading there."""
+    length: float
+    """Metres."""
+    bend: float
+    """Curvature, 1/m."""
+    low: float
+    """How far left of it a car may keep at least (right: negative) and stay on the road, metres."""
+    high: float
+    """How far left of it a car may keep at most, metres."""
+    pivot: int
+    """1 if the end has to be reached before the next piece is begun, where the car turns in place."""
+    waits: int
+    """1 if there is a line at which to wait for an intersection."""
+    stop: float
+    """Metres along the piece to that line."""
+    gate_x: float
+    """Where that intersection is, metres."""
+    gate_y: float
+    """Where that intersection is, metres."""
+    lane: int = -1
+    """Number of the lane, -1 in a turn."""
+
+
 @dataclass(frozen=True, slots=True)
 class Path:
-    """`rows` (rows, FIELDS) and the number of the row that follows the last."""
+    """`rows` (rows,) and the number of the row that follows the last."""
 
-    rows: Floats
+    rows: Rows[PathRow]
     loop: int
 
 
@@ -91,7 +111,7 @@ class PathMaker:
 
         After the last lane follows `lanes[loop]`; 1 <= loop, and the last lane is `lanes[loop - 1]` again.
         """
-        rows: list[list[float]] = []
+        rows: list[dict[str, float]] = []
         loop_row = 0
         begin = start
         for k, lane in enumerate(lanes):
@@ -102,11 +122,14 @@ class PathMaker:
             rows.append(self._lane_row(lane, begin, turn))
             rows += self._turn_rows(lane, turn)
             begin = turn.after
-        array = np.array(rows, dtype=np.float64).reshape(len(rows), FIELDS)
-        self._bound(array)
-        return Path(array, loop_row)
+        path = table(PathRow, len(rows))
+        for k, values in enumerate(rows):
+            for name, value in values.items():
+                setattr(path[k], name, value)
+        self._bound(path)
+        return Path(path, loop_row)
 
-    def _lane_row(self, lane: int, begin: float, turn: Turn) -> list[float]:
+    def _lane_row(self, lane: int, begin: float, turn: Turn) -> dict[str, float]:
         problem = self._problem
         w = problem.car.w
         (x0, y0), _ = self._network.lane_line(lane, -w)
@@ -115,36 +138,47 @@ class PathMaker:
         end = max(length - turn.before, begin)
         sharp = bool(turn.pieces[0].pivot) if turn.pieces else turn.cost != 0.0
         v = self._network.lane_ends(lane)[1]
-        stop = NO_STOP
+        row = {
+            "x": x0 + begin * tx,
+            "y": y0 + begin * ty,
+            "c": tx,
+            "s": ty,
+            "length": end - begin,
+            "lane": lane,
+        }
+        row |= {"low": -w + EDGE * w, "high": 3.0 * w - EDGE * w, "pivot": int(sharp)}
         if self._degrees[v] != 2:
             reach = problem.intersection_radius + problem.car.body.reach
             stop = min(length - reach - WAITING_GAP, end)
             stop = max(stop, min(reach, length - reach - 0.02)) - begin
-        row = [x0 + begin * tx, y0 + begin * ty, tx, ty, end - begin, 0.0]
-        row += [-w + EDGE * w, 3.0 * w - EDGE * w, float(sharp), stop, *self._points[v], float(lane)]
+            row |= {"waits": 1, "stop": stop, "gate_x": self._points[v][0], "gate_y": self._points[v][1]}
         return row
 
-    def _turn_rows(self, lane: int, turn: Turn) -> list[list[float]]:
+    def _turn_rows(self, lane: int, turn: Turn) -> list[dict[str, float]]:
         tx, ty = self._directions[lane]
         x0, y0 = self._points[self._network.lane_ends(lane)[1]]
-        rows: list[list[float]] = []
+        rows: list[dict[str, float]] = []
         for piece in turn.pieces:
-            x, y = x0 + piece.x * tx - piece.y * ty, y0 + piece.x * ty + piece.y * tx
-            c, s = piece.c * tx - piece.s * ty, piece.c * ty + piece.s * tx
-            row = [x, y, c, s, piece.length, piece.bend, 0.0, 0.0, float(piece.pivot), NO_STOP, x0, y0, -1.0]
-            rows.append(row)
+            row = {"x": x0 + piece.x * tx - piece.y * ty, "y": y0 + piece.x * ty + piece.y * tx}
+            row |= {
+                "c": piece.c * tx - piece.s * ty,
+                "s": piece.c * ty + piece.s * tx,
+                "length": piece.length,
+            }
+            rows.append(row | {"bend": piece.bend, "pivot": int(piece.pivot)})
         return rows
 
-    def _bound(self, rows: Floats) -> None:
-        """Fill LOW and HIGH of the rows in turns by trying offsets at three places; never up to a turn's centre."""
+    def _bound(self, rows: Rows[PathRow]) -> None:
+        """Fill `low` and `high` of the rows in turns by trying offsets at three places; never up to a turn's centre."""
         w = self._problem.car.w
-        turns = np.flatnonzero(rows[:, LANE] < 0)
-        if not len(turns):
+        turns = np.flatnonzero(rows["lane"] < 0).tolist()
+        if not turns:
             return
         offsets = 0.1 * w * np.arange(-30, 31)
         points = np.empty((len(turns), 3, len(offsets), 2))
         for i, r in enumerate(turns):
-            piece = Piece(*rows[r, : PIVOT - 2].tolist())
+            row = rows[r]
+            piece = Piece(row.x, row.y, row.c, row.s, row.length, row.bend)
             for k in range(3):
                 sigma = 0.5 * k * piece.length
                 x, y = along(piece, sigma)
@@ -159,8 +193,9 @@ class PathMaker:
                 low -= 1
             while high < 60 and free[i][high + 1]:
                 high += 1
-            rows[r, LOW], rows[r, HIGH] = offsets[low], offsets[high]
-            if rows[r, BEND] != 0.0:
-                inner = max(0.0, 1.0 / abs(rows[r, BEND]) - w)
-                rows[r, LOW] = max(rows[r, LOW], -inner) if rows[r, BEND] < 0.0 else rows[r, LOW]
-                rows[r, HIGH] = min(rows[r, HIGH], inner) if rows[r, BEND] > 0.0 else rows[r, HIGH]
+            row = rows[r]
+            row.low, row.high = float(offsets[low]), float(offsets[high])
+            if row.bend != 0.0:
+                inner = max(0.0, 1.0 / abs(row.bend) - w)
+                row.low = max(row.low, -inner) if row.bend < 0.0 else row.low
+                row.high = min(row.high, inner) if row.bend > 0.0 else row.high

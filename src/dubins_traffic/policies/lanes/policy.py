@@ -1,4 +1,4 @@
-"""The compiled law of the controller `lanes`, over a batch of trials.
+"""The compiled policy of the controller `lanes`.
 
 It follows a path (`policies.lanes.paths`), keeps behind cars, waits at occupied intersections, backs up from a car
 that waits for it to keep away, passes what stands in its way, and asks for another route when it can't.
@@ -8,311 +8,222 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.gaps import (
-    NOBODY,
-    O_GAP,
-    O_SEEN,
-    O_SPEED,
-    O_STILL,
-    O_YAW,
-    OC,
-    OS,
-    OX,
-    OY,
-    PX,
-    PY,
-    RETURN,
-    SPACING,
-    TX,
-    TY,
+    first_conflict,
+    manoeuvre_of,
     next_gate,
     offset_at,
+    pose_of,
     sample_path,
 )
-from dubins_traffic.policies.lanes.knowledge import (
-    AIM,
-    BACK_SPEED,
-    BACKING,
-    BARRED,
-    BEGIN,
-    DISC,
-    FASTEST,
-    FOLLOW,
-    FROM,
-    GAIN,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    LEFT,
-    MARK,
-    MOVES,
-    MOVING_MARGIN,
-    ODO,
-    PASSING_SPEED,
-    PERIOD,
-    PROGRESS,
-    RADIUS,
-    RAMP,
-    REACH,
-    ROUNDING,
-    SHUFFLED,
-    SHUTTLE,
-    SIGMA,
-    SLOWEST,
-    STANDS,
-    STILL_MARGIN,
-    STUCK,
-    TRIED,
-    TURN_SHARE,
-    TURNS,
-    UNTIL,
-    WAITED,
-    YAW_MOST,
-    Knowledge,
-)
-from dubins_traffic.policies.lanes.paths import HIGH, LENGTH, LOW, NO_STOP, PIVOT, WAITING_GAP
-from dubins_traffic.policies.lanes.tracking import AHEAD, ahead_on, locate, place_on, steer
-from dubins_traffic.policies.lanes.waiting import conflict, gap_now, is_oncoming, stand
-from dubins_traffic.policies.safety import NEAR, VERGE, leaves_road, may_hit, motion_is_safe
+from dubins_traffic.policies.lanes.knowledge import NOBODY, Knowledge
+from dubins_traffic.policies.lanes.paths import PathRow
+from dubins_traffic.policies.lanes.tracking import ahead_on, locate, place_on, steer
+from dubins_traffic.policies.lanes.waiting import gap_from, is_oncoming, stand
+from dubins_traffic.policies.safety import NEAR, leaves_road, may_hit, may_meet, travel_of
 from dubins_traffic.roads.table import RoadTable
 
 
 @jit
-def decide(known: Knowledge, roads: RoadTable) -> None:
-    """Choose the commands of all trials of a batch."""
-    for b in range(known.span.shape[0]):
-        known.blocker[b] = NOBODY
-        near = _watch(known, b)
-        _find_place(known, b)
-        speed = known.car[b, FASTEST]
-        if near or known.part_off[b + 1] > known.part_off[b]:
-            speed = _speed_in_traffic(known, b)
-        wanted = speed
-        speed, yaw_rate = _follow(known, b, speed)
-        speed, yaw_rate = _last_look(known, roads, b, speed, yaw_rate)
-        _note_progress(known, b, wanted, speed, yaw_rate)
-        known.command[b, 0] = speed
-        known.command[b, 1] = yaw_rate
+def decide(tick: int, x: float, y: float, c: float, s: float, known: Knowledge, roads: RoadTable) -> None:
+    """Choose the command of an ego at a pose; `roads` has its network only."""
+    ego = known.follower
+    ego.tick, ego.x, ego.y, ego.c, ego.s = tick, x, y, c, s
+    ego.blocker = NOBODY
+    near = _watch(known)
+    _find_place(known)
+    wanted = known.vehicle.fastest
+    if near or known.obstacles.parts.shape[0] > 0:
+        wanted = _speed_in_traffic(known)
+    speed, yaw_rate = _follow(known, wanted)
+    if not _is_safe(known, roads, Command(speed, yaw_rate)):
+        slowest = known.vehicle.slowest
+        speed, yaw_rate = (slowest, yaw_rate) if slowest > 0.0 else (0.0, 0.0)
+    ego.speed = speed
+    ego.yaw_rate = yaw_rate
+    _note_progress(known, wanted)
 
 
 @jit
-def _watch(known: Knowledge, b: int) -> bool:
+def _watch(known: Knowledge) -> bool:
     """Count how long each sensed car has stood; return whether there is any."""
     found = False
-    others = known.others[b]
-    for n in range(others.shape[0]):
-        if others[n, O_SEEN] == 0.0:
-            others[n, O_STILL] = 0.0
+    ego, manner = known.follower, known.manner
+    for n in range(known.other.shape[0]):
+        car = known.other[n]
+        if car.tick != ego.tick:
+            known.still[n] = 0.0
             continue
         found = True
-        others[n, O_GAP] = gap_now(known, b, n)
-        if abs(others[n, O_SPEED]) > MOVES or abs(others[n, O_YAW]) > TURNS:
-            others[n, O_STILL] = 0.0
+        known.gap[n] = gap_from(known, ego.x, ego.y, n)
+        if abs(car.speed) > manner.moves or abs(car.yaw_rate) > manner.turns:
+            known.still[n] = 0.0
         else:
-            others[n, O_STILL] += known.car[b, PERIOD]
+            known.still[n] += known.vehicle.period
     return found
 
 
 @jit
-def _note_progress(known: Knowledge, b: int, wanted: float, speed: float, yaw_rate: float) -> None:
+def _note_progress(known: Knowledge, wanted: float) -> None:
     """Count for how long the car has wanted to move and has not; forget its waits once it has got on.
 
-    A turn in place counts little: half a turn less than HELD_UP.
+    A turn in place counts little: half a turn less than `Manner.held_up`.
     """
-    memory = known.memory[b]
-    if speed != 0.0:
-        memory[STUCK] = 0.0
-        if abs(memory[ODO] - memory[MARK]) > PROGRESS:
-            memory[MARK] = memory[ODO]
-            memory[WAITED] = 0.0
-            memory[TRIED] = 0.0
+    ego, manner, period = known.follower, known.manner, known.vehicle.period
+    if ego.speed != 0.0:
+        ego.stuck = 0.0
+        if abs(ego.odometer - ego.mark) > manner.progress:
+            ego.mark = ego.odometer
+            ego.waited = 0.0
+            ego.tried = 0.0
             if wanted > 0.0:
-                memory[BACKING] = 0.0
+                ego.backs_from = -1
+                ego.is_barred = 0
     elif wanted != 0.0:
-        turned = abs(yaw_rate) * known.car[b, PERIOD]
-        memory[STUCK] += TURN_SHARE * turned if turned > 0.0 else known.car[b, PERIOD]
-        if wanted < 0.0 and memory[STUCK] > 0.2:
-            memory[BACKING] = BARRED
+        turned = abs(ego.yaw_rate) * period
+        ego.stuck += manner.turn_share * turned if turned > 0.0 else period
+        if wanted < 0.0 and ego.stuck > 0.2:
+            ego.backs_from = -1
+            ego.is_barred = 1
 
 
 @jit
-def _find_place(known: Knowledge, b: int) -> None:
-    memory = known.memory[b]
-    span = known.span[b]
-    row, sigma, left, travelled = locate(
-        known.path, known.row[b], memory[SIGMA], known.ego[b, 0], known.ego[b, 1], span[0], span[1], span[2]
-    )
-    known.row[b] = row
-    memory[SIGMA] = sigma
-    memory[LEFT] = left
-    memory[ODO] += travelled
-    if memory[ODO] - memory[FROM] > memory[UNTIL] + RETURN:
-        memory[BEGIN] = 0.0
-        memory[AIM] = 0.0
+def _find_place(known: Knowledge) -> None:
+    ego = known.follower
+    ego.odometer += locate(known)
+    if ego.odometer - ego.since > ego.until + known.manner.returns:
+        ego.begin = 0.0
+        ego.aim = 0.0
 
 
 @jit
-def _speed_in_traffic(known: Knowledge, b: int) -> float:
+def _speed_in_traffic(known: Knowledge) -> float:
     """Return the speed that traffic allows; negative to back up."""
-    memory = known.memory[b]
-    car = known.car[b]
-    span = known.span[b]
-    sample_path(known.path, known.row[b], memory[SIGMA], span[0], span[1], span[2], known.sample)
-    begin, aim, ramp, until = memory[BEGIN], memory[AIM], memory[RAMP], memory[UNTIL]
-    last = known.sample.shape[0] - 1
-    first, who, nearest = conflict(
-        known, b, last, memory[ODO] - memory[FROM], begin, aim, ramp, until, STILL_MARGIN, MOVING_MARGIN
-    )
-    speed = car[FASTEST] if begin == 0.0 and aim == 0.0 else min(car[FASTEST], PASSING_SPEED)
-    speed = min(speed, _following_speed(known, b, first, who, nearest))
-    line, gate_x, gate_y = next_gate(
-        known.path, known.row[b], memory[SIGMA], WAITING_GAP - 0.02, span[0], span[1], span[2]
-    )
+    ego, manner, fastest = known.follower, known.manner, known.vehicle.fastest
+    sample_path(known)
+    first, who, nearest = first_conflict(
+        known, known.sample.shape[0] - 1, ego.odometer - ego.since, manoeuvre_of(ego),
+        manner.still_margin, manner.moving_margin,
+    )  # fmt: skip
+    speed = fastest if ego.begin == 0.0 and ego.aim == 0.0 else min(fastest, manner.passing_speed)
+    speed = min(speed, _following_speed(known, first, who, nearest))
+    row, to_line = next_gate(known)
     cause = who
-    if line < NO_STOP:
-        occupant = _occupant(known, b, gate_x, gate_y)
-        if occupant == NOBODY and who != NOBODY and _stops_inside(known, b, who, nearest, gate_x, gate_y):
+    if row >= 0:
+        gate = known.path[row]
+        occupant = _occupant(known, gate)
+        if occupant == NOBODY and who != NOBODY and _stops_inside(known, who, nearest, gate):
             occupant = who
         if occupant != NOBODY:
-            allowed = max(0.0, GAIN * line)
+            allowed = max(0.0, manner.gain * to_line)
             if allowed < speed:
                 speed = allowed
                 cause = occupant
-    return stand(known, b, speed, cause, first)
+    return stand(known, speed, cause, first)
 
 
 @jit
-def _following_speed(known: Knowledge, b: int, first: int, who: int, nearest: int) -> float:
+def _following_speed(known: Knowledge, first: int, who: int, nearest: int) -> float:
     """Return the speed at which the gap to what is in the way becomes and stays the one to follow at."""
+    manner, ego = known.manner, known.follower
     if who == NOBODY:
-        return known.car[b, FASTEST]
+        return known.vehicle.fastest
     if who < 0:
-        return max(0.0, GAIN * (SPACING * first - 0.35))
-    o = known.others[b, who]
-    along = o[O_SPEED] * (o[OC] * known.sample[nearest, TX] + o[OS] * known.sample[nearest, TY])
-    dx = o[OX] - known.ego[b, 0]
-    dy = o[OY] - known.ego[b, 1]
-    far = SPACING * nearest
-    if not is_oncoming(known, b, who):
+        return max(0.0, manner.gain * (manner.spacing * first - 0.35))
+    car, place = known.other[who], known.sample[nearest]
+    along = car.speed * (car.c * place.tx + car.s * place.ty)
+    dx = car.x - ego.x
+    dy = car.y - ego.y
+    far = manner.spacing * nearest
+    if not is_oncoming(known, who):
         far = min(far, sqrt(dx * dx + dy * dy))
-    return max(0.0, max(0.0, along) + GAIN * (far - known.car[b, FOLLOW]))
+    return max(0.0, max(0.0, along) + manner.gain * (far - manner.follow))
 
 
 @jit
-def _occupant(known: Knowledge, b: int, gate_x: float, gate_y: float) -> int:
+def _occupant(known: Knowledge, gate: PathRow) -> int:
     """Return a car whose body meets the disc and that has moved of late, or NOBODY."""
-    radius = known.car[b, DISC] + known.car[b, REACH]
-    others = known.others[b]
-    for n in range(others.shape[0]):
-        if others[n, O_SEEN] == 0.0 or others[n, O_STILL] >= STANDS:
-            continue
-        dx = others[n, OX] - gate_x
-        dy = others[n, OY] - gate_y
-        if dx * dx + dy * dy < radius * radius:
+    for n in range(known.other.shape[0]):
+        car = known.other[n]
+        is_awake = car.tick == known.follower.tick and known.still[n] < known.manner.stands
+        if is_awake and _in_disc(known, gate, car.x, car.y):
             return n
     return NOBODY
 
 
 @jit
-def _stops_inside(known: Knowledge, b: int, who: int, nearest: int, gate_x: float, gate_y: float) -> bool:
-    """Whether the car would have to stop behind a standing `who` before it has left the disc again."""
-    if who >= 0 and known.others[b, who, O_STILL] == 0.0:
-        return False
-    k = nearest - int(known.car[b, FOLLOW] / SPACING)
-    if k < 0:
-        return True
-    dx = known.sample[k, PX] - gate_x
-    dy = known.sample[k, PY] - gate_y
-    radius = known.car[b, DISC] + known.car[b, REACH]
+def _in_disc(known: Knowledge, gate: PathRow, x: float, y: float) -> bool:
+    """Whether a car with its centre at a place may meet the disc behind a line."""
+    dx = x - gate.gate_x
+    dy = y - gate.gate_y
+    radius = known.vehicle.disc + known.vehicle.reach
     return dx * dx + dy * dy < radius * radius
 
 
 @jit
-def _follow(known: Knowledge, b: int, speed: float) -> tuple[float, float]:
-    """Return the command that follows the path at `speed`, backwards if it is negative."""
-    car = known.car[b]
-    if speed == 0.0 and car[SLOWEST] <= 0.0:
-        return 0.0, 0.0
-    memory = known.memory[b]
-    span = known.span[b]
-    row = known.row[b]
-    sigma = memory[SIGMA]
-    if speed >= 0.0:
-        aim_row, aim_sigma = ahead_on(known.path, row, sigma, AHEAD, span[0], span[1], span[2], True)
-        distance = memory[ODO] - memory[FROM] + AHEAD
-        if known.path[row, PIVOT] != 0.0:
-            speed = min(speed, max(known.path[row, LENGTH] - sigma, 0.01) / car[PERIOD])
-    else:
-        aim_row, aim_sigma = row, sigma - AHEAD
-        distance = memory[ODO] - memory[FROM] - AHEAD
-    px, py, tx, ty = place_on(known.path, aim_row, aim_sigma)
-    offset = offset_at(distance, memory[BEGIN], memory[AIM], memory[RAMP], memory[UNTIL])
-    if aim_row != row or known.path[row, LOW] <= memory[LEFT] <= known.path[row, HIGH]:
-        offset = min(max(offset, known.path[aim_row, LOW]), known.path[aim_row, HIGH])
-    if speed < 0.0:
-        offset = memory[LEFT]
-    speed, yaw_rate, turns = steer(
-        known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3],
-        px - offset * ty, py + offset * tx, speed, car[YAW_MOST], car[RADIUS],
-    )  # fmt: skip
-    if turns and car[RADIUS] > 0.0:
-        return _shuffle(known, b, yaw_rate)
-    return max(speed, car[SLOWEST]), yaw_rate
+def _stops_inside(known: Knowledge, who: int, nearest: int, gate: PathRow) -> bool:
+    """Whether the car would have to stop behind a standing `who` before it has left the disc again."""
+    if who >= 0 and known.still[who] == 0.0:
+        return False
+    k = nearest - int(known.manner.follow / known.manner.spacing)
+    return k < 0 or _in_disc(known, gate, known.sample[k].x, known.sample[k].y)
 
 
 @jit
-def _shuffle(known: Knowledge, b: int, yaw_rate: float) -> tuple[float, float]:
+def _follow(known: Knowledge, speed: float) -> tuple[float, float]:
+    """Return the command that follows the path at `speed`, backwards if it is negative."""
+    vehicle, ego, ahead = known.vehicle, known.follower, known.manner.ahead
+    if speed == 0.0 and vehicle.slowest <= 0.0:
+        return 0.0, 0.0
+    here = known.path[ego.row]
+    offset = ego.left
+    if speed >= 0.0:
+        row, sigma = ahead_on(known, ego.row, ego.sigma + ahead, True)
+        aim = known.path[row]
+        if here.pivot != 0:
+            speed = min(speed, max(here.length - ego.sigma, 0.01) / vehicle.period)
+        distance = ego.odometer - ego.since + ahead
+        offset = offset_at(distance, manoeuvre_of(ego), known.manner.returns)
+        if row != ego.row or here.low <= ego.left <= here.high:
+            offset = min(max(offset, aim.low), aim.high)
+    else:
+        aim, sigma = here, ego.sigma - ahead
+    px, py, tx, ty = place_on(aim, sigma)
+    pose = Pose(ego.x, ego.y, ego.c, ego.s)
+    speed, yaw_rate, turns = steer(pose, px - offset * ty, py + offset * tx, speed, vehicle)
+    if turns and vehicle.tightest > 0.0:
+        return _shuffle(known, yaw_rate)
+    return max(speed, vehicle.slowest), yaw_rate
+
+
+@jit
+def _shuffle(known: Knowledge, yaw_rate: float) -> tuple[float, float]:
     """Return the command of a car with a turning radius that has to turn on the spot: to and fro, or a full turn."""
-    memory = known.memory[b]
-    car = known.car[b]
-    memory[SHUFFLED] += 1.0
-    speed = min(car[FASTEST], BACK_SPEED)
-    if car[SLOWEST] <= -0.05:
-        if memory[SHUFFLED] >= 2.0 * SHUTTLE:
-            memory[SHUFFLED] = 0.0
-        if memory[SHUFFLED] >= SHUTTLE:
-            speed = -min(-car[SLOWEST], speed)
-    speed = max(speed, car[SLOWEST])
-    most = min(abs(yaw_rate), abs(speed) / car[RADIUS])
+    ego, vehicle, manner = known.follower, known.vehicle, known.manner
+    ego.shuffled += 1
+    speed = min(vehicle.fastest, manner.back_speed)
+    if vehicle.slowest <= -0.05:
+        if ego.shuffled >= 2 * manner.shuttle:
+            ego.shuffled = 0
+        if ego.shuffled >= manner.shuttle:
+            speed = -min(-vehicle.slowest, speed)
+    speed = max(speed, vehicle.slowest)
+    most = min(abs(yaw_rate), abs(speed) / vehicle.tightest)
     return speed, most if yaw_rate > 0.0 else -most
 
 
 @jit
-def _last_look(
-    known: Knowledge, roads: RoadTable, b: int, speed: float, yaw_rate: float
-) -> tuple[float, float]:
-    """Return the command, unless it might lead into a contact or off the road: then the car stands if it can."""
-    if _is_safe(known, roads, b, speed, yaw_rate):
-        return speed, yaw_rate
-    if known.car[b, SLOWEST] > 0.0:
-        return known.car[b, SLOWEST], yaw_rate
-    return 0.0, 0.0
-
-
-@jit
-def _is_safe(known: Knowledge, roads: RoadTable, b: int, speed: float, yaw_rate: float) -> bool:
-    car = known.car[b]
-    period = car[PERIOD]
-    x, y, c, s = known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3]
-    edge = float(roads.half_width[known.net[b]]) - VERGE
-    if speed != 0.0 and leaves_road(x, y, c, s, speed, yaw_rate, period, edge, roads, known.net[b]):
+def _is_safe(known: Knowledge, roads: RoadTable, command: Command) -> bool:
+    """Whether a command can neither lead into a contact nor off the road, whatever the others do."""
+    ego, vehicle = known.follower, known.vehicle
+    pose = Pose(ego.x, ego.y, ego.c, ego.s)
+    if command.speed != 0.0 and leaves_road(pose, command, vehicle.period, roads, 0):
         return False
-    a, h, r, reach = car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING], car[REACH]
-    travel = max(car[FASTEST], -car[SLOWEST]) * period
-    if a + h > 0.0:
-        travel += car[YAW_MOST] * reach * period
-    others = known.others[b]
-    for n in range(others.shape[0]):
-        o = others[n]
-        dx = o[OX] - x
-        dy = o[OY] - y
-        near = 2.0 * reach + NEAR
-        if o[O_SEEN] != 0.0 and dx * dx + dy * dy < near * near and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
-            o[OX], o[OY], o[OC], o[OS], a, h, r, travel,
-        ):  # fmt: skip
+    travel = travel_of(vehicle)
+    for n in range(known.other.shape[0]):
+        car = known.other[n]
+        if car.tick == ego.tick and may_meet(pose, command, vehicle, pose_of(car), travel):
             return False
-    return not may_hit(
-        x, y, c, s, speed, yaw_rate, period, a, h, r, reach,
-        known.part, known.part_off[b], known.part_off[b + 1], NEAR, 0.0,
-    )  # fmt: skip
+    return not may_hit(0, pose, command, vehicle, known.obstacles, NEAR, 0.0)

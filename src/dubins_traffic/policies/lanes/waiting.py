@@ -2,239 +2,162 @@
 
 from __future__ import annotations
 
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.policies.lanes.gaps import (
-    NOBODY,
-    O_GAP,
-    O_SEEN,
-    O_STILL,
-    OC,
-    OS,
-    OX,
-    OY,
-    P_HIGH,
-    P_LOW,
-    SPACING,
-    first_conflict,
-    gap_to,
-)
-from dubins_traffic.policies.lanes.knowledge import (
-    AIM,
-    BACK_SPEED,
-    BACKING,
-    BARRED,
-    BEGIN,
-    CLEAR,
-    DESPAIR,
-    FASTEST,
-    FROM,
-    HALF_LENGTH,
-    HALF_WIDTH,
-    HELD_UP,
-    LEFT,
-    NEAR,
-    ODO,
-    PASSING_MARGIN,
-    PASSING_SPEED,
-    PATIENCE,
-    PERIOD,
-    RAMP,
-    REACH,
-    RETRY,
-    ROUNDING,
-    SIDESTEP,
-    SLOWEST,
-    STANDS,
-    STILL_MARGIN,
-    STUCK,
-    TRIED,
-    UNTIL,
-    WAITED,
-    WARY_MARGIN,
-    Knowledge,
-)
-from dubins_traffic.policies.lanes.paths import HIGH, LOW
+from dubins_traffic.policies.lanes.gaps import Manoeuvre, first_conflict, gap_between, pose_of
+from dubins_traffic.policies.lanes.knowledge import NOBODY, Knowledge
+from dubins_traffic.policies.safety import body_at
 
 
 @jit
-def gap_now(known: Knowledge, b: int, n: int) -> float:
-    """Return the gap between the ego and car n, metres."""
-    car = known.car[b]
-    o = known.others[b, n]
-    ego = known.ego[b]
-    return gap_to(
-        ego[0], ego[1], ego[2], ego[3], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
-        o[OX], o[OY], o[OC], o[OS], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
-    )  # fmt: skip
+def gap_from(known: Knowledge, x: float, y: float, n: int) -> float:
+    """Return the gap between the ego, were its centre at a place, and the other car n, metres."""
+    ego, vehicle = known.follower, known.vehicle
+    own = body_at(Pose(x, y, ego.c, ego.s), vehicle)
+    return gap_between(own, body_at(pose_of(known.other[n]), vehicle))
 
 
 @jit
-def conflict(
-    known: Knowledge,
-    b: int,
-    last: int,
-    done: float,
-    begin: float,
-    aim: float,
-    ramp: float,
-    until: float,
-    still: float,
-    moving: float,
-) -> tuple[int, int, int]:
-    """Return what `policies.lanes.gaps.first_conflict` says of the ego's manoeuvre: first sample, who, nearest
-    sample.
+def stand(known: Knowledge, speed: float, cause: int, first: int) -> float:
+    """Return the speed of a car that `cause` (number of a body) keeps to a speed; wait, back up or pass in time.
+
+    The conflict begins at the sample `first` (number). Who has been kept waiting for long asks for another route.
     """
-    car = known.car[b]
-    return first_conflict(
-        known.sample, last, done, begin, aim, ramp, until,
-        car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING], car[REACH],
-        known.others[b], known.part, known.part_off[b], known.part_off[b + 1], still, moving,
-    )  # fmt: skip
-
-
-@jit
-def stand(known: Knowledge, b: int, speed: float, cause: int, first: int) -> float:
-    """Count how long the car has been kept waiting by `cause`; back up, pass or ask for another route in time."""
-    memory = known.memory[b]
-    period = known.car[b, PERIOD]
-    if memory[BACKING] > 0.0 and cause != NOBODY and _backs_up(known, b, int(memory[BACKING]) - 1):
-        return -BACK_SPEED
-    stuck = memory[STUCK] > HELD_UP
+    ego, manner = known.follower, known.manner
+    if ego.backs_from >= 0 and cause != NOBODY and _backs_up(known, ego.backs_from):
+        return -manner.back_speed
+    stuck = ego.stuck > manner.held_up
     if stuck and cause == NOBODY:
-        cause = _nearest_body(known, b)
+        cause = _nearest_body(known)
         if cause == NOBODY:
-            _return(known, b)
+            _return(known)
     if cause == NOBODY or (speed > 0.03 and not stuck):
         return speed
-    memory[WAITED] += period
-    memory[TRIED] += period
-    still = known.others[b, cause, O_STILL] if cause >= 0 else 1e9
-    comes = cause >= 0 and is_oncoming(known, b, cause)
+    ego.waited += known.vehicle.period
+    ego.tried += known.vehicle.period
+    still = known.still[cause] if cause >= 0 else 1e9
+    comes = cause >= 0 and is_oncoming(known, cause)
     hasty = stuck or comes
     if (
-        memory[WAITED] > (HELD_UP if hasty else PATIENCE)
-        and still > (0.0 if hasty else STANDS)
-        and memory[TRIED] >= (HELD_UP if comes else RETRY)
+        ego.waited > (manner.held_up if hasty else manner.patience)
+        and still > (0.0 if hasty else manner.stands)
+        and ego.tried >= (manner.held_up if comes else manner.retry)
     ):
-        memory[TRIED] = 0.0
-        if _find_way_past(known, b, first):
-            memory[STUCK] = 0.0
-            memory[BACKING] = 0.0
-            return min(known.car[b, FASTEST], PASSING_SPEED)
-    if cause >= 0 and _backs_up(known, b, cause):
-        return -BACK_SPEED
-    if memory[WAITED] > DESPAIR:
-        known.blocker[b] = cause
+        ego.tried = 0.0
+        if _find_way_past(known, first):
+            ego.stuck = 0.0
+            ego.backs_from = -1
+            ego.is_barred = 0
+            return min(known.vehicle.fastest, manner.passing_speed)
+    if cause >= 0 and _backs_up(known, cause):
+        return -manner.back_speed
+    if ego.waited > manner.despair:
+        ego.blocker = cause
     return 0.0
 
 
 @jit
-def _return(known: Knowledge, b: int) -> None:
+def _return(known: Knowledge) -> None:
     """Give up what the car was about, and go back to the path from where it is."""
-    memory = known.memory[b]
-    memory[BEGIN] = memory[LEFT]
-    memory[AIM] = 0.0
-    memory[FROM] = memory[ODO]
-    memory[RAMP] = memory[UNTIL] = 0.2 + abs(memory[LEFT])
-    memory[STUCK] = 0.0
+    ego = known.follower
+    ramp = 0.2 + abs(ego.left)
+    _begin(known, Manoeuvre(ego.left, 0.0, ramp, ramp))
+    ego.stuck = 0.0
 
 
 @jit
-def is_oncoming(known: Knowledge, b: int, n: int) -> bool:
-    """Whether car n faces the ego's way back, within 60 degrees."""
-    o = known.others[b, n]
-    return o[OC] * known.ego[b, 2] + o[OS] * known.ego[b, 3] < -0.5
+def _begin(known: Knowledge, manoeuvre: Manoeuvre) -> None:
+    ego = known.follower
+    ego.begin, ego.aim, ego.ramp, ego.until = manoeuvre
+    ego.since = ego.odometer
 
 
 @jit
-def _backs_up(known: Knowledge, b: int, cause: int) -> bool:
+def is_oncoming(known: Knowledge, n: int) -> bool:
+    """Whether the other car n faces the ego's way back, within 60 degrees."""
+    car = known.other[n]
+    return car.c * known.follower.c + car.s * known.follower.s < -0.5
+
+
+@jit
+def _backs_up(known: Knowledge, cause: int) -> bool:
     """Whether to back up from a car that stands so near that it may be waiting for the ego to go away.
 
     Once begun, this goes on until there is enough room, the car moves off or something is behind.
     """
-    memory = known.memory[b]
-    o = known.others[b, cause]
-    dx = o[OX] - known.ego[b, 0]
-    dy = o[OY] - known.ego[b, 1]
+    ego, manner, car = known.follower, known.manner, known.other[cause]
+    dx = car.x - ego.x
+    dy = car.y - ego.y
     far2 = dx * dx + dy * dy
-    if memory[BACKING] == 0.0 and far2 < NEAR * NEAR and memory[WAITED] > 0.6 and o[O_STILL] > 0.5:
-        memory[BACKING] = cause + 1.0
-    if memory[BACKING] > 0.0 and (o[O_SEEN] == 0.0 or far2 > CLEAR * CLEAR or not _free_behind(known, b)):
-        memory[BACKING] = BARRED
-    return memory[BACKING] > 0.0
+    begins = ego.backs_from < 0 and ego.is_barred == 0
+    if begins and far2 < manner.near * manner.near and ego.waited > 0.6 and known.still[cause] > 0.5:
+        ego.backs_from = cause
+    if ego.backs_from >= 0 and (
+        car.tick != ego.tick or far2 > manner.clear * manner.clear or not _free_behind(known)
+    ):
+        ego.backs_from = -1
+        ego.is_barred = 1
+    return ego.backs_from >= 0
 
 
 @jit
-def _nearest_body(known: Knowledge, b: int) -> int:
+def _nearest_body(known: Knowledge) -> int:
     """Return the sensed car nearest to the ego, or an obstacle's part if there is no car within 1 m."""
     best = 1.0
-    who = -1 if known.part_off[b + 1] > known.part_off[b] else NOBODY
-    others = known.others[b]
-    for n in range(others.shape[0]):
-        if others[n, O_SEEN] != 0.0 and others[n, O_GAP] < best:
-            best = others[n, O_GAP]
+    who = -1 if known.obstacles.parts.shape[0] > 0 else NOBODY
+    for n in range(known.other.shape[0]):
+        if known.other[n].tick == known.follower.tick and known.gap[n] < best:
+            best = known.gap[n]
             who = n
     return who
 
 
 @jit
-def _free_behind(known: Knowledge, b: int) -> bool:
+def _free_behind(known: Knowledge) -> bool:
     """Whether the car may back up a little: able to, on the road, nobody close behind."""
-    car = known.car[b]
-    path = known.path[known.row[b]]
-    left = known.memory[b, LEFT]
-    if car[SLOWEST] >= 0.0 or left < path[LOW] or left > path[HIGH]:
+    ego = known.follower
+    piece = known.path[ego.row]
+    if known.vehicle.slowest >= 0.0 or ego.left < piece.low or ego.left > piece.high:
         return False
-    x, y, c, s = known.ego[b, 0], known.ego[b, 1], known.ego[b, 2], known.ego[b, 3]
-    bx = x - 0.1 * c
-    by = y - 0.1 * s
-    others = known.others[b]
-    for n in range(others.shape[0]):
-        o = others[n]
-        if o[O_SEEN] == 0.0 or (o[OX] - x) * c + (o[OY] - y) * s > 0.0:
+    x, y, c, s = ego.x, ego.y, ego.c, ego.s
+    for n in range(known.other.shape[0]):
+        car = known.other[n]
+        if car.tick != ego.tick or (car.x - x) * c + (car.y - y) * s > 0.0:
             continue
-        gap = gap_to(
-            bx, by, c, s, car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
-            o[OX], o[OY], o[OC], o[OS], car[HALF_LENGTH], car[HALF_WIDTH], car[ROUNDING],
-        )  # fmt: skip
-        if gap < STILL_MARGIN:
+        if gap_from(known, x - 0.1 * c, y - 0.1 * s, n) < known.manner.still_margin:
             return False
     return True
 
 
 @jit
-def _find_way_past(known: Knowledge, b: int, first: int) -> bool:
+def _find_way_past(known: Knowledge, first: int) -> bool:
     """Look for the least offset at which the car gets past what stands in its way, and take it."""
-    memory = known.memory[b]
-    sample = known.sample
-    now = memory[LEFT]
+    manner, sample, now = known.manner, known.sample, known.follower.left
     last = sample.shape[0] - 1
-    ramp = min(0.7, max(0.15, SPACING * first - 0.1))
-    low, high = sample[0, P_LOW], sample[0, P_HIGH]
-    steps = int((high - low) / SIDESTEP) + 1
+    ramp = min(0.7, max(0.15, manner.spacing * first - 0.1))
+    low, high = sample[0].low, sample[0].high
+    steps = int((high - low) / manner.sidestep) + 1
     for k in range(2 * steps + 1):
-        aim = SIDESTEP * ((k + 1) // 2)
+        aim = manner.sidestep * ((k + 1) // 2)
         if k % 2 == 0:
             aim = -aim
         if aim < low or aim > high:
             continue
-        end = _passed(known, b, now, aim, ramp, last)
+        end = _passed(known, Manoeuvre(now, aim, ramp, 0.0), last)
         if end >= 0:
-            memory[BEGIN] = now
-            memory[AIM] = aim
-            memory[FROM] = memory[ODO]
-            memory[RAMP] = ramp
-            memory[UNTIL] = SPACING * end
+            _begin(known, Manoeuvre(now, aim, ramp, manner.spacing * end))
             return True
     return False
 
 
 @jit
-def _passed(known: Knowledge, b: int, now: float, aim: float, ramp: float, last: int) -> int:
-    """Return the sample at which a car with the offset `aim` can return to its path, or -1 if it is no way past."""
+def _passed(known: Knowledge, way: Manoeuvre, last: int) -> int:
+    """Return the sample at which a car on a manoeuvre can return to its path, or -1 if it is no way past."""
+    manner = known.manner
     for end in range(8, last - 8, 5):
-        first, _, _ = conflict(
-            known, b, min(last, end + 12), 0.0, now, aim, ramp, SPACING * end, PASSING_MARGIN, WARY_MARGIN
+        tried = Manoeuvre(way.begin, way.aim, way.ramp, manner.spacing * end)
+        first, _, _ = first_conflict(
+            known, min(last, end + 12), 0.0, tried, manner.passing_margin, manner.wary_margin
         )
         if first < 0:
             return end

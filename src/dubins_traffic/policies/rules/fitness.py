@@ -6,6 +6,7 @@ from math import inf, pi
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.errors import InputError
 from dubins_traffic.policies.rules.tables import LONGEST_WAY
 from dubins_traffic.roads.clearance import clearance_faults
@@ -42,6 +43,7 @@ def check_fit(problem: Problem, owes: bool) -> None:
         Naming the field of the car, or the place in the roads.
     """
     car, bounds = problem.car, problem.car.bounds
+    require_dubins(car, "the rules of the road and the shield are kept")
     if bounds.speed_low > 0.0:
         raise _refuse("can't stop", "bounds.speed_min", bounds.speed_low, "at most 0")
     if bounds.turning_radius > ROUND * car.w:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import FEW
-from dubins_traffic.cars.state import Labels
+from dubins_traffic.cars.state import Command, Labels, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
@@ -57,7 +57,7 @@ from dubins_traffic.policies.rules.tables import (
     Vehicle,
 )
 from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_lane, on_way
-from dubins_traffic.policies.safety import VERGE, leaves_road
+from dubins_traffic.policies.safety import leaves_road
 from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.routing.lane_graph import lane_at
 from dubins_traffic.rules.propositions import APPROACH, BLOCKED, LEFT, STOPPED
@@ -283,12 +283,11 @@ def dawdle(b: int, n: int, speed: float, near: int, traffic: Traffic) -> float:
 def strays(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a motion takes the centre off the road, or nearly."""
     state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    if keeps_to_road(b, n, x, y, way, roads, drivers):
+    pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
+    if keeps_to_road(b, n, pose.x, pose.y, way, roads, drivers):
         return False
-    net = drivers.net[b]
-    edge = float(roads.half_width[net]) - VERGE
-    return leaves_road(x, y, c, s, speed, yaw_rate, drivers.vehicle[b].period, edge, roads, net)
+    command = Command(speed, yaw_rate)
+    return leaves_road(pose, command, drivers.vehicle[b].period, roads, drivers.net[b])
 
 
 @jit_inline
@@ -348,7 +347,7 @@ def keep_place(
     car = drivers.car[b, n]
     seen = labels.lane[b, n]
     if car.lane < 0:
-        lane = seen if seen >= 0 else lane_at(roads, net, x, y, c, s)
+        lane = seen if seen >= 0 else lane_at(roads, net, Pose(x, y, c, s))
         take_lane(b, n, tick, lane, traffic)
     elif seen >= 0 and seen != car.lane:
         take_lane(b, n, tick, seen, traffic)

@@ -6,13 +6,14 @@ from math import sqrt
 
 import numpy as np
 
+from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
 from dubins_traffic.policies.rules.tables import LEFT_SIDE, ROUND, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import NEAR, may_hit, motion_is_safe
+from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
 from dubins_traffic.rules.propositions import LEFT
 
 HURRY = 0.25
@@ -179,23 +180,14 @@ def is_safe(
 ) -> bool:
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
     state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
-    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    period = vehicle.period
-    p, q, r, reach = vehicle.half_length, vehicle.half_width, vehicle.rounding, vehicle.reach
-    travel = vehicle.fastest * period
-    if p > 0.0:
-        travel += vehicle.yaw_most * reach * period
+    pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
+    command = Command(speed, yaw_rate)
+    travel = vehicle.fastest * vehicle.period
+    if vehicle.half_length > 0.0:
+        travel += vehicle.yaw_most * vehicle.reach * vehicle.period
     for k in range(near):
         j = scratch.near[k]
-        dx = state.x[b, j] - x
-        dy = state.y[b, j] - y
-        far = 2.0 * reach + NEAR
-        if j != trusted and dx * dx + dy * dy < far * far and not motion_is_safe(
-            x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-            state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j], p, q, r, travel,
-        ):  # fmt: skip
+        other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
+        if j != trusted and may_meet(pose, command, vehicle, other, travel):
             return False
-    return not may_hit(
-        x, y, c, s, speed, yaw_rate, period, p, q, r, reach,
-        obstacles.part, obstacles.off[b], obstacles.off[b + 1], NEAR, 0.0,
-    )  # fmt: skip
+    return not may_hit(b, pose, command, vehicle, obstacles, NEAR, 0.0)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.cars.rows import clip, rows
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import pack_cars
@@ -95,6 +96,7 @@ class Gazebo:
         self.close()
         (instance,) = instances
         problem = instance.problem
+        require_dubins(problem.car, "Gazebo has a car")
         cars = len(instance.starts)
         self._rate = problem.rate
         self._steps = math.ceil(1.0 / (problem.rate * self._longest) - 1e-9)

@@ -10,6 +10,7 @@ from threading import Lock
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
+from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.cars.state import EGO, Contact, Pose, State
 from dubins_traffic.cars.touching import Touching
 from dubins_traffic.errors import ControllerError, InputError, TransportError
@@ -80,6 +81,7 @@ class ExternalWorld:
             )
         (self._instance,) = instances
         problem = self._instance.problem
+        require_dubins(problem.car, "a world outside is known")
         self._touching = Touching(problem.car, problem.obstacles, problem.period)
         self._tick = 0
         self._driven: dict[int, float] = {}

@@ -1,0 +1,57 @@
+"""Controllers by name, without a shield: those that come with the package, and a user's own."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, Final, cast
+
+from dubins_traffic import outside
+from dubins_traffic.controllers import blame
+from dubins_traffic.outside import Seam
+from dubins_traffic.protocols import Controller
+
+BUILT_IN: Final = {
+    "keyboard": ("Keyboard", "you, with the arrow keys, in real time; the map is drawn in the terminal"),
+    "lanes": (
+        "Lanes",
+        "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
+    ),
+    "rules": (
+        "Rules",
+        "round the goals under all rules of the road: right lane, stops, order of arrival, never at fault",
+    ),
+    "simple": (
+        "Simple",
+        "the reference of 2016: round the goals in order, straight across country, blind to cars",
+    ),
+    "synthesized": (
+        "Synthesized",
+        "plays a winning strategy of the game of cells, found at the start; drives as rules does",
+    ),
+}
+"""Class and description of each controller that comes with the package, by the name of its module."""
+_SEAM = Seam(
+    "--controller",
+    "controller",
+    ("start", "act"),
+    "start(problem) and act(observation) -> (speed, yaw rate)",
+    blame.error_text,
+)
+_EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
+
+
+def load(spec: str) -> Controller:
+    """Return a new controller, as `controllers.registry.load` does for names that end in no shield."""
+    if spec in BUILT_IN:
+        return cast(Controller, getattr(_module(spec), BUILT_IN[spec][0])())
+    if spec.endswith(".mcap"):
+        return cast(Controller, _module("scripted").replay(spec))
+    if spec.endswith(".npz"):
+        return cast(Controller, _module("synthesized").player(spec))
+    if not outside.is_place(spec):
+        raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(BUILT_IN)))
+    return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))
+
+
+def _module(name: str) -> Any:
+    return importlib.import_module(f"dubins_traffic.controllers.{name}")
