@@ -105,7 +105,7 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     for k in range(state.count[b]):
         if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
             return False
-    vx, vy = float(roads.vert[vertex, 0]), float(roads.vert[vertex, 1])
+    vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
     count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
     return find_exit(b, n, v, way_back(v, lane, roads, own), count, tables)
 
@@ -150,7 +150,7 @@ def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, i
     """
     state, roads, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     row = roads.vert_off[own.net] + v
-    vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
+    vx, vy = roads.vertex[row].x, roads.vertex[row].y
     dx, dy = state.x[b, EGO] - vx, state.y[b, EGO] - vy
     spare = sqrt(dx * dx + dy * dy) - terms.lone - terms.goal_gap - own.lane_width
     if spare > 0.0:

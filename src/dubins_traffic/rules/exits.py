@@ -87,7 +87,7 @@ def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> 
     net = own.net
     row = t.vert_off[net] + v
     x, y = state.x[b, k], state.y[b, k]
-    dx, dy = x - t.vert[row, 0], y - t.vert[row, 1]
+    dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
     away2 = dx * dx + dy * dy
     inside = tables.labels.at[b, k] == v
     if away2 > terms.exit2 or (
@@ -122,7 +122,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
         tables.state, tables.roads, tables.spacing, tables.rules[b], tables.terms[b],
     )  # fmt: skip
     row = t.vert_off[own.net] + v
-    vx, vy = float(t.vert[row, 0]), float(t.vert[row, 1])
+    vx, vy = t.vertex[row].x, t.vertex[row].y
     far2, lone = terms.exit2, terms.lone
     near = 0 if back < 0 else 1
     nearest2 = beyond2 = lone * lone
@@ -155,7 +155,7 @@ def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
     )  # fmt: skip
     row = t.vert_off[own.net] + v
     x, y = state.x[b, EGO], state.y[b, EGO]
-    dx, dy = x - t.vert[row, 0], y - t.vert[row, 1]
+    dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
     far = own.radius + terms.goal_gap
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]

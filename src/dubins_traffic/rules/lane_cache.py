@@ -28,15 +28,15 @@ def keep_road(
     k = n & (BLOCK - 1)
     net = own.net
     place = t.vert_off[net] + vertex
-    block.vertex_x[k] = float(t.vert[place, 0])
-    block.vertex_y[k] = float(t.vert[place, 1])
+    block.vertex_x[k] = t.vertex[place].x
+    block.vertex_y[k] = t.vertex[place].y
     row = t.seg_off[net] + (lane >> 1 if lane >= 0 else segment)
-    length = t.seg[row, 4]
+    length = t.segment[row].length
     back = lane >= 0 and lane & 1 != 0
-    block.from_x[k] = t.seg[row, 0]
-    block.from_y[k] = t.seg[row, 1]
-    block.axis_x[k] = t.seg[row, 2]
-    block.axis_y[k] = t.seg[row, 3]
+    block.from_x[k] = t.segment[row].x
+    block.from_y[k] = t.segment[row].y
+    block.axis_x[k] = t.segment[row].tx
+    block.axis_y[k] = t.segment[row].ty
     block.base[k] = length if back else 0.0
     block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
     if lane >= 0:

@@ -138,7 +138,7 @@ def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: Refer
     roads, spacing = tables.roads, tables.spacing
     row = roads.vert_off[tables.rules[b].net] + v
     far = tables.terms[b].lone + 2.0 * spacing.drift[b]
-    x, y = float(roads.vert[row, 0]), float(roads.vert[row, 1])
+    x, y = roads.vertex[row].x, roads.vertex[row].y
     count = list_near(tables.state, b, tick, x, y, far, spacing)
     judge_entry(b, n, tick, v, stopped, count, tables)
 

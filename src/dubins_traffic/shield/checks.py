@@ -130,7 +130,7 @@ def _enters(b: int, v: int, x: float, y: float, c: float, s: float, traffic: Tra
     row = roads.vert_off[net] + v
     if labels.crosses[b, EGO] == v or roads.degree[row] < vehicle.degree:
         return NOTHING
-    vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
+    vx, vy = roads.vertex[row].x, roads.vertex[row].y
     half_length, half_width = vehicle.half_length, vehicle.half_width
     edge = vehicle.disc + vehicle.rounding + BRINK
     after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)

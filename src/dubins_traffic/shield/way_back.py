@@ -128,7 +128,7 @@ def _blocks(
 ) -> bool:
     """Tell whether an obstacle blocks a lane where its progress is in [near, far]."""
     vehicle = drivers.vehicle[b]
-    length = roads.seg[roads.seg_off[drivers.net[b]] + (lane >> 1), 4]
+    length = roads.segment[roads.seg_off[drivers.net[b]] + (lane >> 1)].length
     place = RightLane(b, lane, length, 2.0 * vehicle.middle)
     needed = vehicle.needed - ROUNDED
     return obstacle_narrows(guards.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
@@ -145,7 +145,7 @@ def _leaves(
         return True
     v, _ = nearest_vertex(roads, net, x, y)
     row = roads.vert_off[net] + v
-    vx, vy = float(roads.vert[row, 0]), float(roads.vert[row, 1])
+    vx, vy = roads.vertex[row].x, roads.vertex[row].y
     rim = vehicle.disc + vehicle.rounding + BRINK
     return distance2_to_body(vx, vy, x, y, c, s, vehicle.half_length, vehicle.half_width) < rim * rim
 

@@ -22,7 +22,7 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
     What `find_way_past` asks of cars that stand or come is left out: these go.
     """
     roads, obstacles = traffic.roads, traffic.obstacles
-    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
+    length = roads.segment[roads.seg_off[net] + (lane >> 1)].length
     wide = vehicle.half_width + vehicle.rounding
     done = 0.0
     early = LATE * vehicle.disc + vehicle.reach + QUEUE_GAP
@@ -42,9 +42,9 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
         if (back - own) / (0.8 * vehicle.fastest) + TURNING > vehicle.left_time:
             return True
         for p in range(first, last):
-            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            far = vehicle.reach + obstacles.part[p, 7]
-            beside = abs(left + vehicle.middle - offset) < wide + BESIDE + obstacles.part[p, 7]
+            along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
+            far = vehicle.reach + obstacles.parts[p].reach
+            beside = abs(left + vehicle.middle - offset) < wide + BESIDE + obstacles.parts[p].reach
             if own - far < along < back + far and left + vehicle.middle > 0.0 and beside:
                 return True
     return False
@@ -64,7 +64,7 @@ def has_place(b: int, lane: int, traffic: Traffic) -> bool:
     first, last = obstacles.off[b], obstacles.off[b + 1]
     early = LAST * vehicle.disc + vehicle.reach + OBSTACLE_GAP
     begin, _, _ = next_bar(traffic, net, lane, 0.0, early, first, last, vehicle)
-    return begin >= min(nearest_bar(vehicle), roads.seg[roads.seg_off[net] + (lane >> 1), 4])
+    return begin >= min(nearest_bar(vehicle), roads.segment[roads.seg_off[net] + (lane >> 1)].length)
 
 
 @jit
@@ -97,8 +97,8 @@ def next_narrow(
     begin = INFINITE
     wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(first, last):
-        along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-        size = obstacles.part[p, 7]
+        along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
+        size = obstacles.parts[p].reach
         if abs(left + vehicle.middle) < wide + size and along - size >= done:
             begin = min(begin, along - size)
     end = begin
@@ -107,8 +107,8 @@ def next_narrow(
     while found:
         found = False
         for p in range(first, last):
-            along, left = lane_coordinates(roads, net, lane, obstacles.part[p, 0], obstacles.part[p, 1])
-            size = obstacles.part[p, 7]
+            along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
+            size = obstacles.parts[p].reach
             in_way = abs(left + vehicle.middle) < wide + size and begin <= along - size <= end + NARROWS
             if in_way and along + size > end:
                 end = along + size
@@ -162,10 +162,10 @@ def stands_in_disc(b: int, lane: int, out: int, traffic: Traffic) -> bool:
     way = way_between(roads, net, lane, out, vehicle.middle, vehicle.disc)
     wide = vehicle.half_width + vehicle.rounding + SIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        dx, dy = row[0] - way.x, row[1] - way.y
-        far = vehicle.disc + row[7]
-        _, _, left, _, _ = on_way(way, row[0], row[1])
-        if dx * dx + dy * dy < far * far and abs(left) < wide + row[7]:
+        part = obstacles.parts[p]
+        dx, dy = part.x - way.x, part.y - way.y
+        far = vehicle.disc + part.reach
+        _, _, left, _, _ = on_way(way, part.x, part.y)
+        if dx * dx + dy * dy < far * far and abs(left) < wide + part.reach:
             return True
     return False

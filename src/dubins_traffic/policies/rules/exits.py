@@ -222,8 +222,8 @@ def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
         goal = drivers.stage[k]
         if goal == labels.at[b, 0] or (goal == car.place and car.last - car.first > 1):
             continue
-        dx = roads.vert[roads.vert_off[net] + goal, 0] - state.x[b, 0]
-        dy = roads.vert[roads.vert_off[net] + goal, 1] - state.y[b, 0]
+        dx = roads.vertex[roads.vert_off[net] + goal].x - state.x[b, 0]
+        dy = roads.vertex[roads.vert_off[net] + goal].y - state.y[b, 0]
         if dx * dx + dy * dy < least:
             least = dx * dx + dy * dy
             best = goal

@@ -68,13 +68,13 @@ def clear_offset(
     for tight in range(2):
         wide = (SQUEEZED if tight == 1 else BESIDE) + vehicle.half_width + vehicle.rounding
         for p in range(first, last):
-            row = obstacles.part[p]
-            key = along + tx * row[0] + ty * row[1]
-            if not begin - vehicle.reach - row[7] < key < end + vehicle.reach + row[7]:
+            part = obstacles.parts[p]
+            key = along + tx * part.x + ty * part.y
+            if not begin - vehicle.reach - part.reach < key < end + vehicle.reach + part.reach:
                 continue
-            its = left + tx * row[1] - ty * row[0]
+            its = left + tx * part.y - ty * part.x
             for side in range(2):
-                offset = its - row[7] - wide if side == 0 else its + row[7] + wide
+                offset = its - part.reach - wide if side == 0 else its + part.reach + wide
                 near = abs(offset) < abs(best) and low <= offset <= high
                 if near and is_clear(
                     along, left, tx, ty, begin, end, offset, wide, obstacles, first, last, vehicle
@@ -92,10 +92,10 @@ def is_clear(
 ) -> bool:  # fmt: skip
     """Tell whether all obstacles of a stretch are `wide` beside a car `offset` left of the middle of its lane."""
     for p in range(first, last):
-        row = obstacles.part[p]
-        key = along + tx * row[0] + ty * row[1]
-        if not begin - vehicle.reach - row[7] < key < end + vehicle.reach + row[7]:
+        part = obstacles.parts[p]
+        key = along + tx * part.x + ty * part.y
+        if not begin - vehicle.reach - part.reach < key < end + vehicle.reach + part.reach:
             continue
-        if abs(left + tx * row[1] - ty * row[0] - offset) < wide + row[7] - 1e-9:
+        if abs(left + tx * part.y - ty * part.x - offset) < wide + part.reach - 1e-9:
             return False
     return True

@@ -96,7 +96,7 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
-    length = roads.seg[roads.seg_off[net] + (drivers.car[b, n].lane >> 1), 4]
+    length = roads.segment[roads.seg_off[net] + (drivers.car[b, n].lane >> 1)].length
     if length + own < vehicle.disc + reach + EDGE:
         return
     if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, vehicle):
@@ -154,8 +154,8 @@ def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> No
     if end >= own and low > -INFINITE:
         offset = offset_on_way(b, way, own, end + SLIP, obstacles, vehicle)
     if offset == 0.0:
-        row = obstacles.part[p]
-        end = along(way, row[0], row[1]) + row[7] - vehicle.reach
+        part = obstacles.parts[p]
+        end = along(way, part.x, part.y) + part.reach - vehicle.reach
         offset = offset_on_way(b, way, own + vehicle.reach, end, obstacles, vehicle)
     if end >= own and offset != 0.0:
         drivers.car[b, n].aside = offset
@@ -232,13 +232,13 @@ def extent(
                 low = -INFINITE
             j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):
-            row = obstacles.part[p]
-            key = along(way, row[0], row[1])
-            left = aside(way, row[0], row[1])
-            if own < key <= horizon + row[7] and abs(left) - row[7] < vehicle.middle:
-                end = max(end, key + row[7] - reach)
-                offset = max(offset, left + row[7])
-                low = min(low, left - row[7])
+            part = obstacles.parts[p]
+            key = along(way, part.x, part.y)
+            left = aside(way, part.x, part.y)
+            if own < key <= horizon + part.reach and abs(left) - part.reach < vehicle.middle:
+                end = max(end, key + part.reach - reach)
+                offset = max(offset, left + part.reach)
+                low = min(low, left - part.reach)
     return end, offset, low
 
 
@@ -255,11 +255,11 @@ def stands_beside(
     """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
     wide = vehicle.half_width + vehicle.rounding + BESIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        key = along(way, row[0], row[1])
-        left = aside(way, row[0], row[1])
-        near = own - vehicle.reach - row[7] < key < back + vehicle.reach + row[7]
-        if near and left > 0.0 and abs(left - offset) < wide + row[7]:
+        part = obstacles.parts[p]
+        key = along(way, part.x, part.y)
+        left = aside(way, part.x, part.y)
+        near = own - vehicle.reach - part.reach < key < back + vehicle.reach + part.reach
+        if near and left > 0.0 and abs(left - offset) < wide + part.reach:
             return True
     return False
 
@@ -289,9 +289,12 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
         return speed
     length = 2.0 * vehicle.reach
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        key = along(way, row[0], row[1])
-        if own - row[7] - length < key <= car.until + row[7] and abs(aside(way, row[0], row[1])) < 2.0:
+        part = obstacles.parts[p]
+        key = along(way, part.x, part.y)
+        if (
+            own - part.reach - length < key <= car.until + part.reach
+            and abs(aside(way, part.x, part.y)) < 2.0
+        ):
             return speed
     beside = False
     before = False

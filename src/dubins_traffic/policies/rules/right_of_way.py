@@ -211,8 +211,8 @@ def comes_first(b: int, n: int, j: int, v: int, traffic: Traffic) -> bool:
     if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
         return False
     row = roads.vert_off[net] + v
-    dx = state.x[b, j] - roads.vert[row, 0]
-    dy = state.y[b, j] - roads.vert[row, 1]
+    dx = state.x[b, j] - roads.vertex[row].x
+    dy = state.y[b, j] - roads.vertex[row].y
     near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON
     first = n == EGO or j < n or not turns_round(drivers.car[b, j])
     return dx * dx + dy * dy < near * near and first

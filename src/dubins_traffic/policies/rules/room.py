@@ -65,7 +65,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     end = lane_end(roads, net, out)
     crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
-    last = roads.seg[roads.seg_off[net] + (out >> 1), 4] - mouth
+    last = roads.segment[roads.seg_off[net] + (out >> 1)].length - mouth
     last = min(last, before_obstacles(b, out, traffic))
     wall = INFINITE
     for look in range(2):
@@ -170,12 +170,12 @@ def before_obstacles(b: int, lane: int, traffic: Traffic) -> float:
     free = INFINITE
     net, first, last = drivers.net[b], obstacles.off[b], obstacles.off[b + 1]
     for p in range(first, last):
-        row = obstacles.part[p]
-        along, aside = lane_coordinates(roads, net, lane, row[0], row[1])
-        wide = vehicle.half_width + vehicle.rounding + SIDE + row[7]
-        if not (abs(aside + vehicle.middle) < wide and along + row[7] > vehicle.disc):
+        part = obstacles.parts[p]
+        along, aside = lane_coordinates(roads, net, lane, part.x, part.y)
+        wide = vehicle.half_width + vehicle.rounding + SIDE + part.reach
+        if not (abs(aside + vehicle.middle) < wide and along + part.reach > vehicle.disc):
             continue
-        begin, end = along - row[7], along + row[7]
+        begin, end = along - part.reach, along + part.reach
         if offset_in_lane(traffic, net, lane, begin, end, first, last, vehicle) == 0.0:
             free = min(free, begin - vehicle.reach - QUEUE_GAP)
     return free

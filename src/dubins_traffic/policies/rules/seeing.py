@@ -101,7 +101,7 @@ def gather(b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, tr
     if labels.segment[b, n] != lane >> 1:
         count = add_segment(lane >> 1, n, count, scratch)
     to_go = -way_to_go(way, x, y)
-    length = roads.seg[roads.seg_off[net] + (lane >> 1), 4]
+    length = roads.segment[roads.seg_off[net] + (lane >> 1)].length
     for end in range(2):
         far = to_go if end == 0 else length - to_go
         if far > disc + (1.0 if end == 0 else 0.8):
@@ -203,17 +203,17 @@ def see_obstacles(
     """Return what `look_ahead` does, with regard for obstacles as well; each part counts as a disc about it."""
     wide = 2.0 * (vehicle.half_width + vehicle.rounding)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        dx = row[0] - x
-        dy = row[1] - y
+        obstacle = obstacles.parts[p]
+        dx = obstacle.x - x
+        dy = obstacle.y - y
         d2 = dx * dx + dy * dy
-        far = SIGHT + row[7]
+        far = SIGHT + obstacle.reach
         if d2 > far * far:
             continue
-        if d2 < (vehicle.reach + row[7] + 0.2) * (vehicle.reach + row[7] + 0.2):
+        if d2 < (vehicle.reach + obstacle.reach + 0.2) * (vehicle.reach + obstacle.reach + 0.2):
             close = True
-        there, its_key, its_left, _, _ = on_way(way, row[0], row[1])
-        aside = row[7] - vehicle.half_width - vehicle.rounding + NARROW - SIDE
+        there, its_key, its_left, _, _ = on_way(way, obstacle.x, obstacle.y)
+        aside = obstacle.reach - vehicle.half_width - vehicle.rounding + NARROW - SIDE
         if there < part or (there == part and its_key <= key):
             continue
         if there > part and abs(its_left) > wide + SIDE + aside:
@@ -225,7 +225,7 @@ def see_obstacles(
         distance = sqrt(d2)
         if there - part == 2:
             distance = max(distance, its_key - key + max(around(way), chord(way)))
-        its_gap = distance - vehicle.reach - row[7]
+        its_gap = distance - vehicle.reach - obstacle.reach
         if its_gap < gap:
             gap = its_gap
             who = -2 - p

@@ -31,10 +31,10 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
         return False
     own = along(way, x, y)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        row = obstacles.part[p]
-        key = along(way, row[0], row[1])
-        there = own - row[7] <= key <= own + row[7] + vehicle.fore
-        if there and abs(aside(way, row[0], row[1])) - row[7] < vehicle.middle:
+        part = obstacles.parts[p]
+        key = along(way, part.x, part.y)
+        there = own - part.reach <= key <= own + part.reach + vehicle.fore
+        if there and abs(aside(way, part.x, part.y)) - part.reach < vehicle.middle:
             return True
     return surely_stands(b, n, own, way, traffic)
 

@@ -61,8 +61,8 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
         R, metres.
     """
     row = roads.vert_off[net] + lane_end(roads, net, lane)
-    x = roads.vert[row, 0]
-    y = roads.vert[row, 1]
+    x = roads.vertex[row].x
+    y = roads.vertex[row].y
     tx, ty = lane_direction(roads, net, lane)
     ux, uy = lane_direction(roads, net, out)
     sine = tx * uy - ty * ux
