@@ -19,7 +19,8 @@ MOST_STILL = {
     "duplicates": 6,
     "kernels without units": 152,
     "long modules": 1,
-    "retired names": 2,
+    "retired names": 0,
+    "wide kernels": 53,
     "without docstring": 0,
 }
 """How many findings of each kind may be left; a number here may only fall."""
