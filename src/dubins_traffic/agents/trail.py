@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import sqrt
 
 from dubins_traffic.agents.tables import STEP, Agent, Agents, Point, Team, Trail
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 
-Numbers = tuple[float, float, float, float]
 JUMP = 0.5
 """An ego that comes back into sight farther than this from where it was lost has left its path, metres."""
 JOIN = 0.75
@@ -25,7 +25,7 @@ STEEP = 1.0
 
 @jit
 def follow(
-    tick: int, b: int, n: int, pose: Numbers, ego: Numbers, free: bool, agents: Agents
+    tick: int, b: int, n: int, pose: Pose, ego: Pose, free: bool, agents: Agents
 ) -> tuple[bool, bool, float, float]:
     """Return whether the ego is in sight, whether the car shall drive on lanes, else its speed and yaw rate.
 
@@ -36,12 +36,12 @@ def follow(
     trail = agents.trail[f]
     scale = team.w / 0.3
     sight = agent.sight
-    dx = pose[0] - ego[0]
-    dy = pose[1] - ego[1]
+    dx = pose.x - ego.x
+    dy = pose.y - ego.y
     seen = dx * dx + dy * dy <= sight * sight
     if seen:
-        observe(tick, ego[0], ego[1], STEP * scale, path, f, trail)
-    if free and on_path(pose[0], pose[1], JOIN * scale, path, f, trail):
+        observe(tick, ego.x, ego.y, STEP * scale, path, f, trail)
+    if free and on_path(pose.x, pose.y, JOIN * scale, path, f, trail):
         agent.lane = -1
         speed, yaw_rate = track(pose, seen, team, agent, path, f, trail)
         return seen, False, speed, yaw_rate
@@ -92,7 +92,7 @@ def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: T
 
 @jit
 def track(
-    pose: Numbers, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
+    pose: Pose, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
 ) -> tuple[float, float]:
     """Return (speed, yaw rate) along the ego's path; gives the path up at its end when the ego is out of sight."""
     x, y, c, s = pose
