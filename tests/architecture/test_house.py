@@ -17,10 +17,10 @@ from tests.architecture.kernels import is_said, public_kernels
 MOST_STILL = {
     "circles": 0,
     "duplicates": 6,
-    "kernels without units": 152,
+    "kernels without units": 147,
     "long modules": 1,
     "retired names": 0,
-    "wide kernels": 53,
+    "wide kernels": 52,
     "without docstring": 0,
 }
 """How many findings of each kind may be left; a number here may only fall."""

@@ -170,11 +170,8 @@ def estimate(board: Board) -> Estimate:
     """
     if not 1 <= board.others <= MOST_OTHERS:
         raise InputError(
-            "not a number of e-agents of the game",
-            field="--cars",
-            value=board.others,
-            expected=f"1 to {MOST_OTHERS}",
-        )
+            "not a number of e-agents of the game", field="--cars", value=board.others, expected=f"1 to {MOST_OTHERS}"
+        )  # fmt: skip
     count = board.positions
     if count == 0:
         raise InputError(
@@ -331,7 +328,10 @@ def _trimmed(out: Moves, rows: int) -> Moves:
         out.ego_to[: used.ego_to].copy(),
         out.owed[: used.owed].copy(),
         out.owed_mask[: used.owed].copy(),
-        *(own[:rows].copy() for own in (out.ego_cell, out.many, out.ego_many, out.owed_many)),
+        out.ego_cell[:rows].copy(),
+        out.many[:rows].copy(),
+        out.ego_many[:rows].copy(),
+        out.owed_many[:rows].copy(),
         out.used,
     )
 
