@@ -145,8 +145,7 @@ def place_trials(
             spot, along = _choose(own, k, share, side, count, room)
             if spot < 0:
                 break
-            line = own.line[room.lane[side, spot]]
-            pose = poses[b, k]
+            line, pose = own.line[room.lane[side, spot]], poses[b, k]
             pose[0], pose[1] = line[0] + along * line[2], line[1] + along * line[3]
             pose[2], pose[3] = line[2], line[3]
             placed[b] = k + 1
