@@ -25,7 +25,10 @@ BACK = -0.99
 def drive(
     b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) of a car that drives to its waypoint, after choosing the next where it is time."""
+    """Return (speed, yaw rate) of a car that drives to its waypoint, after choosing the next where it is time.
+
+    `seen` (whether the ego is to be sought), `weary` (whether its patience ended and something is in its way).
+    """
     team, agent = scene.agents.team[b], scene.agents.agent[b, n]
     x, y, c, s = pose
     if team.curves != 0:
@@ -66,7 +69,10 @@ def tires(tick: int, n: int, team: Team) -> bool:
 
 @jit
 def begin_lane(pose: Pose, roads: RoadTable, net: int, agent: Agent, cycle: Ints, leg: int) -> None:
-    """Take the lane of the nearest segment that leads along the heading."""
+    """Take the lane of the nearest segment that leads along the heading, `leg` (as `Agent.leg`).
+
+    `cycle` (M,) holds the lanes of all cycles in order.
+    """
     lane = lane_at(roads, net, pose.x, pose.y, pose.c, pose.s)
     agent.lane = lane
     agent.leg = leg
@@ -77,7 +83,8 @@ def begin_lane(pose: Pose, roads: RoadTable, net: int, agent: Agent, cycle: Ints
 def navigate(b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene) -> None:
     """Set the next waypoint: the end of the lane; after turning round at an end first the start of the lane back.
 
-    A `weary` car turns round where it stands, others have reached their waypoint or begin to drive.
+    A `weary` (bool) car turns round where it stands, others have reached their waypoint or begin to drive; where the
+    ego is `seen` (bool) they go toward it.
     """
     roads, cycle = scene.roads, scene.agents.cycle
     net, agent = scene.agents.team[b].net, scene.agents.agent[b, n]
@@ -113,7 +120,7 @@ def navigate_arcs(b: int, n: int, tick: int, pose: Pose, seen: bool, scene: Scen
     """Set the waypoint of a car that can't turn in place: a point of its lane's line ahead.
 
     It chooses its next lane before the end of the present one and takes it where the arc between the two lines
-    begins.
+    begins; `seen` (bool) as for `navigate`.
     """
     roads, team, agent = scene.roads, scene.agents.team[b], scene.agents.agent[b, n]
     net, radius, offset = team.net, team.radius, agent.offset
@@ -141,7 +148,10 @@ def navigate_arcs(b: int, n: int, tick: int, pose: Pose, seen: bool, scene: Scen
 
 @jit
 def choose(b: int, n: int, tick: int, lane: int, seen: bool, scene: Scene) -> int:
-    """Return the lane to take at the end of `lane`: round the cycle or to it, toward the ego if seen, or any."""
+    """Return the lane to take at the end of `lane`: round the cycle or to it, toward the ego if `seen`, or any.
+
+    `seen` (bool) is whether the ego is to be sought.
+    """
     roads, cycle = scene.roads, scene.agents.cycle
     team, agent = scene.agents.team[b], scene.agents.agent[b, n]
     place, first, last, net = agent.place, agent.first, agent.last, team.net

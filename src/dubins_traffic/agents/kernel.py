@@ -13,7 +13,7 @@ from dubins_traffic.kernels.compile import jit
 
 @jit
 def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
-    """Write the commands of all e-agents of the trials from `begin` on.
+    """Write the commands of all e-agents of the trials from `begin` (number) on.
 
     Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which is
     then untouched, like those after it.
@@ -43,6 +43,8 @@ def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
 @jit
 def hold(tick: int, pose: Pose, ego: Pose, held: int, agent: Agent) -> int:
     """Return what holds a car: SEES for no motion, BARRED for no speed, TIGHT for no turning.
+
+    `held` (bits) is what `sight.look` found.
 
     A car stands while it SEES something, and has no speed near the ego. When its patience ends, only what is in
     its way or too near holds it, and WEARY says that something is in its way.

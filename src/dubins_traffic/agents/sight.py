@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from dubins_traffic.agents.tables import BARRED, SEES, TIGHT, Agent, Scene, Team
 from dubins_traffic.cars.near import candidates
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.boxes import nearest_in_box, separation
 from dubins_traffic.kernels.compile import jit
 
@@ -17,7 +18,6 @@ ELBOW = 0.1
 """A car whose patience ended keeps this free ahead of its body, and what it drives in a tick, metres."""
 SHOULDER = 0.03
 """It keeps this free to either side of its body, metres."""
-Numbers = tuple[float, float, float, float]
 
 
 class Box(NamedTuple):
@@ -34,7 +34,7 @@ class Box(NamedTuple):
 
 @jit
 def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
-    """Return whether a rounded box has a point nearer than `stop` to (x, y) and at most 2.0 rad off the heading.
+    """Return whether a rounded box has a point nearer than `stop` (m) to (x, y) and at most 2.0 rad off the heading.
 
     Exact: either the point of the box that is nearest lies in the sector, or else the nearest one in the sector
     lies on one of the sector's edges.
@@ -62,7 +62,7 @@ def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
 
 
 @jit
-def in_way(pose: Numbers, front: float, side: float, box: Box) -> bool:
+def in_way(pose: Pose, front: float, side: float, box: Box) -> bool:
     """Return whether a rounded box meets the strip from a pose to `front` ahead, `side` to either side, metres."""
     x, y, c, s = pose
     ox, oy, oc, os, a, b, r = box
@@ -72,7 +72,7 @@ def in_way(pose: Numbers, front: float, side: float, box: Box) -> bool:
 
 
 @jit
-def consider(pose: Numbers, team: Team, agent: Agent, box: Box) -> int:
+def consider(pose: Pose, team: Team, agent: Agent, box: Box) -> int:
     """Return the bits of `Workspace.held` that one body brings upon a car."""
     x, y, c, s = pose
     stop = agent.stop
@@ -115,16 +115,16 @@ def look(scene: Scene, b: int) -> int:
     for k in range(found):
         i = work.pair[k, 0]
         j = work.pair[k, 1]
-        pose = (state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
+        pose = Pose(state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
         if j < 0:
             row = obstacles.part[-1 - j]
             box = Box(row[0], row[1], row[2], row[3], row[4], row[5], row[6])
             work.held[i] |= consider(pose, team, agents[b, i], box)
             continue
-        other = (state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
+        other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         for _ in range(2):
             if work.held[i] == 0 or agents[b, i].patience >= 0:
-                box = Box(other[0], other[1], other[2], other[3], p, q, r)
+                box = Box(other.x, other.y, other.c, other.s, p, q, r)
                 work.held[i] |= consider(pose, team, agents[b, i], box)
             i, j = j, i
             pose, other = other, pose

@@ -62,7 +62,10 @@ def travel_of(vehicle: Vehicle) -> float:
 
 @jit_inline
 def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch: Scratch) -> int:
-    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
+    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many.
+
+    `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
+    """
     far = 2.0 * (vehicle.reach + 1.2 * travel_of(vehicle)) + GUARD
     far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
     count = 0
@@ -77,7 +80,7 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
 
 @jit
 def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
-    """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
+    """Tell whether a command could bring about a contact, were the `near` (count) others to do their worst for a tick.
 
     `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
@@ -106,7 +109,9 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
 def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: ShieldTables) -> int:
     """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
 
-    NOTHING if it does not: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
+    `near` (count) is how many cars `gather_close` has listed.
+
+    NOTHING if it breaks none: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
     the road, and has touched nothing, whatever the others did.
     """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers

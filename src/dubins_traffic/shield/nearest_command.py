@@ -70,7 +70,7 @@ def shield(tick: Any, sighted: bool, traffic: Traffic, guards: ShieldTables, com
 def shield_trial(
     b: int, tick: int, sight2: float, traffic: Traffic, guards: ShieldTables, commands: Floats
 ) -> None:
-    """Put what the ego of trial b does in place of what it was asked to do."""
+    """Put what the ego of trial b does in place of what it was asked to do; `sight2` (m2) as for `gather_close`."""
     state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]

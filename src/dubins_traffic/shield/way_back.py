@@ -36,7 +36,7 @@ ROUNDED = 1e-6
 
 @jit
 def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
+    """Write the command of an ego that the law drives; it goes by the cars within sight, `sight2` (m2)."""
     scratch = traffic.scratch
     decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
@@ -72,7 +72,10 @@ def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
 def surely_returns(
     b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: ShieldTables
 ) -> bool:
-    """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time."""
+    """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time.
+
+    `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
+    """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
