@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import grimp
 
 from tests.architecture.house import Findings, Module, modules
-from tests.architecture.kernels import kernels_without_units
+from tests.architecture.kernels import kernels_without_units, wide_kernels
 
 MOST_LINES = 350
 """Lines of a module."""
@@ -199,6 +199,7 @@ CHECKS: Mapping[str, Callable[[], Findings]] = {
     "duplicates": duplicates,
     "kernels without units": kernels_without_units,
     "long modules": long_modules,
+    "wide kernels": wide_kernels,
     "retired names": retired_names,
     "without docstring": without_docstring,
 }

@@ -17,8 +17,10 @@ from functools import cache
 
 from tests.architecture.house import Findings, Module, modules
 
-JIT = frozenset({"jit", "jit_inline", "jit_wide"})
+JIT = frozenset({"jit", "jit_inline", "jit_long", "jit_wide"})
 """What makes a function a kernel."""
+WIDE = 8
+"""So many parameters of a kernel are too many: tables, rows and nouns (a pose, a body) hold what belongs together."""
 _ROW = re.compile(r"^(\w+(?:, \w+)*) +(\w+) {2,}\S", re.MULTILINE)
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*)(?: : (.*))?\n((?:    .*\n?)+)", re.MULTILINE)
 _SHAPE = re.compile(r"\((?:[A-Z]\w*(?: \+ \d+)?|\d+),[^)]*\)|\bmetres\b")
@@ -40,10 +42,25 @@ def kernels_without_units() -> Findings:
     return found
 
 
+def wide_kernels() -> Findings:
+    """Kernels with too many parameters, each with their number."""
+    found: dict[str, str | int] = {}
+    for module in modules():
+        for kernel in kernels(module):
+            if len(kernel.args.args) >= WIDE:
+                found[f"{module.name}.{kernel.name}"] = len(kernel.args.args)
+    return found
+
+
 def public_kernels(module: Module) -> Iterator[ast.FunctionDef]:
     """Yield the compiled functions of a module whose names do not begin with an underscore."""
+    return (kernel for kernel in kernels(module) if not kernel.name.startswith("_"))
+
+
+def kernels(module: Module) -> Iterator[ast.FunctionDef]:
+    """Yield the compiled functions of a module."""
     for item in module.tree.body:
-        if isinstance(item, ast.FunctionDef) and not item.name.startswith("_"):
+        if isinstance(item, ast.FunctionDef):
             decorators = {ast.unparse(one).split("(")[0].split(".")[-1] for one in item.decorator_list}
             if decorators & JIT:
                 yield item

@@ -1,4 +1,7 @@
-"""The suite of every kind of e-agent: those of the table, and one from a file outside; a new kind joins by itself."""
+"""The suite of every kind of e-agent: those of the table, one from a file outside, and one that is registered here.
+
+A new kind of the table joins by itself.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,17 @@ from typing import Any
 
 import pytest
 
+from dubins_traffic.agents.kinds import PACKS, PLAYS, Lists
+from dubins_traffic.agents.script import script_rows
+from dubins_traffic.agents.tables import Agent
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.faults import Strict
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import KINDS, REMOTE
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import read
@@ -27,15 +35,34 @@ from tests.property.test_batch import SEED, configuration, plain
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "extending" / "my_e_agent.py"
 OUTSIDE = f"{EXAMPLE}:Patrol"
-TYPES = [*(kind for kind in KINDS if kind != REMOTE), OUTSIDE]
+REGISTERED = "shuttle"
+TYPES = [*(kind for kind in KINDS if kind != REMOTE), OUTSIDE, REGISTERED]
 NEEDED: Mapping[str, dict[str, Any]] = {"scripted": {"commands": [[2.0, 0.4, 0.3]], "repeat": True}}
 """Parameters of kinds that have some without a default."""
 TOGETHER = {"type": "wander", "name": "other"}
 
 
+class Shuttle(Strict):
+    """Drives to and fro on the spot."""
+
+    leg: float = 0.5
+    speed: float = 0.4
+
+
+def pack_shuttle(instance: Instance, given: Mapping[str, Any], agent: Agent, lists: Lists) -> None:
+    """Let a car play a script of two steps."""
+    seconds, first = given["leg"] / given["speed"], len(lists.script)
+    commands = [[seconds, given["speed"], 0.0], [seconds, -given["speed"], 0.0]]
+    lists.script += script_rows(commands, instance.problem.rate)
+    agent.does, agent.first, agent.last, agent.repeat = PLAYS, first, len(lists.script), 1
+
+
 @pytest.fixture(params=TYPES, ids=lambda kind: str(kind).rpartition("/")[2])
-def entries(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
+def entries(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """Return two e-agents of a kind, and one of another if they may be together."""
+    if request.param == REGISTERED:
+        monkeypatch.setitem(KINDS, REGISTERED, Shuttle)
+        monkeypatch.setitem(PACKS, REGISTERED, pack_shuttle)
     own = {"type": request.param, "name": "own", "count": 2, "parameters": NEEDED.get(request.param, {})}
     return [own] if request.param == "counter" else [own, TOGETHER]
 

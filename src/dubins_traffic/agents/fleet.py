@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide
+from dubins_traffic.agents.kinds import Lists, fill
 from dubins_traffic.agents.own import OwnAgents
 from dubins_traffic.agents.tables import (
-    FOLLOW,
-    KINDS,
-    LOOP,
-    PARKED,
-    SCRIPTED,
     STEP,
     Agent,
     Agents,
@@ -30,28 +25,17 @@ from dubins_traffic.agents.tables import (
 )
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
-from dubins_traffic.kernels.trig import sincos
-from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN, parameters_of
+from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
     from dubins_traffic.agents.lawful import Lawful
-    from dubins_traffic.problem.instance import EAgent, Instance
+    from dubins_traffic.problem.instance import Instance
 
-AS_FAR_AS_2016 = 3.5
-"""Up to this far from its waypoint (metres, for w = 0.3 m) a car keeps the bearing tolerance of 2016."""
-WIDEST = 1.5
-"""Bearing tolerances above this count as this, rad."""
-MARGIN = 0.05
-"""A car that stops for others keeps at least this between the bodies, metres."""
-EVERYWHERE = 1e150
-NEVER = 2**62
 REMEMBERED = 12.0
 """How much of the ego's path is remembered beside the gap, metres (for w = 0.3 m)."""
 PAIRS = 64
@@ -139,8 +123,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     `net` holds the number of each trial's road network.
     """
     agents = table(Agent, (len(instances), cars))
-    cycle: list[int] = []
-    script: list[tuple[float, float, float]] = []
+    lists = Lists()
     elsewhere = KEEP_RULES | ALONE
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
     kinds = [{agent.kind for agent in instances[b].e_agents} for b in fleets]
@@ -148,19 +131,16 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     for b in np.flatnonzero(driven).tolist():
         instance = instances[b]
         for n, agent in enumerate(instance.e_agents, start=1):
-            if agent.kind in elsewhere:
-                continue
-            given = _parameters(agent)
-            _habits(instance, agent.kind, given, agents[b, n])
-            _plan(instance, given, agents[b, n], agent.kind, cycle, script)
-    steps = table(Stretch, len(script))
-    for step, (end, speed, yaw_rate) in zip(range(len(script)), script, strict=True):
+            if agent.kind not in elsewhere:
+                fill(instance, agent, agents[b, n], lists)
+    steps = table(Stretch, len(lists.script))
+    for step, (end, speed, yaw_rate) in enumerate(lists.script):
         steps[step].end, steps[step].speed, steps[step].yaw_rate = end, speed, yaw_rate
     trail, point = _trails(agents, min(instance.problem.car.w for instance in instances))
     return Agents(
         team=_teams(instances, agents, net),
         agent=agents,
-        cycle=np.array(cycle, dtype=np.int64),
+        cycle=np.array(lists.cycle, dtype=np.int64),
         script=steps,
         trail=trail,
         point=point,
@@ -179,66 +159,6 @@ def _counter() -> CounterTeam:
     from dubins_traffic.agents.counter import CounterTeam
 
     return CounterTeam()
-
-
-@cache
-def _defaults(kind: str) -> Mapping[str, Any]:
-    return parameters_of(kind, {"commands": []} if kind == "scripted" else {})
-
-
-def _parameters(agent: EAgent) -> Mapping[str, Any]:
-    if agent.kind not in KINDS:
-        raise InputError(
-            "unknown kind of e-agent", field="kind", value=agent.kind, expected=" or ".join(KINDS)
-        )
-    return {**_defaults("wander"), **_defaults(agent.kind), **agent.parameters}
-
-
-def _plan(
-    instance: Instance,
-    given: Mapping[str, Any],
-    agent: Agent,
-    kind: str,
-    cycle: list[int],
-    script: list[tuple[float, float, float]],
-) -> None:
-    agent.kind = KINDS[kind]
-    patience = given["patience"]
-    agent.patience = -1 if patience is None else math.ceil(patience * instance.problem.rate - 1e-9)
-    if agent.kind == LOOP:
-        agent.first = len(cycle)
-        cycle += cycle_lanes(instance.problem.network, given["cycle"])
-        agent.last = len(cycle)
-    elif agent.kind == SCRIPTED:
-        agent.first = len(script)
-        script += script_rows(given["commands"], instance.problem.rate)
-        agent.last = len(script)
-        agent.repeat = given["repeat"]
-    elif agent.kind == PARKED:
-        after = given["vacates_after"]
-        agent.begin = NEVER if after is None else math.ceil(after * instance.problem.rate - 1e-9)
-
-
-def _habits(instance: Instance, kind: str, given: Mapping[str, Any], agent: Agent) -> None:
-    """Say how an e-agent drives, turns and keeps away from others."""
-    car = instance.problem.car
-    speed = max(min(given["speed"], car.bounds.speed), car.bounds.speed_low)
-    cosine, sine = sincos(min(given["bearing_tolerance"], WIDEST))
-    tangent = sine / cosine
-    stop = given["stop_range"]
-    if stop > 0.0:
-        stop = max(stop, car.body.reach + speed * instance.problem.period + MARGIN)
-    sensing = kind == "follow" and given["sensing_only"]
-    agent.offset = given["offset"] * car.lane_width
-    agent.reached = given["waypoint_radius"]
-    agent.tangent = tangent
-    agent.miss = tangent * AS_FAR_AS_2016 * car.w / 0.3
-    agent.stop = 0.0 if kind == "scripted" else stop
-    agent.berth = given["ego_range"] if kind in ("wander", "parked") else -1.0
-    agent.speed = speed
-    agent.yaw_rate = min(given["yaw_rate"], car.bounds.yaw_rate)
-    agent.gap = given.get("gap", 0.0)
-    agent.sight = instance.problem.sensing_radius if sensing else EVERYWHERE
 
 
 def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Rows[Team]:
@@ -263,21 +183,8 @@ def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Row
 
 def _trails(agents: Rows[Agent], w: float) -> tuple[Rows[Trail], Rows[Point]]:
     """Give every car that follows a ring for the ego's path; return `Agents.trail` and `Agents.point`."""
-    follows = agents["kind"] == FOLLOW
+    follows = agents["trail"] == 0
     followers = int(follows.sum())
     agents["trail"][follows] = np.arange(followers)
     points = math.ceil((float(agents["gap"].max()) + REMEMBERED) / (STEP * w / 0.3)) + 2
     return table(Trail, followers), table(Point, (followers, points))
-
-
-def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:
-    """Return (tick at which it ends, speed, yaw rate) of commands given as [seconds, speed, yaw rate].
-
-    A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9).
-    """
-    rows: list[tuple[float, float, float]] = []
-    time = 0.0
-    for seconds, speed, yaw_rate in commands:
-        time += seconds
-        rows.append((float(math.ceil(time * rate - 1e-9)), float(speed), float(yaw_rate)))
-    return rows

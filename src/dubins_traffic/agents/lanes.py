@@ -14,7 +14,10 @@ CHOICE_DRAW = 0
 
 @jit
 def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
-    """Return a lane out of `v` for `car` (number), each equally likely; the one back only at a dead end."""
+    """Return one of the lanes out of `v`, each equally likely, but the one back, which only a dead end gives.
+
+    `car` (number) and tick are what the draw follows from.
+    """
     arms, degree = roads.arms, roads.degree
     if degree[v] < 2:
         return lane ^ 1
@@ -29,7 +32,10 @@ def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick:
 
 @jit
 def nearer_exit(roads: RoadTable, v: int, lane: int, hops: Ints) -> int:
-    """Return the lane out of `v` with the fewest of `hops` (L,) to go; the one back where no other leads there."""
+    """Return the lane out of `v` with the fewest hops to go; the one back where no other leads there.
+
+    `hops` (L,) is how many lanes are to go from each.
+    """
     arms, degree = roads.arms, roads.degree
     best = lane ^ 1
     fewest = FAR

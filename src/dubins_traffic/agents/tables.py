@@ -14,8 +14,6 @@ from dubins_traffic.kernels.records import Rows, record
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
 
-WANDER, LOOP, FOLLOW, PARKED, SCRIPTED = range(5)
-KINDS = {"wander": WANDER, "loop": LOOP, "follow": FOLLOW, "parked": PARKED, "scripted": SCRIPTED}
 NOBODY: Final = -1
 
 SEES, BARRED, TIGHT, WEARY = 1, 2, 4, 8
@@ -31,8 +29,8 @@ STEP: Final = 0.1
 class Agent:
     """An e-agent: what it is given, and what it remembers."""
 
-    kind: int = NOBODY
-    """WANDER to SCRIPTED; NOBODY where there's no e-agent."""
+    does: int = NOBODY
+    """What it does (`agents.kinds`); NOBODY where there's no e-agent."""
     begin: int
     """The tick at which the car begins to drive."""
     first: int
@@ -55,7 +53,7 @@ class Agent:
     """Largest lateral distance of the waypoint from the line ahead that is left alone, metres."""
     stop: float
     """It stands while a surface in sight is nearer, metres."""
-    berth: float
+    berth: float = -1.0
     """It does not drive while the ego's centre is within, metres; negative: never mind."""
     speed: float
     """How fast it drives, m/s."""
@@ -63,7 +61,7 @@ class Agent:
     """How fast it turns, rad/s."""
     gap: float
     """Kept behind the ego, metres."""
-    sight: float
+    sight: float = 1e150
     """From where the ego is seen, metres."""
     lane: int = -1
     """The lane driven, -1 before the first."""

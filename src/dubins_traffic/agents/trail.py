@@ -29,7 +29,7 @@ def follow(
 ) -> tuple[bool, bool, float, float]:
     """Return whether the ego is in sight, whether the car shall drive on lanes, else its speed and yaw rate.
 
-    A car that is not `free` (whether) only looks.
+    A car that is not `free` (bool) only looks.
     """
     team, agent = agents.team[b], agents.agent[b, n]
     path, f = agents.point, agent.trail
@@ -50,7 +50,7 @@ def follow(
 
 @jit
 def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: int, trail: Trail) -> None:
-    """Remember the ego's place every `step` (m) of row `f` (row); one that is back in sight elsewhere begins anew."""
+    """Remember the ego's place on path `f` (row), each `step` (m); one that comes back elsewhere begins a new path."""
     dx = x - trail.x
     dy = y - trail.y
     moved = sqrt(dx * dx + dy * dy)
@@ -77,7 +77,7 @@ def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: in
 
 @jit
 def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: Trail) -> bool:
-    """Return whether the car is on the ego's path, row `f` (row): from when a point of it is within `near` (m)."""
+    """Return whether the car is on path `f` (row): from when any point of it is within `near` (m), the newest first."""
     if trail.aimed < 0:
         written = trail.written
         for k in range(written - 1, max(written - path.shape[1], -1), -1):
@@ -94,10 +94,7 @@ def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: T
 def track(
     pose: Pose, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) along the ego's path, row `f` (row).
-
-    The car gives it up at its end when the ego is not `seen` (whether).
-    """
+    """Return (speed, yaw rate) along path `f` (row); gives it up at its end when the ego is not `seen` (bool)."""
     x, y = pose.x, pose.y
     near = max(AHEAD * team.w / 0.3, team.radius)
     aimed = trail.aimed

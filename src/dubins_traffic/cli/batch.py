@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
@@ -10,6 +11,17 @@ from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.progress import progress
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dubins_traffic.engine.batch import Batch
+
+    class Run(Protocol):
+        """Runs the trials of a batch."""
+
+        def __call__(self, *, ended: Callable[[Outcome], object]) -> object:
+            """Run them, and tell `ended` what came of each as it ends."""
+            ...
+
     from dubins_traffic.engine.group import Outcome
 
 EXAMPLES = options.examples(
@@ -18,37 +30,41 @@ EXAMPLES = options.examples(
     "batch town --trials 200 --threads 2 --keep failures --records out",
 )
 
+ControllerOption = Annotated[
+    str,
+    typer.Option(
+        "--controller",
+        metavar="C",
+        help="A built-in name, module:Class or path/to/file.py:Class; `rules` runs compiled.",
+        autocompletion=options.controllers,
+    ),
+]
+TrialsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
+    ),
+]
+TogetherOption = Annotated[
+    int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")
+]
+ThreadsOption = Annotated[
+    int, typer.Option("--threads", metavar="T", min=1, help="Batches at a time, where all is compiled.")
+]
+KeepOption = Annotated[
+    str,
+    typer.Option("--keep", metavar="none|all|failures|sample:K", help="Of which trials a record is kept."),
+]
+
 
 def batch(
     configuration: options.Config,
-    controller: Annotated[
-        str,
-        typer.Option(
-            "--controller",
-            metavar="C",
-            help="A built-in name, module:Class or path/to/file.py:Class; `rules` runs compiled.",
-            autocompletion=options.controllers,
-        ),
-    ] = "rules",
-    trials: Annotated[
-        int | None,
-        typer.Option(
-            "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
-        ),
-    ] = None,
+    controller: ControllerOption = "rules",
+    trials: TrialsOption = None,
     seed: options.Seed = 0,
-    together: Annotated[
-        int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")
-    ] = 64,
-    threads: Annotated[
-        int, typer.Option("--threads", metavar="T", min=1, help="Batches at a time, where all is compiled.")
-    ] = 1,
-    keep: Annotated[
-        str,
-        typer.Option(
-            "--keep", metavar="none|all|failures|sample:K", help="Of which trials a record is kept."
-        ),
-    ] = "none",
+    together: TogetherOption = 64,
+    threads: ThreadsOption = 1,
+    keep: KeepOption = "none",
     records: options.Records = None,
     overwrite: options.Overwrite = False,
     append: options.Append = False,
@@ -60,16 +76,14 @@ def batch(
 
     Ctrl-C keeps the scores of all finished trials.
     """
-    from dubins_traffic.cli.tables import show
     from dubins_traffic.controllers.registry import shielded
-    from dubins_traffic.engine.batch import in_order, run_each
+    from dubins_traffic.engine.batch import run_batch
     from dubins_traffic.problem.configuration import load_config
-    from dubins_traffic.record.sink import FAULTS
 
     drawn = load_config(configuration)
     count = drawn.number_trials if trials is None else trials
-    done: list[Outcome] = []
-    each = run_each(
+    run = partial(
+        run_batch,
         drawn,
         shielded(controller) if shield else controller,
         trials=trials,
@@ -82,11 +96,20 @@ def batch(
         append=append,
         metrics=metric or (),
     )
+    found = _run(run, count, records, json=json)
+    if not faults.tell_failed([(own.instance, own.ending) for own in found.outcomes]):
+        raise typer.Exit(faults.FAILED)
+
+
+def _run(run: Run, count: int, records: str | None, *, json: bool) -> Batch:
+    """Run `count` trials, show the scores of those that have ended, and return what came of them."""
+    from dubins_traffic.cli.tables import show
+    from dubins_traffic.engine.batch import in_order
+
+    done: list[Outcome] = []
     try:
         with faults.no_silent_end(), progress(count) as tell:
-            for outcome in each:
-                done.append(outcome)
-                tell(len(done), count)
+            run(ended=lambda outcome: (done.append(outcome), tell(len(done), count)))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(done)} of {count} trials")
         raise
@@ -94,8 +117,4 @@ def batch(
         if done:
             show(in_order(done).sheet, json=json)
             options.tell(*(() if records is None else (records,)))
-    failed = [outcome for outcome in in_order(done).outcomes if outcome.ending.end in FAULTS]
-    for outcome in failed:
-        faults.tell(f"trial {outcome.instance.trial}: {outcome.ending.end}: {outcome.ending.detail}")
-    if failed:
-        raise typer.Exit(faults.FAILED)
+    return in_order(done)

@@ -29,28 +29,32 @@ class Sdf(StrEnum):
     NEW = "1.9"
 
 
+FileArgument = Annotated[
+    str,
+    typer.Argument(metavar="FILE", help="A road network, a record, a bag or a log.", show_default=False),
+]
+OutputOption = Annotated[
+    str, typer.Option("--output", "-o", metavar="FILE", help="What to write; its suffix says as what.")
+]
+SdfOption = Annotated[
+    Sdf,
+    typer.Option("--sdf", help="Version of a world for Gazebo: 1.6 for 11 and older, 1.9 for newer ones."),
+]
+MapFormatOption = Annotated[
+    str | None,
+    typer.Option(
+        "--map-format",
+        metavar="F",
+        help="A further map format, module:Class or path/to/file.py:Class, to read FILE or write the output.",
+    ),
+]
+
+
 def convert(
-    file: Annotated[
-        str,
-        typer.Argument(metavar="FILE", help="A road network, a record, a bag or a log.", show_default=False),
-    ],
-    output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="What to write; its suffix says as what.")
-    ],
-    sdf: Annotated[
-        Sdf,
-        typer.Option(
-            "--sdf", help="Version of a world for Gazebo: 1.6 for 11 and older, 1.9 for newer ones."
-        ),
-    ] = Sdf.CLASSIC,
-    map_format: Annotated[
-        str | None,
-        typer.Option(
-            "--map-format",
-            metavar="F",
-            help="A further map format, module:Class or path/to/file.py:Class, to read FILE or write the output.",
-        ),
-    ] = None,
+    file: FileArgument,
+    output: OutputOption,
+    sdf: SdfOption = Sdf.CLASSIC,
+    map_format: MapFormatOption = None,
 ) -> None:
     """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
 
@@ -59,9 +63,9 @@ def convert(
     ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.files import is_stream
-    from dubins_traffic.interchange.bag_reader import bag_to_records, is_bag
+    from dubins_traffic.interchange.bag_reader import is_bag
     from dubins_traffic.interchange.bags import write_bag
-    from dubins_traffic.interchange.lcm_log import is_log, log_to_records
+    from dubins_traffic.interchange.lcm_log import is_log
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
@@ -71,13 +75,7 @@ def convert(
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
     if not is_stream(file) and (is_bag(file) or is_log(file)):
-        if Path(output).suffix.lower() != ".mcap":
-            raise InputError(
-                "not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap"
-            )
-        records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=True)
-        count = [f"{len(records)} trials, {len(records)} records:"] if len(records) > 1 else []
-        options.tell(*count, *map(str, records))
+        _to_records(file, output)
         return
     form = None if map_format is None else formats.load(map_format)
     found = load(file, map_format=form)
@@ -99,3 +97,15 @@ def convert(
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
     options.tell(output)
+
+
+def _to_records(file: str, output: str) -> None:
+    """Write the trials of a bag or log as records."""
+    from dubins_traffic.interchange.bag_reader import bag_to_records, is_bag
+    from dubins_traffic.interchange.lcm_log import log_to_records
+
+    if Path(output).suffix.lower() != ".mcap":
+        raise InputError("not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap")
+    records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=True)
+    count = [f"{len(records)} trials, {len(records)} records:"] if len(records) > 1 else []
+    options.tell(*count, *map(str, records))

@@ -7,14 +7,18 @@ import os
 import sys
 import threading
 import traceback
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from itertools import pairwise
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import typer
 
 from dubins_traffic.controllers.blame import DEBUG
 from dubins_traffic.errors import DubinsTrafficError, InputError, WorkerLostError, shown
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.record.sink import Ending
 
 OK: Final = 0
 FAILED: Final = 1
@@ -53,6 +57,16 @@ def tell(text: str) -> None:
     """Print one line about something wrong on standard error."""
     with contextlib.suppress(BrokenPipeError):  # whoever read it has had enough
         print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+
+
+def tell_failed(trials: Iterable[tuple[Instance, Ending]]) -> bool:
+    """Tell of each trial that ended by a fault why; return whether none did."""
+    from dubins_traffic.record.sink import FAULTS
+
+    failed = [(instance, ending) for instance, ending in trials if ending.end in FAULTS]
+    for instance, ending in failed:
+        tell(f"trial {instance.trial}: {ending.end}: {ending.detail}")
+    return not failed
 
 
 def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:

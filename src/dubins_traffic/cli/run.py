@@ -10,6 +10,7 @@ from dubins_traffic.cli import faults, options
 from dubins_traffic.errors import WorkerLostError
 
 if TYPE_CHECKING:
+    from dubins_traffic.runs.plan import Plan
     from dubins_traffic.runs.single import Result
 
 EXAMPLES = options.examples(
@@ -22,73 +23,76 @@ EXAMPLES = options.examples(
     "run demo --simulator gazebo --records out",
 )
 
+ControllerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        metavar="C",
+        help="A built-in name, module:Class or path/to/file.py:Class.",
+        show_default="lanes; of a record its own",
+        autocompletion=options.controllers,
+    ),
+]
+TrialsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
+    ),
+]
+RepeatOption = Annotated[
+    int, typer.Option("--repeat", metavar="N", min=1, help="How many times each trial is run.")
+]
+SeedOption = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        metavar="S",
+        min=0,
+        help="What all random numbers follow from.",
+        show_default="0",
+    ),
+]
+JobsOption = Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")]
+DeadlineOption = Annotated[
+    float | None,
+    typer.Option("--deadline", metavar="SECONDS", help="End a trial whose controller takes longer to act."),
+]
+SimulatorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--simulator",
+        metavar="S",
+        help="What moves the cars; `list simulators` names them.",
+        show_default="as the source says",
+        autocompletion=options.simulators,
+    ),
+]
+GuiOption = Annotated[
+    bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
+]
+
 
 def run(
     source: options.Source,
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            "--controller",
-            metavar="C",
-            help="A built-in name, module:Class or path/to/file.py:Class.",
-            show_default="lanes; of a record its own",
-            autocompletion=options.controllers,
-        ),
-    ] = None,
-    trials: Annotated[
-        int | None,
-        typer.Option(
-            "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
-        ),
-    ] = None,
-    repeat: Annotated[
-        int, typer.Option("--repeat", metavar="N", min=1, help="How many times each trial is run.")
-    ] = 1,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            "--seed",
-            metavar="S",
-            min=0,
-            help="What all random numbers follow from.",
-            show_default="0",
-        ),
-    ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")] = 1,
+    controller: ControllerOption = None,
+    trials: TrialsOption = None,
+    repeat: RepeatOption = 1,
+    seed: SeedOption = None,
+    jobs: JobsOption = 1,
     rnd: options.Network = None,
     data: options.Data = None,
     data_over: options.DataOver = None,
     records: options.Records = None,
     overwrite: options.Overwrite = False,
     append: options.Append = False,
-    deadline: Annotated[
-        float | None,
-        typer.Option(
-            "--deadline", metavar="SECONDS", help="End a trial whose controller takes longer to act."
-        ),
-    ] = None,
-    simulator: Annotated[
-        str | None,
-        typer.Option(
-            "--simulator",
-            metavar="S",
-            help="What moves the cars; `list simulators` names them.",
-            show_default="as the source says",
-            autocompletion=options.simulators,
-        ),
-    ] = None,
-    gui: Annotated[
-        bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
-    ] = False,
+    deadline: DeadlineOption = None,
+    simulator: SimulatorOption = None,
+    gui: GuiOption = False,
     shield: options.Shield = False,
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
-    from dubins_traffic.cli.progress import progress
-    from dubins_traffic.cli.tables import show
-    from dubins_traffic.record.sink import FAULTS
-    from dubins_traffic.runs.jobs import run_trials
     from dubins_traffic.runs.plan import plan
 
     todo = plan(
@@ -109,15 +113,28 @@ def run(
         shield=shield,
         metrics=metric or (),
     )
-    results: list[Result] = []
-    lost: WorkerLostError | None = None
     if todo.before:
         faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
+    results, lost = _run(todo, jobs, records, json=json, hidden=controller == "keyboard")
+    is_sound = faults.tell_failed([(own.instance, own.ending) for own in results])
+    if lost is not None:
+        faults.tell(str(lost))
+    if lost is not None or not is_sound:
+        raise typer.Exit(faults.FAILED)
+
+
+def _run(
+    todo: Plan, jobs: int, records: str | None, *, json: bool, hidden: bool
+) -> tuple[list[Result], WorkerLostError | None]:
+    """Run what is to do and show its scores; return the results, and what is said of a worker that was lost."""
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.cli.tables import show
+    from dubins_traffic.runs.jobs import run_trials
+
+    results: list[Result] = []
+    lost: WorkerLostError | None = None
     try:
-        with (
-            faults.no_silent_end(),
-            progress(len(todo.jobs), hidden=controller == "keyboard") as tell,
-        ):
+        with faults.no_silent_end(), progress(len(todo.jobs), hidden=hidden) as tell:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 tell(len(results), len(todo.jobs))
@@ -130,11 +147,4 @@ def run(
         if results:
             show(todo.conclude(results), json=json)
             options.tell(*(str(written) for written in (records, todo.data) if written is not None))
-    failed = [result for result in results if result.ending.end in FAULTS]
-    for result in failed:
-        ending = result.ending
-        faults.tell(f"trial {result.instance.trial}: {ending.end}: {ending.detail}")
-    if lost is not None:
-        faults.tell(str(lost))
-    if failed or lost is not None:
-        raise typer.Exit(faults.FAILED)
+    return results, lost

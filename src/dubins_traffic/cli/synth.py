@@ -14,6 +14,7 @@ from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.synthesis.assumption import Assumption
 
 EXAMPLES = options.examples(
     "synth demo --cars 2",
@@ -21,65 +22,76 @@ EXAMPLES = options.examples(
     "synth first.json --order-degree 1 -o first.npz --json",
 )
 
+SourceArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CONFIG|INSTANCE",
+        help="A trials configuration (file or shipped name), an instance or a record.",
+        show_default=False,
+        autocompletion=options.shipped,
+    ),
+]
+CarsOption = Annotated[
+    int | None,
+    typer.Option("--cars", metavar="N", min=1, help="E-agents.", show_default="those of the instance"),
+]
+AssumeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--assume",
+        metavar="E1,E2,...",
+        help="What is assumed of the e-agents: some of E1 to E6, weaker forms E1:any-order, E3:one-forfeit, "
+        "E3:forfeits, E4:unmet, E5:moves-up; or nothing.",
+        show_default="as the problem says",
+    ),
+]
+OrderDegreeOption = Annotated[
+    int | None,
+    typer.Option(
+        "--order-degree",
+        metavar="D",
+        min=1,
+        help="Intersections of so many roads are crossings.",
+        show_default="as the problem says",
+    ),
+]
+StrategyOption = Annotated[
+    str | None,
+    typer.Option("--output", "-o", metavar="STRATEGY", help="Check the strategy and write it, `*.npz`."),
+]
+GraphOption = Annotated[
+    str | None,
+    typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
+]
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace files that exist; else they are refused.")
+]
+ExplainOption = Annotated[
+    bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
+]
+MemoryOption = Annotated[
+    int | None,
+    typer.Option(
+        "--memory", metavar="MIB", min=1, help="Most memory to use.", show_default="half of the machine's"
+    ),
+]
+TrialOption = Annotated[
+    int, typer.Option("--trial", metavar="I", min=0, help="Which trial of a configuration.")
+]
+
 
 def synth(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="CONFIG|INSTANCE",
-            help="A trials configuration (file or shipped name), an instance or a record.",
-            show_default=False,
-            autocompletion=options.shipped,
-        ),
-    ],
-    cars: Annotated[
-        int | None,
-        typer.Option("--cars", metavar="N", min=1, help="E-agents.", show_default="those of the instance"),
-    ] = None,
-    assume: Annotated[
-        str | None,
-        typer.Option(
-            "--assume",
-            metavar="E1,E2,...",
-            help="What is assumed of the e-agents: some of E1 to E6, weaker forms E1:any-order, E3:one-forfeit, "
-            "E3:forfeits, E4:unmet, E5:moves-up; or nothing.",
-            show_default="as the problem says",
-        ),
-    ] = None,
-    order_degree: Annotated[
-        int | None,
-        typer.Option(
-            "--order-degree",
-            metavar="D",
-            min=1,
-            help="Intersections of so many roads are crossings.",
-            show_default="as the problem says",
-        ),
-    ] = None,
-    strategy: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="STRATEGY", help="Check the strategy and write it, `*.npz`."),
-    ] = None,
-    graph: Annotated[
-        str | None,
-        typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that exist; else they are refused.")
-    ] = False,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
-    ] = False,
-    memory: Annotated[
-        int | None,
-        typer.Option(
-            "--memory", metavar="MIB", min=1, help="Most memory to use.", show_default="half of the machine's"
-        ),
-    ] = None,
+    source: SourceArgument,
+    cars: CarsOption = None,
+    assume: AssumeOption = None,
+    order_degree: OrderDegreeOption = None,
+    strategy: StrategyOption = None,
+    graph: GraphOption = None,
+    overwrite: OverwriteOption = False,
+    explain: ExplainOption = False,
+    memory: MemoryOption = None,
     seed: options.Seed = 0,
-    trial: Annotated[
-        int, typer.Option("--trial", metavar="I", min=0, help="Which trial of a configuration.")
-    ] = 0,
+    trial: TrialOption = 0,
     json: options.Json = False,
 ) -> None:
     """Say whether the ego can win at all: solve the game of cells behind a problem.
@@ -87,24 +99,19 @@ def synth(
     Ctrl-C ends it soon; nothing is written then.
     """
     from dubins_traffic.synthesis.answer import answer
-    from dubins_traffic.synthesis.archive import check_target
-    from dubins_traffic.synthesis.assumption import Assumption
     from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
     from dubins_traffic.synthesis.strategy import Strategy
 
     for option, name in (("--output", strategy), ("--graph", graph)):
-        if name is not None and not name.endswith(".npz"):
-            raise InputError("not a name of an archive", field=option, value=name, expected="NAME.npz")
         if name is not None:
-            check_target(name, overwrite=overwrite)
+            _check_archive(option, name, overwrite=overwrite)
     instance = _instance(source, seed, trial)
-    words = None if assume is None else [word for word in assume.split(",") if word.strip() != "nothing"]
     with _progress() as progress:
         found = answer(
             instance,
             cars=cars,
-            assumption=None if words is None else Assumption.parse(words),
+            assumption=None if assume is None else _parsed(assume),
             order_degree=order_degree,
             limit=None if memory is None else memory << 20,
             progress=progress,
@@ -122,6 +129,22 @@ def synth(
         print(json_text.dumps(found.to_json() | extra, indent=2))
         return
     print("\n".join([*found.lines(), *reasons]))
+
+
+def _parsed(assume: str) -> Assumption:
+    """Return what ``--assume`` says."""
+    from dubins_traffic.synthesis.assumption import Assumption
+
+    return Assumption.parse([word for word in assume.split(",") if word.strip() != "nothing"])
+
+
+def _check_archive(option: str, name: str, *, overwrite: bool) -> None:
+    """Raise InputError if no archive of that name can be written."""
+    from dubins_traffic.synthesis.archive import check_target
+
+    if not name.endswith(".npz"):
+        raise InputError("not a name of an archive", field=option, value=name, expected="NAME.npz")
+    check_target(name, overwrite=overwrite)
 
 
 def _instance(source: str, seed: int, trial: int) -> Instance:

@@ -23,50 +23,58 @@ EXAMPLES = options.examples(
     "verify out/*.mcap --configuration town --seed 7 --json",
 )
 
+RecordsArgument = Annotated[
+    list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
+]
+InstanceOption = Annotated[
+    str | None,
+    typer.Option("--instance", metavar="FILE", help="The instance that was to be run."),
+]
+ConfigurationOption = Annotated[
+    str | None,
+    typer.Option(
+        "--configuration",
+        metavar="CONFIG",
+        help="What the instances were to be drawn from.",
+        autocompletion=options.shipped,
+    ),
+]
+SeedOption = Annotated[
+    int, typer.Option("--seed", metavar="S", min=0, help="The seed of the configuration's trials.")
+]
+TrialOption = Annotated[
+    int | None,
+    typer.Option(
+        "--trial", metavar="I", min=0, help="The trial's number.", show_default="as the record says"
+    ),
+]
+SimulatorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--simulator",
+        metavar="S",
+        help="What was to move the cars.",
+        show_default="as the instance says",
+        autocompletion=options.simulators,
+    ),
+]
+ScoresOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scores", metavar="FILE", help="What `run --json` or `score --json` printed of the records."
+    ),
+]
+
 
 def verify(
-    records: Annotated[
-        list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
-    ],
-    instance: Annotated[
-        str | None,
-        typer.Option("--instance", metavar="FILE", help="The instance that was to be run."),
-    ] = None,
-    configuration: Annotated[
-        str | None,
-        typer.Option(
-            "--configuration",
-            metavar="CONFIG",
-            help="What the instances were to be drawn from.",
-            autocompletion=options.shipped,
-        ),
-    ] = None,
+    records: RecordsArgument,
+    instance: InstanceOption = None,
+    configuration: ConfigurationOption = None,
     rnd: options.Network = None,
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="S", min=0, help="The seed of the configuration's trials.")
-    ] = 0,
-    trial: Annotated[
-        int | None,
-        typer.Option(
-            "--trial", metavar="I", min=0, help="The trial's number.", show_default="as the record says"
-        ),
-    ] = None,
-    simulator: Annotated[
-        str | None,
-        typer.Option(
-            "--simulator",
-            metavar="S",
-            help="What was to move the cars.",
-            show_default="as the instance says",
-            autocompletion=options.simulators,
-        ),
-    ] = None,
-    scores: Annotated[
-        str | None,
-        typer.Option(
-            "--scores", metavar="FILE", help="What `run --json` or `score --json` printed of the records."
-        ),
-    ] = None,
+    seed: SeedOption = 0,
+    trial: TrialOption = None,
+    simulator: SimulatorOption = None,
+    scores: ScoresOption = None,
     json: options.Json = False,
 ) -> None:
     """Simulate recorded trials again, and say what in a record is not what happened.

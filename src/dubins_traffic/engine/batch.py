@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -70,6 +70,7 @@ def run_batch(
     overwrite: bool = False,
     append: bool = False,
     progress: Progress | None = None,
+    ended: Callable[[Outcome], object] | None = None,
     metrics: Sequence[MetricSpec] = (),
 ) -> Batch:
     """Run trials of a configuration, `batch` at a time.
@@ -106,6 +107,8 @@ def run_batch(
         Whether they stay, and are not made again; they must be of the same controller and instances.
     progress : callable, optional
         Told how many trials have ended, each time.
+    ended : callable, optional
+        Told what came of each trial as it ends, in whatever order they do.
     metrics : sequence of str or callable
         Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md). They
         are shown every frame, so that no trial runs for several ticks without Python.
@@ -115,47 +118,6 @@ def run_batch(
     InputError
         If anything of this is wrong, or an instance can't be drawn.
     """
-    found: list[Outcome] = []
-    for outcome in run_each(
-        configuration, controller, trials=trials, first=first, seed=seed, batch=batch, threads=threads, keep=keep,
-        records=records, overwrite=overwrite, append=append, metrics=metrics,
-    ):  # fmt: skip
-        found.append(outcome)
-        if progress is not None:
-            progress(len(found))
-    return in_order(found)
-
-
-def in_order(found: Iterable[Outcome]) -> Batch:
-    """Return what came of some trials as a batch."""
-    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
-
-
-def run_each(
-    configuration: Configuration | str | os.PathLike[str],
-    controller: str | Maker = COMPILED,
-    *,
-    trials: int | None = None,
-    first: int = 0,
-    seed: int = 0,
-    batch: int = 64,
-    threads: int = 1,
-    keep: str = "none",
-    records: str | os.PathLike[str] | None = None,
-    overwrite: bool = False,
-    append: bool = False,
-    metrics: Sequence[MetricSpec] = (),
-) -> Iterator[Outcome]:
-    """Run trials as `run_batch` does, and yield what came of each as it ends; nothing is kept of it here.
-
-    The parameters are those of `run_batch`, whose `progress` is not needed here. Outcomes come in the order in which
-    trials end; `in_order` makes a `Batch` of them.
-
-    Raises
-    ------
-    InputError
-        As `run_batch`, when the first outcome is asked for.
-    """
     if not isinstance(configuration, Configuration):
         configuration = load_config(configuration)
     count = configuration.number_trials if trials is None else trials
@@ -164,22 +126,27 @@ def run_each(
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = chosen(keep, count), folder_of(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
-    own_metrics = scores.makers(metrics)
-    each = outcomes(instances, controller, batch=batch, threads=threads, metrics=own_metrics)
-    if folder is None:
-        yield from each
-        return
-    own = partial(draw, configuration, seed)
-    there = claim(folder, called(controller), own, overwrite=overwrite, append=append)
-    with locked(folder):
-        for outcome in each:
-            record = folder / record_name(outcome.instance.trial)
-            if not kept(outcome.instance.trial - first, outcome):
-                yield outcome
-            elif record.name in there:
-                yield replace(outcome, score=replace(outcome.score, record=str(record)))
-            else:
-                yield _recorded(outcome, controller, record, own_metrics)
+    makers = scores.makers(metrics)
+    each = outcomes(instances, controller, batch=batch, threads=threads, metrics=makers)
+    if folder is not None:
+        own = partial(draw, configuration, seed)
+        there = claim(folder, called(controller), own, overwrite=overwrite, append=append)
+        each = _recorded(
+            each, folder, there, lambda own: kept(own.instance.trial - first, own), controller, makers
+        )
+    found: list[Outcome] = []
+    for outcome in each:
+        found.append(outcome)
+        if ended is not None:
+            ended(outcome)
+        if progress is not None:
+            progress(len(found))
+    return in_order(found)
+
+
+def in_order(found: Iterable[Outcome]) -> Batch:
+    """Return what came of some trials as a batch."""
+    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
 
 
 def called(controller: str | Maker) -> str:
@@ -321,12 +288,25 @@ def _alone(instance: Instance, make: Maker, name: str, metrics: Sequence[MetricM
 
 
 def _recorded(
-    outcome: Outcome, controller: str | Maker, record: Path, metrics: Sequence[MetricMaker]
-) -> Outcome:
-    """Run a trial once more for its record."""
-    instance = outcome.instance
-    driver = controllers.made(_maker(controller))
-    result = run_trial(
-        instance, driver, record=record, overwrite=record.exists(), name=called(controller), metrics=metrics
-    )
-    return replace(outcome, ending=result.ending, score=result.score)
+    each: Iterable[Outcome],
+    folder: Path,
+    there: Container[str],
+    is_kept: Callable[[Outcome], bool],
+    controller: str | Maker,
+    metrics: Sequence[MetricMaker],
+) -> Iterator[Outcome]:
+    """Run the trials that are kept once more for their records, but those whose records are `there`."""
+    with locked(folder):
+        for outcome in each:
+            record = folder / record_name(outcome.instance.trial)
+            if not is_kept(outcome):
+                yield outcome
+            elif record.name in there:
+                yield replace(outcome, score=replace(outcome.score, record=str(record)))
+            else:
+                driver = controllers.made(_maker(controller))
+                result = run_trial(
+                    outcome.instance, driver, record=record, overwrite=record.exists(),
+                    name=called(controller), metrics=metrics,
+                )  # fmt: skip
+                yield replace(outcome, ending=result.ending, score=result.score)

@@ -11,11 +11,12 @@ import numpy as np
 from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import FULL, MOVED, Motion, step_trial
-from dubins_traffic.cars.near import Spacing, keep_apart, lost
+from dubins_traffic.cars.near import keep_apart, lost
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
+from dubins_traffic.kernels.records import record
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.policy import decide_trial as decide_lawful
 from dubins_traffic.policies.rules.tables import Traffic
@@ -24,37 +25,73 @@ from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
 from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
-from dubins_traffic.scoring.tally import CLEARANCE, SEALED, SIGHT2, Tally, count_frame
+from dubins_traffic.scoring.tally import count_frame
+from dubins_traffic.scoring.tally_tables import Counted
 
 RUNNING, ENDED, COLLIDED, FAULTY, NO_CONTACTS, NO_PAIRS, NO_SIGHT, NO_DOCKET = range(8)
 """Why a trial stands still: for nothing; its time is up; the ego collided; an e-agent asked for a command that is not
 finite; there is no room for contacts, for pairs that may meet, for pairs that may see each other, for breaches."""
 
-TICK, LAST, STATUS, DECIDED, LAWFUL, OTHERS, ENDS = range(7)
-COURSE = 7
-"""Columns of `Progress.ints`.
 
-TICK: the present frame, -1 before the first. LAST: the last one. STATUS: as above. DECIDED: 1 if the commands for
-the next tick are chosen already. LAWFUL, OTHERS: whether the law drives some of its cars, and whether other built-in
-drivers do. ENDS: whether a collision of the ego ends it.
-"""
+@record
+class TrialProgress:
+    """How far a trial is."""
+
+    tick: int = -1
+    """The present frame, -1 before the first."""
+    last: int
+    """The last one."""
+    status: int
+    """RUNNING, or why it stands still."""
+    decided: int
+    """1 if the commands for the next tick are chosen already."""
+    lawful: int
+    """1 if the law drives some of its cars."""
+    others: int
+    """1 if other built-in drivers drive some of its cars."""
+    ends: int
+    """1 if a collision of the ego ends it."""
+    sight2: float
+    """Square of the radius within which an ego that the law drives sees others, metres squared."""
+
+
+@record
+class ContactNote:
+    """What is noted of a contact."""
+
+    tick: int
+    """The frame in which its tick ends."""
+    bits: int
+    """Flags of the car in the frame before."""
+    other_bits: int
+    """Flags of the other car then, 0 of an obstacle."""
+    sensed: int
+    """1 if the car is within the ego's sensing radius."""
+    other_sensed: int
+    """1 if the other is."""
+
+
+@record
+class BreachPlace:
+    """Where the car of a breach was, metres."""
+
+    x: float
+    y: float
+    """Metres."""
 
 
 class Progress(Tables):
     """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
 
-    `ints` (B, COURSE). `sight2` (B,): square of the radius within which an ego that the law drives sees others.
-    `contact` (C, 5): tick, the flags of both cars in the frame before, and whether each is within the ego's sensing
-    radius, of each contact. `place` (K, 2): where the car of each breach was.
+    `trial` (B,); `contact` (C,), of each contact; `place` (K,), of each breach.
     """
 
-    ints: Ints
-    sight2: Floats
-    contact: Ints
-    place: Floats
+    trial: TableOf[TrialProgress]
+    contact: TableOf[ContactNote]
+    place: TableOf[BreachPlace]
 
 
-class World(Scene, Traffic, Motion):
+class World(Scene, Traffic, Motion, Counted):
     """All tables of a batch."""
 
     beside: ObstacleLanes
@@ -62,9 +99,7 @@ class World(Scene, Traffic, Motion):
     terms: TableOf[RefereeParameters]
     memory: Memory
     breach_log: BreachLog
-    tally: Tally
     progress: Progress
-    spacing: Spacing
     labelling: LabelTables
     judging: RefereeTables
     """The same tables, as labels and referee take them."""
@@ -88,46 +123,46 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
         The tables of the batch.
     """
     for k in range(active.shape[0]):
-        b = active[k]
-        own = world.progress.ints[b]
-        own[STATUS] = RUNNING
+        b: int = active[k]
+        own = world.progress.trial[b]
+        own.status = RUNNING
         for _ in range(most):
-            if own[STATUS] != RUNNING:
+            if own.status != RUNNING:
                 break
             _advance(b, dt, commands, own, world)
 
 
 @jit_inline
-def _advance(b: int, dt: float, commands: Floats, own: Ints, world: World) -> None:
-    """Take trial b from its present frame to the next one, or say why not in `own[STATUS]`."""
-    tick = own[TICK]
+def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: World) -> None:
+    """Take trial b from its present frame to the next one, or say why not in `own.status`."""
+    tick = own.tick
     if world.breach_log.filled[0] + _room(b, world) > world.breach_log.row.shape[0]:
-        own[STATUS] = NO_DOCKET
+        own.status = NO_DOCKET
         return
     ego_hit = False
     if tick >= 0:
         _decide(b, tick, commands, own, world)
-        if own[STATUS] != RUNNING:
+        if own.status != RUNNING:
             return
         before = world.work.found[0]
         least = world.spacing.least[b] - lost(world.spacing, b, tick)
         moved = step_trial(b, dt, least, commands, world)
         if moved != MOVED:
-            own[STATUS] = NO_CONTACTS if moved == FULL else NO_PAIRS
+            own.status = NO_CONTACTS if moved == FULL else NO_PAIRS
             return
-        own[DECIDED] = 0
+        own.decided = 0
         if world.work.found[0] > before:
             ego_hit = _note_contacts(b, tick + 1, before, world)
-    own[TICK] = tick + 1
+    own.tick = tick + 1
     keep_apart(world.state, b, tick + 1, world.spacing)
     label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
-        world.tally.ints[b, SEALED] = 1
-    if tick + 1 >= own[LAST]:
-        own[STATUS] = ENDED
-    elif ego_hit and own[ENDS] != 0:
-        own[STATUS] = COLLIDED
+        world.tally.trial[b].sealed = 1
+    if tick + 1 >= own.last:
+        own.status = ENDED
+    elif ego_hit and own.ends != 0:
+        own.status = COLLIDED
 
 
 @jit_inline
@@ -138,24 +173,24 @@ def _room(b: int, world: World) -> int:
 
 
 @jit_inline
-def _decide(b: int, tick: int, commands: Floats, own: Ints, world: World) -> None:
-    if own[DECIDED] != 0:
+def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: World) -> None:
+    if own.decided != 0:
         return
-    if own[OTHERS] != 0 and not decide_others(b, tick, world, commands):
-        own[STATUS] = NO_SIGHT
+    if own.others != 0 and not decide_others(b, tick, world, commands):
+        own.status = NO_SIGHT
         return
-    if own[LAWFUL] != 0:
+    if own.lawful != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, world.progress.sight2[b], spacing.apart[b], lost(spacing, b, tick), world, commands
+            b, tick, own.sight2, spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
     finite = True
     for n in range(commands.shape[1]):
         speed, yaw_rate = commands[b, n, 0], commands[b, n, 1]
         finite &= (speed - speed == 0.0) & (yaw_rate - yaw_rate == 0.0)
     if not finite:
-        own[STATUS] = FAULTY
-    own[DECIDED] = 1
+        own.status = FAULTY
+    own.decided = 1
 
 
 @jit
@@ -166,14 +201,14 @@ def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
         car = world.work.contact[k].car
         other = world.work.contact[k].other
         note = world.progress.contact[k]
-        note[0] = tick
-        note[1] = np.int64(world.labels.bits[b, car])
-        note[2] = np.int64(world.labels.bits[b, other]) if other >= 0 else 0
-        note[3] = _is_sensed(b, car, world)
-        note[4] = _is_sensed(b, other, world) if other >= 0 else 0
+        note.tick = tick
+        note.bits = int(np.int64(world.labels.bits[b, car]))
+        note.other_bits = int(np.int64(world.labels.bits[b, other])) if other >= 0 else 0
+        note.sensed = _is_sensed(b, car, world)
+        note.other_sensed = _is_sensed(b, other, world) if other >= 0 else 0
         if EGO in (car, other):
             ego_hit = True
-            world.tally.floats[b, CLEARANCE] = 0.0
+            world.tally.trial[b].clearance = 0.0
     return ego_hit
 
 
@@ -182,23 +217,21 @@ def _is_sensed(b: int, n: int, world: World) -> int:
     """Return 1 if car n is within the ego's sensing radius, else 0."""
     dx = world.state.x[b, n] - world.state.x[b, EGO]
     dy = world.state.y[b, n] - world.state.y[b, EGO]
-    return 1 if dx * dx + dy * dy <= world.tally.floats[b, SIGHT2] else 0
+    return 1 if dx * dx + dy * dy <= world.tally.trial[b].sight2 else 0
 
 
 @jit_inline
 def _observe(b: int, tick: int, world: World) -> None:
     """Judge and count a frame that has been labelled."""
     breach_log, tally = world.breach_log, world.tally
-    count_frame(
-        b, tick, world.state, world.labels, world.roads, world.cars, world.obstacles, world.spacing, tally
-    )
+    count_frame(b, tick, world)
     if world.terms[b].judged == 0:
         return
     first = breach_log.filled[0]
     judge_trial(b, tick, world.judging)
     for k in range(first, breach_log.filled[0]):
         n = breach_log.row[k].car
-        world.progress.place[k, 0] = world.state.x[b, n]
-        world.progress.place[k, 1] = world.state.y[b, n]
+        world.progress.place[k].x = world.state.x[b, n]
+        world.progress.place[k].y = world.state.y[b, n]
         if n == EGO:
-            tally.ints[b, SEALED] = 1
+            tally.trial[b].sealed = 1

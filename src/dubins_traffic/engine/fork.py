@@ -15,13 +15,13 @@ import numpy.typing as npt
 from dubins_traffic.agents.tables import Agents
 from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.engine.batch_kernel import World
+from dubins_traffic.engine.batch_kernel import BreachPlace, ContactNote, World
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
 from dubins_traffic.rules.tables import LabelTables, spread
-from dubins_traffic.scoring.tally import Tally
+from dubins_traffic.scoring.tally_tables import Tally
 
 Table = TypeVar("Table", bound=Tables)
 
@@ -82,7 +82,12 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
         agents=_agents(world.agents, trials, seeds),
         space=_copied(world.space),
         tally=_tally(world.tally, trials),
-        progress=rows_of(progress, trials, contact=progress.contact.copy(), place=progress.place.copy()),
+        progress=rows_of(
+            progress,
+            trials,
+            contact=table(ContactNote, len(progress.contact)),
+            place=table(BreachPlace, len(progress.place)),
+        ),
         spacing=spacing,
         labelling=LabelTables(state, roads, beside, rules, labels, memory),
         judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
@@ -129,8 +134,10 @@ def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
 
 
 def _tally(tally: Tally, trials: Ints) -> Tally:
-    goals = ragged(np.append(tally.goal_off, len(tally.goal)), trials)
-    return rows_of(tally, trials, goal_off=goals.off[:-1], goal=tally.goal[goals.row])
+    goals = ragged(np.append(tally.trial["first_goal"], len(tally.goal)), trials)
+    own = tally.trial[trials]
+    own["first_goal"], own["last_goal"] = goals.off[:-1], goals.off[1:]
+    return rows_of(tally, trials, trial=own, goal=tally.goal[goals.row])
 
 
 def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:

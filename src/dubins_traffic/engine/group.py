@@ -18,18 +18,14 @@ from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
     COLLIDED,
-    COURSE,
     ENDED,
-    ENDS,
     FAULTY,
-    LAST,
-    LAWFUL,
     NO_PAIRS,
     NO_SIGHT,
-    OTHERS,
-    STATUS,
-    TICK,
+    BreachPlace,
+    ContactNote,
     Progress,
+    TrialProgress,
     World,
     run_trials,
 )
@@ -56,7 +52,7 @@ from dubins_traffic.scoring.margins_kernel import margin_rules
 from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
 from dubins_traffic.scoring.score import Score
-from dubins_traffic.scoring.tally import new_tally
+from dubins_traffic.scoring.tally_tables import new_tally
 from dubins_traffic.simulators.embedded import Embedded, contact_of
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.forking import reseeded
@@ -205,7 +201,7 @@ class Group:
     @property
     def ticks(self) -> Ints:
         """The present frame of each trial, (B,)."""
-        return self._world.progress.ints[:, TICK]
+        return self._world.progress.trial["tick"]
 
     @property
     def world(self) -> World:
@@ -267,22 +263,21 @@ class Group:
         return found
 
     def _progress(self, contacts: int, breaches: int) -> Progress:
-        ints = np.zeros((len(self.instances), COURSE), dtype=np.int64)
-        ints[:, TICK] = -1
-        ints[:, LAST] = [max(1, instance.ticks) for instance in self.instances]
-        ints[:, ENDS] = [instance.end_on_collision for instance in self.instances]
+        trial = table(TrialProgress, len(self.instances))
+        trial["last"] = [max(1, instance.ticks) for instance in self.instances]
+        trial["ends"] = [instance.end_on_collision for instance in self.instances]
         fleets, whose = distinct([id(instance.e_agents) for instance in self.instances])
         kinds = [{agent.kind for agent in self.instances[b].e_agents} for b in fleets]
-        ints[:, OTHERS] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
+        trial["others"] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         radii = np.array([instance.problem.sensing_radius for instance in self.instances])
-        places = np.zeros((breaches, 2))
-        return Progress(ints, radii * radii, np.zeros((contacts, 5), dtype=np.int64), places)
+        trial["sight2"] = radii * radii
+        return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))
 
     def _aim(self) -> None:
         """Let the egos that keep the rules begin with the goal nearest to where they start."""
         world = self._world
         drivers, labels = world.drivers, world.labels
-        world.progress.ints[:, LAWFUL] = drivers.active
+        world.progress.trial["lawful"] = drivers.active
         for b in np.flatnonzero(drivers.car["kind"][:, EGO] == ROUND).tolist():
             own = drivers.car[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
@@ -312,7 +307,7 @@ class Group:
 
     def _mind(self, active: Ints) -> None:
         """Enlarge what was too small, and write down how trials ended."""
-        status = self._world.progress.ints[active, STATUS]
+        status = self._world.progress.trial["status"][active]
         if (status == NO_PAIRS).any():
             self._world = self._world.replace(work=enlarged(self._world.work))
         if (status == NO_SIGHT).any():
@@ -330,15 +325,15 @@ class Group:
     def _drain(self) -> None:
         """Take over the contacts and breaches that have been found, and make room."""
         world = self._world
-        found, rows = world.work.meetings(), world.breach_log.found()
-        notes = zip(found, world.progress.contact[: len(found)].tolist(), strict=True)
-        for row, (tick, own, other, own_seen, other_seen) in notes:
-            b, contact = row.b, contact_of(row, tick, self._rate)
-            self._contacts[b].append(with_fault_by(contact, own, other))
-            pair = ((contact.car, own_seen), (contact.other, other_seen))
-            self._seen[b].update((car, tick) for car, is_seen in pair if is_seen)
-        for breached, (x, y) in zip(rows, world.progress.place[: len(rows)].tolist(), strict=True):
-            b, breach = int(breached.trial), breach_of(breached, x, y)
+        for k, row in enumerate(world.work.meetings()):
+            note = world.progress.contact[k]
+            b, contact = row.b, contact_of(row, note.tick, self._rate)
+            self._contacts[b].append(with_fault_by(contact, note.bits, note.other_bits))
+            pair = ((contact.car, note.sensed), (contact.other, note.other_sensed))
+            self._seen[b].update((car, note.tick) for car, is_seen in pair if is_seen)
+        for k, breached in enumerate(world.breach_log.found()):
+            place = world.progress.place[k]
+            b, breach = int(breached.trial), breach_of(breached, place.x, place.y)
             self._breaches[b].append(breach)
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))
@@ -346,5 +341,6 @@ class Group:
 
     def _is_seen(self, b: int, breach: Breach) -> bool:
         """Tell whether the car of a breach was within the ego's sensing radius in that frame."""
-        dx, dy = self._world.tally.pose[b, breach.tick, :2] - (breach.x, breach.y)
-        return bool(dx * dx + dy * dy <= self._world.progress.sight2[b])
+        ego = self._world.tally.ego[b, breach.tick]
+        dx, dy = ego.x - breach.x, ego.y - breach.y
+        return bool(dx * dx + dy * dy <= self._world.progress.trial[b].sight2)

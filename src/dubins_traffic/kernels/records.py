@@ -37,6 +37,10 @@ KINDS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, np.uint64:
 """What a field may be, and how it is kept: eight bytes each."""
 
 
+MOST_KNOWN = 1 << 12
+"""Rows of a table that are kept once they have been made; of longer tables others are made anew each time."""
+
+
 class Rows(Protocol[R_co]):
     """A NumPy array whose elements are rows of one record: what kernels see of it."""
 
@@ -128,7 +132,8 @@ class Table(np.ndarray[Any, Any]):
             axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
             far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
             found = self.KIND(self, far)
-        self.known[place] = found
+        if len(self.known) < MOST_KNOWN:
+            self.known[place] = found
         return found
 
 

@@ -161,7 +161,7 @@ COUNTER = "counter"
 REMOTE = "remote"
 OWN = "own"
 """A class of the user's, which the type names: ``module:Class`` or ``path/to/file.py:Class``."""
-KINDS: Mapping[str, type[Strict]] = {
+KINDS: dict[str, type[Strict]] = {
     "wander": Wander,
     "loop": Loop,
     "follow": Follow,
@@ -172,7 +172,7 @@ KINDS: Mapping[str, type[Strict]] = {
     COUNTER: Counter,
     REMOTE: Remote,
 }
-"""Kinds by name, each with the model of its parameters."""
+"""Kinds by name, each with the model of its parameters; `agents.kinds` says what is made of them."""
 KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis"})
 """Kinds of e-agents that keep the rules of the road."""
 ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})

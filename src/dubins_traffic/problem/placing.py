@@ -24,6 +24,17 @@ CUTS = 24
 """Room for so many more intervals for each car; where more are cut the trial is drawn without compiled code."""
 
 
+class Room(NamedTuple):
+    """Scratch for one trial, two lists of intervals that take turns.
+
+    `lane` (2, K) and `span` (2, K, 2): lane and ends (m) of each interval; `ends` (K,): what is free up to its end, m.
+    """
+
+    lane: Ints
+    span: Floats
+    ends: Floats
+
+
 class Lots(NamedTuple):
     """Where the cars of trials on one ground may stand.
 
@@ -72,11 +83,9 @@ def place_cars(
     """Return the start poses of the cars of each trial; None where they don't fit as they should at best."""
     poses = np.zeros((len(trials), len(own.order), 4))
     placed = np.zeros(len(trials), dtype=np.int64)
-    room = len(own.lane) + CUTS * len(wishes)
-    place_trials(
-        np.uint64(seed), np.array(trials, dtype=np.int64), stream, own, np.zeros((2, room), dtype=np.int64),
-        np.zeros((2, room, 2)), np.zeros(room), poses, placed,
-    )  # fmt: skip
+    size = len(own.lane) + CUTS * len(wishes)
+    room = Room(np.zeros((2, size), dtype=np.int64), np.zeros((2, size, 2)), np.zeros(size))
+    place_trials(np.uint64(seed), np.array(trials, dtype=np.int64), stream, own, room, poses, placed)
     base = [wish.pose for wish in wishes]
     order: list[int] = own.order.tolist()
     found: list[list[Pose] | None] = []
@@ -93,9 +102,8 @@ def place_cars(
 
 @jit
 def place_trials(
-    seed: np.uint64, trials: Ints, stream: int, own: Lots, lane: Ints, span: Floats, ends: Floats, poses: Floats,
-    placed: Ints,
-) -> None:  # fmt: skip
+    seed: np.uint64, trials: Ints, stream: int, own: Lots, room: Room, poses: Floats, placed: Ints
+) -> None:
     """Place the cars of all trials.
 
     Parameters
@@ -108,7 +116,7 @@ def place_trials(
         Number of the draw in the counter of random numbers.
     own : Lots
         What the trials have in common.
-    lane, span, ends : (2, K), (2, K, 2), (K,)
+    room : Room
         Scratch for one trial.
     poses : (B, D, 4) float64
         Set to x, y (m), cos, sin of each car that is drawn.
@@ -118,13 +126,12 @@ def place_trials(
     for b in range(trials.shape[0]):
         count = own.lane.shape[0]
         for k in range(count):
-            lane[0, k] = own.lane[k]
-            span[0, k, 0] = own.low[k]
-            span[0, k, 1] = own.high[k]
+            room.lane[0, k] = own.lane[k]
+            room.span[0, k, 0] = own.low[k]
+            room.span[0, k, 1] = own.high[k]
         side = 0
         for g in range(own.given.shape[0]):
-            x, y = own.given[g, 0], own.given[g, 1]
-            count = _cut_out(own, x, y, lane[side], span[side], count, lane[1 - side], span[1 - side])
+            count = _cut_out(own, own.given[g, 0], own.given[g, 1], side, count, room)
             side = 1 - side
             if count < 0:
                 break
@@ -135,25 +142,21 @@ def place_trials(
             first = words[0] if k % 2 == 0 else words[2]
             second = words[1] if k % 2 == 0 else words[3]
             share = np.float64((first << UP) | (second >> DOWN)) * GRID
-            spot, along = _choose(own, k, share, lane[side], span[side], count, ends)
+            spot, along = _choose(own, k, share, side, count, room)
             if spot < 0:
                 break
-            line = own.line[lane[side, spot]]
-            pose = poses[b, k]
+            line, pose = own.line[room.lane[side, spot]], poses[b, k]
             pose[0], pose[1] = line[0] + along * line[2], line[1] + along * line[3]
             pose[2], pose[3] = line[2], line[3]
             placed[b] = k + 1
-            count = _cut_out(
-                own, pose[0], pose[1], lane[side], span[side], count, lane[1 - side], span[1 - side]
-            )
+            count = _cut_out(own, pose[0], pose[1], side, count, room)
             side = 1 - side
 
 
 @jit
-def _choose(
-    own: Lots, car: int, share: float, lane: Ints, span: Floats, count: int, ends: Floats
-) -> tuple[int, float]:
+def _choose(own: Lots, car: int, share: float, side: int, count: int, room: Room) -> tuple[int, float]:
     """Return an interval and the metres along its lane at a share of all that is free; -1 if nothing is."""
+    lane, span, ends = room.lane[side], room.span[side], room.ends
     total = 0.0
     last = -1
     for k in range(count):
@@ -180,10 +183,14 @@ def _choose(
 
 
 @jit
-def _cut_out(
-    own: Lots, x: float, y: float, lane: Ints, span: Floats, count: int, new_lane: Ints, new_span: Floats
-) -> int:
+def _cut_out(own: Lots, x: float, y: float, side: int, count: int, room: Room) -> int:
     """Take a disc out of the intervals; return how many there are then, -1 if there is no room for them."""
+    lane, span, new_lane, new_span = (
+        room.lane[side],
+        room.span[side],
+        room.lane[1 - side],
+        room.span[1 - side],
+    )
     total = 0
     square = own.radius * own.radius
     for k in range(count):

@@ -25,7 +25,7 @@ class RightLane(NamedTuple):
 @jit_inline
 def lane_of(t: RoadTable, own: TrialRules, b: int, lane: int) -> RightLane:
     """Return a lane of trial b, whose rules are `own`."""
-    return RightLane(b, lane, t.segment[t.seg_off[own.net] + (lane >> 1)].length, own.lane_width)
+    return RightLane(b, lane, t.segment[int(t.seg_off[own.net]) + (lane >> 1)].length, own.lane_width)
 
 
 @jit

@@ -99,7 +99,7 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     if obstacle_narrows(tables.obstacles, place, here, here + terms.way, own.free_needed + GRAIN):
         return False
     v = lane_end(roads, own.net, lane)
-    vertex = roads.vert_off[own.net] + v
+    vertex = int(roads.vert_off[own.net]) + v
     if roads.degree[vertex] >= own.crossing_degree or place.length - own.radius - here > terms.way:
         return True
     for k in range(state.count[b]):
@@ -149,7 +149,7 @@ def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, i
     Also returns when to ask again, if no car comes or goes.
     """
     state, roads, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
-    row = roads.vert_off[own.net] + v
+    row = int(roads.vert_off[own.net]) + v
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
     dx, dy = state.x[b, EGO] - vx, state.y[b, EGO] - vy
     spare = sqrt(dx * dx + dy * dy) - terms.lone - terms.goal_gap - own.lane_width

@@ -62,7 +62,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
     `spacing.near`.
     """
     t, own, terms = tables.roads, tables.rules[b], tables.terms[b]
-    row = t.vert_off[own.net] + v
+    row = int(t.vert_off[own.net]) + v
     taken = 0
     for i in range(count):
         k = tables.spacing.near[i]
@@ -85,7 +85,7 @@ def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> 
     """Return which lanes out of v car k takes, so that car n can't: bit `arm` for the lane of that arm."""
     state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     net = own.net
-    row = t.vert_off[net] + v
+    row = int(t.vert_off[net]) + v
     x, y = state.x[b, k], state.y[b, k]
     dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
     away2 = dx * dx + dy * dy
@@ -121,7 +121,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     state, t, spacing, own, terms = (
         tables.state, tables.roads, tables.spacing, tables.rules[b], tables.terms[b],
     )  # fmt: skip
-    row = t.vert_off[own.net] + v
+    row = int(t.vert_off[own.net]) + v
     vx, vy = t.vertex[row].x, t.vertex[row].y
     far2, lone = terms.exit2, terms.lone
     near = 0 if back < 0 else 1
@@ -153,7 +153,7 @@ def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
     state, t, labels, own, terms = (
         tables.state, tables.roads, tables.labels, tables.rules[b], tables.terms[b],
     )  # fmt: skip
-    row = t.vert_off[own.net] + v
+    row = int(t.vert_off[own.net]) + v
     x, y = state.x[b, EGO], state.y[b, EGO]
     dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
     far = own.radius + terms.goal_gap

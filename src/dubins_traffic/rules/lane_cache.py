@@ -27,10 +27,10 @@ def keep_road(
     """
     k = n & (BLOCK - 1)
     net = own.net
-    place = t.vert_off[net] + vertex
+    place = int(t.vert_off[net]) + vertex
     block.vertex_x[k] = t.vertex[place].x
     block.vertex_y[k] = t.vertex[place].y
-    row = t.seg_off[net] + (lane >> 1 if lane >= 0 else segment)
+    row = int(t.seg_off[net]) + (lane >> 1 if lane >= 0 else segment)
     length = t.segment[row].length
     back = lane >= 0 and lane & 1 != 0
     block.from_x[k] = t.segment[row].x

@@ -159,7 +159,7 @@ def _reach(
                 gap2 = _distance2_to_vertex(t, own, end, pose)
             outer2 = max(own.stop2, own.queue2)
             outer = sqrt(outer2) + CERTAIN
-            to_go = t.segment[t.seg_off[net] + (lane >> 1)].length - car.progress
+            to_go = t.segment[int(t.seg_off[net]) + (lane >> 1)].length - car.progress
             if end != v and to_go > outer + CERTAIN:
                 outside = outer
             elif end != v:
@@ -174,7 +174,7 @@ def _reach(
 @jit_inline
 def _distance2_to_vertex(t: RoadTable, own: TrialRules, v: int, pose: Pose) -> float:
     """Return the squared distance of an intersection from a body without its rounding."""
-    row = t.vert_off[own.net] + v
+    row = int(t.vert_off[own.net]) + v
     px, py = t.vertex[row].x, t.vertex[row].y
     return distance2_to_body(px, py, pose.x, pose.y, pose.c, pose.s, own.half_length, own.half_width)
 

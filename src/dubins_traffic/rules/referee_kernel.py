@@ -136,7 +136,7 @@ def _by_the_road(b: int, tables: RefereeTables) -> bool:
 def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: RefereeTables) -> None:
     """Rule 3, of a car that enters crossing v and had `stopped` there in the frame before, or not."""
     roads, spacing = tables.roads, tables.spacing
-    row = roads.vert_off[tables.rules[b].net] + v
+    row: int = roads.vert_off[tables.rules[b].net] + v
     far = tables.terms[b].lone + 2.0 * spacing.drift[b]
     x, y = roads.vertex[row].x, roads.vertex[row].y
     count = list_near(tables.state, b, tick, x, y, far, spacing)

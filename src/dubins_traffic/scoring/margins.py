@@ -10,7 +10,6 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
@@ -36,16 +35,12 @@ class Margins:
         self._problem = instance.problem
         self._clearance = Clearance()
         self._clearance.begin(instance)
-        self._poses: list[Floats] = []
-        self._marks: list[Ints] = []
+        self._blocks: list[Frames] = []
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
         self._clearance.frames(frames)
-        own = frames.x[:, EGO], frames.y[:, EGO], frames.c[:, EGO], frames.s[:, EGO]
-        self._poses.append(np.stack(own, axis=-1))
-        marks = frames.bits[:, EGO].astype(np.int64), frames.lane[:, EGO]
-        self._marks.append(np.stack(marks, axis=-1))
+        self._blocks.append(frames)
 
     def end(self, ending: Ending) -> None:
         """Nothing is left to do."""
@@ -56,11 +51,17 @@ class Margins:
         It is positive if the rule was kept and negative if it was broken, or would be if the trial ended here.
         """
         gap = self._clearance.result()
-        count = sum(map(len, self._poses))
+        count = sum(map(len, self._blocks))
         if not count:
             return margins_by_rule(gap, [math.inf] * len(MEASURED))
         # compiles; only where there is something to measure
-        from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginTables, find_margins, margin_rules
+        from dubins_traffic.scoring.margins_kernel import (
+            EgoFrame,
+            EgoMargins,
+            MarginTables,
+            find_margins,
+            margin_rules,
+        )
 
         problem = self._problem
         rules = RuleParameters.from_mapping(problem.rules)
@@ -72,15 +73,10 @@ class Margins:
             cars=pack_cars([problem.car]),
             signal=np.zeros(count),
         )
-        find_margins(
-            only,
-            np.array([count]),
-            np.concatenate(self._poses)[None],
-            np.concatenate(self._marks)[None],
-            only,
-            tables,
-            found,
-        )
+        ego = table(EgoFrame, (1, count))
+        for name in ("x", "y", "c", "s", "bits", "lane"):
+            ego[name] = np.concatenate([getattr(block, name)[:, EGO] for block in self._blocks])
+        find_margins(only, np.array([count]), ego, only, tables, found)
         return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back])
 
 

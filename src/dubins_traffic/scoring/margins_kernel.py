@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
@@ -30,6 +30,24 @@ class MarginRules:
     """Where `left` rises and where it falls, metres."""
     window: int
     """Ticks within which the ego must be back."""
+
+
+@record
+class EgoFrame:
+    """The ego in one frame."""
+
+    x: float
+    """Where its centre is, metres."""
+    y: float
+    """Where its centre is, metres."""
+    c: float
+    """Cosine of its heading."""
+    s: float
+    """Sine of its heading."""
+    bits: int
+    """Its flags (`rules.propositions`)."""
+    lane: int
+    """Its lane state."""
 
 
 @record
@@ -65,8 +83,7 @@ def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], inde
 def find_margins(
     trials: Ints,
     frames: Ints,
-    pose: Floats,
-    mark: Ints,
+    ego: Grid[EgoFrame],
     nets: Ints,
     tables: MarginTables,
     found: Rows[EgoMargins],
@@ -77,10 +94,8 @@ def find_margins(
     ----------
     trials, frames : (K,)
         Which trials, and how many frames each has.
-    pose : (B, F, 4)
-        x, y, cosine and sine of the ego; metres.
-    mark : (B, F, 2)
-        Its flags and lane state.
+    ego : (B, F)
+        The ego in each frame.
     nets : (B,)
         Number of each trial's road network.
     tables
@@ -90,12 +105,12 @@ def find_margins(
     """
     for k in range(trials.shape[0]):
         b: int = trials[k]
-        _find_margin(b, frames[k], pose[b], mark[b], nets[b], tables, found[b])
+        _find_margin(b, frames[k], ego[b], nets[b], tables, found[b])
 
 
 @jit
 def _find_margin(
-    b: int, frames: Any, pose: Floats, mark: Ints, net: Any, tables: MarginTables, found: EgoMargins
+    b: int, frames: Any, ego: Rows[EgoFrame], net: Any, tables: MarginTables, found: EgoMargins
 ) -> None:
     roads, signal = tables.roads, tables.signal
     half_road = roads.half_width[net]
@@ -104,14 +119,15 @@ def _find_margin(
     segment = 0
     farthest = -1.0
     for f in range(frames):
-        x, y, bits = pose[f, 0], pose[f, 1], mark[f, 0]
+        own = ego[f]
+        x, y, bits = own.x, own.y, own.bits
         if bits & ON_ROAD != 0:
             begun = True
         # No segment is farther than the one that was nearest before, so often none need be looked for.
         if begun and distance2(roads, net, segment, x, y) > farthest:
             segment, square = nearest_segment(roads, net, x, y)
             farthest = max(farthest, square)
-        right = -_beyond(b, pose[f], mark[f], net, tables)
+        right = -_beyond(b, own, net, tables)
         signal[f] = right
         if bits & OVERTAKING == 0:
             line = min(line, right)
@@ -121,17 +137,17 @@ def _find_margin(
 
 
 @jit
-def _beyond(b: int, pose: Floats, mark: Ints, net: Any, tables: MarginTables) -> Any:
+def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     """Return how far the body reaches over the line that `left` looks at, metres; -inf without a lane state."""
     roads, cars, own = tables.roads, tables.cars, tables.rules[b]
-    lane = mark[1]
+    lane = ego.lane
     if lane < 0:
         return -INFINITE
     tx, ty = lane_direction(roads, net, lane)
-    c, s = pose[2], pose[3]
+    c, s = ego.c, ego.s
     half = abs(c * ty - s * tx) * cars.half_length[b] + abs(c * tx + s * ty) * cars.half_width[b]
-    _, lateral = lane_coordinates(roads, net, lane, pose[0], pose[1])
-    risen = mark[0] & LEFT != 0
+    _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)
+    risen = ego.bits & LEFT != 0
     return lateral + (half + cars.rounding[b]) - (own.left_release if risen else own.left_set)
 
 

@@ -25,23 +25,7 @@ from dubins_traffic.scoring.margins import margins_by_rule
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
 from dubins_traffic.scoring.paper import paper_score
 from dubins_traffic.scoring.score import Score, is_clean
-from dubins_traffic.scoring.tally import (
-    CLEARANCE,
-    COLLIDED,
-    DEPARTURES,
-    DISTANCE,
-    GAP,
-    GOALS,
-    LAST_VISIT,
-    NET,
-    OFF_ROAD,
-    OFF_TICKS,
-    ROUNDS,
-    SAMPLED,
-    STANDING,
-    VISITS,
-    Tally,
-)
+from dubins_traffic.scoring.tally_tables import GoalCounts, Tally, TrialCounts
 from dubins_traffic.scoring.verdict import reach_verdict
 
 if TYPE_CHECKING:
@@ -70,17 +54,10 @@ class BatchScores:
         roads: RoadTable,
         cars: CarTable,
     ) -> None:
-        found = table(EgoMargins, len(tally.ints))
-        tables = MarginTables(margins, roads, cars, np.zeros(int(tally.pose.shape[1])))
-        nets = np.ascontiguousarray(tally.ints[:, NET])
-        find_margins(trials, frames, tally.pose, tally.mark, nets, tables, found)
-        numbers: list[int] = trials.tolist()
-        self._row = {b: k for k, b in enumerate(numbers)}
-        margin = [found[b] for b in numbers]
-        self._margins = [(own.road, own.line, own.back) for own in margin]
-        self._ints: list[list[int]] = tally.ints[trials].tolist()
-        self._floats: list[list[float]] = tally.floats[trials].tolist()
-        self._first: list[int] = tally.goal_off[trials].tolist()
+        self._found = table(EgoMargins, len(tally.trial))
+        tables = MarginTables(margins, roads, cars, np.zeros(tally.ego.shape[1]))
+        nets = np.ascontiguousarray(tally.trial["net"])
+        find_margins(trials, frames, tally.ego, nets, tables, self._found)
         self._tally = tally
 
     def score(
@@ -102,14 +79,13 @@ class BatchScores:
         of each breach by an e-agent that was within the sensing radius then; `running` is what hung over the cars in
         the last frame.
         """
-        k = self._row[b]
-        ints, floats = self._ints[k], self._floats[k]
+        own, margins = self._tally.trial[b], self._found[b]
         rate, ticks = instance.problem.rate, ending.ticks
-        goals: list[list[int]] = self._tally.goal[self._first[k] : self._first[k] + ints[GOALS]].tolist()
-        visits = _visits(instance, goals, ints[ROUNDS])
+        goals = [self._tally.goal[g] for g in range(own.first_goal, own.last_goal)]
+        visits = _visits(instance, goals, own.rounds)
         whole = ran_whole(instance, ending, ticks)
         collisions, among_others = _collisions(instance, contacts) if contacts else ((), 0)
-        gap = None if math.isinf(floats[CLEARANCE]) else max(0.0, floats[CLEARANCE])
+        gap = None if math.isinf(own.clearance) else max(0.0, own.clearance)
         verdict = None
         if instance.problem.rules:
             verdict = reach_verdict(
@@ -118,15 +94,15 @@ class BatchScores:
                 sorted([*breaches, *accused(contacts)], key=order) if breaches or contacts else (),
                 collisions,
                 visits,
-                [row[VISITS] > 0 and row[LAST_VISIT] == ticks for row in goals],
+                [goal.visits > 0 and goal.last_visit == ticks for goal in goals],
                 lambda car, first, last: bool(first <= self._tally.sensed[b, car] <= last),
                 lambda car, tick: (car, tick) in seen,
                 running,
-                margins_by_rule(gap, self._margins[k]),
+                margins_by_rule(gap, (margins.road, margins.line, margins.back)),
                 whole=whole,
             )
         clean = is_clean(verdict, collisions)
-        off_road = ints[OFF_ROAD] / rate
+        off_road = own.off_road / rate
         return Score(
             trial=instance.trial,
             seed=instance.seed,
@@ -141,29 +117,29 @@ class BatchScores:
             collisions=collisions,
             collisions_among_others=among_others,
             driven=Driven(
-                floats[DISTANCE],
-                ints[STANDING] / max(1, ticks),
+                own.distance,
+                own.standing / max(1, ticks),
                 off_road,
-                ints[OFF_ROAD] / max(1, ticks),
-                ints[DEPARTURES],
+                own.off_road / max(1, ticks),
+                own.departures,
             ),
             min_clearance_m=gap,
             time_to_begin_s=time_to_begin,
             verdict=verdict,
             formulas=(),
             paper_score=paper_score(instance, collisions, visits.rounds, off_road),
-            icra2016=_icra2016(instance, ints, ticks + 1),
+            icra2016=_icra2016(instance, own, ticks + 1),
         )
 
 
-def _visits(instance: Instance, rows: Sequence[Sequence[int]], rounds: int) -> Visits:
+def _visits(instance: Instance, rows: Sequence[GoalCounts], rounds: int) -> Visits:
     goals = dict.fromkeys(instance.problem.goals)
     rate, planned = instance.problem.rate, planned_ticks(instance)
     found = [
-        GoalVisits(goal, row[VISITS], max(row[GAP], planned - row[LAST_VISIT]) / rate)
+        GoalVisits(goal, row.visits, max(row.gap, planned - row.last_visit) / rate)
         for goal, row in zip(goals, rows, strict=True)
     ]
-    visited = sum([row[VISITS] > 0 for row in rows]) / len(rows) if rows else 1.0
+    visited = sum([row.visits > 0 for row in rows]) / len(rows) if rows else 1.0
     return Visits(tuple(found), visited, rounds)
 
 
@@ -174,11 +150,11 @@ def _collisions(instance: Instance, contacts: Sequence[Contact]) -> tuple[tuple[
     return listed.result(), listed.among_others
 
 
-def _icra2016(instance: Instance, ints: Sequence[int], samples: int) -> float | None:
+def _icra2016(instance: Instance, own: TrialCounts, samples: int) -> float | None:
     weight = weight_of(instance)
     if weight is None:
         return None
-    if ints[COLLIDED]:
+    if own.collided:
         return COLLISION_SCORE
-    rounds = ints[SAMPLED] if ints[GOALS] else samples
-    return weight * rounds / max(1.0, ints[OFF_TICKS] / instance.problem.rate)
+    rounds = own.sampled if own.last_goal > own.first_goal else samples
+    return weight * rounds / max(1.0, own.off_ticks / instance.problem.rate)

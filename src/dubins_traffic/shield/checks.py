@@ -30,7 +30,7 @@ from dubins_traffic.shield.tables import (
     ROAD,
     STOP,
     TURN,
-    Guards,
+    ShieldTables,
 )
 
 VERGE = 0.005
@@ -42,18 +42,21 @@ TURNING = 0.01
 
 
 @jit_inline
-def bounded(speed: float, yaw_rate: float, vehicle: Vehicle) -> tuple[float, float]:
+def bounded(speed: float, yaw_rate: float, vehicle: Vehicle) -> Command:
     """Return a command as the simulator clips it."""
     speed = min(max(speed, vehicle.slowest), vehicle.fastest)
     most = vehicle.yaw_most
     if vehicle.tightest > 0.0:
         most = min(most, abs(speed) / vehicle.tightest)
-    return speed, min(max(yaw_rate, -most), most)
+    return Command(speed, min(max(yaw_rate, -most), most))
 
 
 @jit_inline
 def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch: Scratch) -> int:
-    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many."""
+    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many.
+
+    `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
+    """
     far = 2.0 * (vehicle.reach + 1.2 * travel_of(vehicle)) + GUARD
     far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
     count = 0
@@ -68,7 +71,7 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
 
 @jit
 def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
-    """Tell whether a command could bring about a contact, were the others to do their worst for a tick.
+    """Tell whether a command could bring about a contact, were the `near` (count) others to do their worst for a tick.
 
     `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
@@ -89,10 +92,12 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
 
 
 @jit
-def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards) -> int:
+def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: ShieldTables) -> int:
     """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
 
-    NOTHING if it does not: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
+    `near` (count) is how many cars `gather_close` has listed.
+
+    NOTHING if it breaks none: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
     the road, and has touched nothing, whatever the others did.
     """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
@@ -104,6 +109,7 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     net = drivers.net[b]
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
+    after = Pose(nx, ny, nc, ns)
     segment, off2 = nearest_segment(roads, net, nx, ny)
     edge = float(roads.half_width[net]) - VERGE
     if off2 > edge * edge:
@@ -111,28 +117,29 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
         if off2 >= before2:
             return ROAD
     v, away2 = nearest_vertex(roads, net, nx, ny)
-    found = _enters(b, v, nx, ny, nc, ns, traffic)
+    found = _enters(b, v, after, traffic)
     if found != NOTHING:
         return found
     at = v if away2 < vehicle.disc * vehicle.disc else -1
-    found = _leaves_lane(b, at, segment, off2, nx, ny, nc, ns, traffic, guards)
+    found = _leaves_lane(b, at, segment, off2, after, traffic, guards)
     if found != NOTHING:
         return found
     return CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else NOTHING
 
 
 @jit
-def _enters(b: int, v: int, x: float, y: float, c: float, s: float, traffic: Traffic) -> int:
+def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
     """Return which part of rule 3 an ego that goes to a pose breaks; the nearest intersection to that is v."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     if labels.crosses[b, EGO] == v or roads.degree[row] < vehicle.degree:
         return NOTHING
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
     half_length, half_width = vehicle.half_length, vehicle.half_width
     edge = vehicle.disc + vehicle.rounding + BRINK
+    x, y, c, s = pose
     after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)
     if after2 >= edge * edge:
         return NOTHING
@@ -152,16 +159,7 @@ def _enters(b: int, v: int, x: float, y: float, c: float, s: float, traffic: Tra
 
 @jit
 def _leaves_lane(
-    b: int,
-    at: int,
-    segment: int,
-    off2: float,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    traffic: Traffic,
-    guards: Guards,
+    b: int, at: int, segment: int, off2: float, pose: Pose, traffic: Traffic, guards: ShieldTables
 ) -> int:
     """Return whether an ego that goes to a pose, in the disc of `at` (-1: none), is left there or turns round."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
@@ -171,7 +169,6 @@ def _leaves_lane(
     back = guards.ego[b].turn_back
     if at >= 0:
         return NOTHING
-    pose = Pose(x, y, c, s)
     after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
     after, top, progress, lateral, turned = along_lane(
         roads, net, after, fresh, guards.ego[b].top, back, pose
@@ -183,7 +180,7 @@ def _leaves_lane(
         if progress < before:
             return TURN
     tx, ty = lane_direction(roads, net, after)
-    half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & LEFT != 0 and labels.at[b, EGO] < 0:
         return RETURN if reach >= guards.ego[b].left_release else NOTHING

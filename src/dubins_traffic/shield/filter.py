@@ -14,8 +14,8 @@ from dubins_traffic.roads.table import pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
     REASONS,
-    Guards,
     Overtakes,
+    ShieldTables,
     check_overtakes,
     egos,
     guards,
@@ -79,7 +79,7 @@ class ShieldFilter:
             egos([problem], cars, np.zeros(1, dtype=np.int64)),
             scratch(cars, len(problem.network.segments)),
         )
-        self._guards: Guards = guards([problem], self._traffic, overtakes=self._overtakes)
+        self._guards: ShieldTables = guards([problem], self._traffic, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
         self._shield()  # compiles, so that nobody waits for that in the first tick
 

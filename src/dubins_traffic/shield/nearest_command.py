@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.passing import BACK, TURNING, along, find_way_past
@@ -29,7 +30,7 @@ from dubins_traffic.shield.tables import (
     NEVER,
     NOTHING,
     NUMBER,
-    Guards,
+    ShieldTables,
 )
 from dubins_traffic.shield.tables import LANE as LEAVES_LANE
 from dubins_traffic.shield.way_back import copy_memory, drive_alone, drive_by_law, surely_returns
@@ -43,7 +44,7 @@ STEPS = 4
 
 
 @jit
-def shield(tick: Any, sighted: bool, traffic: Traffic, guards: Guards, commands: Floats) -> None:
+def shield(tick: Any, sighted: bool, traffic: Traffic, guards: ShieldTables, commands: Floats) -> None:
     """Put what each ego does in place of what it was asked to do, `commands[:, 0]`.
 
     Parameters
@@ -67,37 +68,37 @@ def shield(tick: Any, sighted: bool, traffic: Traffic, guards: Guards, commands:
 
 @jit
 def shield_trial(
-    b: int, tick: int, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
+    b: int, tick: int, sight2: float, traffic: Traffic, guards: ShieldTables, commands: Floats
 ) -> None:
-    """Put what the ego of trial b does in place of what it was asked to do."""
+    """Put what the ego of trial b does in place of what it was asked to do; `sight2` (m2) as for `gather_close`."""
     state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
     _remember(b, tick, traffic, guards)
     left = np.int64(labels.bits[b, EGO]) & LEFT != 0
-    law, law_yaw = _law(b, tick, left, sight2, traffic, guards, commands)
+    law = _lawful(b, tick, left, sight2, traffic, guards, commands)
     if not left:
         guards.ego[b].kept = 0
     near = gather_close(b, state, sight2, vehicle, scratch)
-    obeys = _may_obey(b, tick, left, sight2, law, law_yaw, near, traffic, guards)
+    obeys = _may_obey(b, tick, sight2, law, near, traffic, guards)
     near = gather_close(b, state, sight2, vehicle, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
-    speed, yaw_rate = bounded(asked, asked_yaw, vehicle) if finite else (0.0, 0.0)
+    wanted = bounded(asked, asked_yaw, vehicle) if finite else Command(0.0, 0.0)
     reason = NOTHING if finite else NUMBER
-    if finite and not (obeys and speed == law and yaw_rate == law_yaw):
-        reason = refusal(b, speed, yaw_rate, near, traffic, guards)
+    if finite and not (obeys and _same(wanted, law)):
+        reason = refusal(b, wanted.speed, wanted.yaw_rate, near, traffic, guards)
     guards.ego[b].reason = reason
     if reason == NOTHING:
         commands[b, EGO, 0] = asked
         commands[b, EGO, 1] = asked_yaw
     else:
         if left:
-            speed, yaw_rate = (law, law_yaw) if obeys else (0.0, 0.0)
+            wanted = law if obeys else Command(0.0, 0.0)
         else:
-            speed, yaw_rate = _nearest(b, speed, yaw_rate, obeys, law, law_yaw, near, traffic, guards)
-        commands[b, EGO, 0] = speed
-        commands[b, EGO, 1] = yaw_rate
-    obeyed = speed == law and yaw_rate == law_yaw
+            wanted = _nearest(b, wanted, obeys, law, near, traffic, guards)
+        commands[b, EGO, 0] = wanted.speed
+        commands[b, EGO, 1] = wanted.yaw_rate
+    obeyed = _same(wanted, law)
     passes = drivers.car[b, EGO].aside != 0.0 and not left
     guards.ego[b].strayed = 1 if passes and (guards.ego[b].strayed != 0 or not obeyed) else 0
     if not left and not obeyed:
@@ -105,32 +106,28 @@ def shield_trial(
 
 
 @jit_inline
-def _law(
-    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, guards: Guards, commands: Floats
-) -> tuple[float, float]:
+def _same(one: Command, other: Command) -> bool:
+    return one.speed == other.speed and one.yaw_rate == other.yaw_rate
+
+
+@jit_inline
+def _lawful(
+    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, guards: ShieldTables, commands: Floats
+) -> Command:
     """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     if left and guards.ego[b].kept != 0:
         copy_memory(b, drivers, guards.alone.traffic.drivers)
-        law, law_yaw = drive_alone(
-            b,
-            tick,
-            labels.lane[b, EGO],
-            state.x[b, EGO],
-            state.y[b, EGO],
-            state.c[b, EGO],
-            state.s[b, EGO],
-            traffic,
-            guards,
-        )
+        pose = Pose(state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO])
+        law = drive_alone(b, tick, labels.lane[b, EGO], pose, traffic, guards)
         copy_memory(b, guards.alone.traffic.drivers, drivers)
-        return law, law_yaw
+        return law
     drive_by_law(b, tick, sight2, traffic, commands)
     return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
-def _remember(b: int, tick: int, traffic: Traffic, guards: Guards) -> None:
+def _remember(b: int, tick: int, traffic: Traffic, guards: ShieldTables) -> None:
     """Keep the greatest progress as the referee does, and let the law begin with the goal nearest to the start."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     ego = guards.ego[b]
@@ -156,23 +153,15 @@ def _remember(b: int, tick: int, traffic: Traffic, guards: Guards) -> None:
 
 @jit_inline
 def _may_obey(
-    b: int,
-    tick: int,
-    left: bool,
-    sight2: float,
-    law: float,
-    law_yaw: float,
-    near: int,
-    traffic: Traffic,
-    guards: Guards,
+    b: int, tick: int, sight2: float, law: Command, near: int, traffic: Traffic, guards: ShieldTables
 ) -> bool:
     """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
     drivers = traffic.drivers
-    if may_touch(b, law, law_yaw, near, traffic, drivers.vehicle[b]):
+    if may_touch(b, law.speed, law.yaw_rate, near, traffic, drivers.vehicle[b]):
         return False
-    if left:
+    if np.int64(traffic.labels.bits[b, EGO]) & LEFT != 0:
         return True
-    found = refusal(b, law, law_yaw, near, traffic, guards)
+    found = refusal(b, law.speed, law.yaw_rate, near, traffic, guards)
     if found != LEAVES_LANE:
         return found == NOTHING
     mode = guards.ego[b].mode
@@ -180,13 +169,13 @@ def _may_obey(
         return False
     if mode == LAW:
         return _has_way_back(b, sight2, traffic, guards)
-    sure = surely_returns(b, tick, law, law_yaw, sight2, traffic, guards)
+    sure = surely_returns(b, tick, law.speed, law.yaw_rate, sight2, traffic, guards)
     guards.ego[b].kept = 1 if sure else 0
     return sure
 
 
 @jit_inline
-def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: Guards) -> bool:
+def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: ShieldTables) -> bool:
     """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
     state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
     car = drivers.car[b, EGO]
@@ -207,68 +196,57 @@ def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: Guards) -> bo
 
 @jit_inline
 def _nearest(
-    b: int,
-    speed: float,
-    yaw_rate: float,
-    obeys: bool,
-    law: float,
-    law_yaw: float,
-    near: int,
-    traffic: Traffic,
-    guards: Guards,
-) -> tuple[float, float]:
+    b: int, refused: Command, obeys: bool, law: Command, near: int, traffic: Traffic, guards: ShieldTables
+) -> Command:
     """Return the command nearest to one that is refused, of those that are looked at, for an ego that is not left.
 
     Distance is that of (speed, yaw rate) in units of the largest speed and yaw rate. To stand is always possible.
     """
     drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
-    fastest = max(vehicle.fastest, -vehicle.slowest)
-    best, best_yaw = _slower(b, speed, yaw_rate, near, traffic, guards)
-    least = _apart(speed, yaw_rate, best, best_yaw, fastest, vehicle)
-    if obeys and _apart(speed, yaw_rate, law, law_yaw, fastest, vehicle) < least:
-        best, best_yaw = law, law_yaw
-        least = _apart(speed, yaw_rate, law, law_yaw, fastest, vehicle)
+    best = _slower(b, refused, near, traffic, guards)
+    least = _apart(refused, best, vehicle)
+    if obeys and _apart(refused, law, vehicle) < least:
+        best = law
+        least = _apart(refused, law, vehicle)
     shift = vehicle.yaw_most
     for _ in range(SHIFTS):
         shift *= 0.5
         for side in range(2):
             for k in range(STEPS):
-                wanted = yaw_rate + shift if side == 0 else yaw_rate - shift
-                u, w = bounded(speed * (1.0 - 0.25 * k), wanted, vehicle)
-                far = _apart(speed, yaw_rate, u, w, fastest, vehicle)
+                yaw_rate = refused.yaw_rate + shift if side == 0 else refused.yaw_rate - shift
+                tried = bounded(refused.speed * (1.0 - 0.25 * k), yaw_rate, vehicle)
+                far = _apart(refused, tried, vehicle)
                 if far >= least:
                     break
-                if refusal(b, u, w, near, traffic, guards) == NOTHING:
-                    best, best_yaw, least = u, w, far
+                if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == NOTHING:
+                    best, least = tried, far
                     break
-    return best, best_yaw
+    return best
 
 
 @jit_inline
-def _slower(
-    b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: Guards
-) -> tuple[float, float]:
+def _slower(b: int, refused: Command, near: int, traffic: Traffic, guards: ShieldTables) -> Command:
     """Return the command with the greatest share of a speed that is refused; (0, 0) if none will do."""
     drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
-    best, best_yaw = 0.0, 0.0
+    best = Command(0.0, 0.0)
     low, high = 0.0, 1.0
     share = 0.0
     for _ in range(HALVINGS + 1):
-        u, w = bounded(share * speed, yaw_rate, vehicle)
-        if refusal(b, u, w, near, traffic, guards) == NOTHING:
-            best, best_yaw = u, w
+        tried = bounded(share * refused.speed, refused.yaw_rate, vehicle)
+        if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == NOTHING:
+            best = tried
             low = share
         else:
             high = share
         share = 0.5 * (low + high)
-    return best, best_yaw
+    return best
 
 
 @jit_inline
-def _apart(u: float, w: float, v: float, z: float, fastest: float, vehicle: Vehicle) -> float:
+def _apart(one: Command, other: Command, vehicle: Vehicle) -> float:
     """Return the squared distance of two commands in units of the car's bounds."""
-    du = (u - v) / fastest
-    dw = (w - z) / vehicle.yaw_most
+    du = (one.speed - other.speed) / max(vehicle.fastest, -vehicle.slowest)
+    dw = (one.yaw_rate - other.yaw_rate) / vehicle.yaw_most
     return du * du + dw * dw

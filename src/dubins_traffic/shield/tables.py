@@ -95,7 +95,7 @@ class Alone(Tables):
     commands: Floats
 
 
-class Guards(Tables):
+class ShieldTables(Tables):
     """What the shield knows and remembers of each trial's `ego` (B,), `obstacles` in lanes, and the ego `alone`."""
 
     ego: Rows[Ego]
@@ -113,7 +113,7 @@ def check_overtakes(value: object) -> Overtakes:
     )
 
 
-def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> Guards:
+def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> ShieldTables:
     """Return what the shield knows of trials that have not begun.
 
     Parameters
@@ -147,7 +147,7 @@ def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtake
         ),
     )
     alone = Alone(unseen, np.zeros((trials, 1, 2)))
-    return Guards(known, obstacles, alone)
+    return ShieldTables(known, obstacles, alone)
 
 
 def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import Command, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -25,7 +25,7 @@ from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch
 from dubins_traffic.shield.tables import (
     EGO,
-    Guards,
+    ShieldTables,
 )
 
 LONGEST = 60.0
@@ -36,25 +36,22 @@ ROUNDED = 1e-6
 
 @jit
 def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of an ego that the law drives; it goes by the cars within sight (`policy.decide_trial`)."""
+    """Write the command of an ego that the law drives; it goes by the cars within sight, `sight2` (m2)."""
     scratch = traffic.scratch
     decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
 
 @jit
-def drive_alone(
-    b: int, tick: int, lane: int, x: float, y: float, c: float, s: float, traffic: Traffic, guards: Guards
-) -> tuple[float, float]:
+def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, guards: ShieldTables) -> Command:
     """Return the command, within bounds, by which the law drives an ego that is left and sees no other car.
 
     What the law remembers is that in `guards.alone`.
     """
     roads, drivers = traffic.roads, traffic.drivers
     alone, commands = guards.alone.traffic, guards.alone.commands
-    alone.state.x[b, EGO], alone.state.y[b, EGO] = x, y
-    alone.state.c[b, EGO], alone.state.s[b, EGO] = c, s
+    alone.state.x[b, EGO], alone.state.y[b, EGO], alone.state.c[b, EGO], alone.state.s[b, EGO] = pose
     bits = LEFT | OVERTAKING
-    own, _ = lane_coordinates(roads, drivers.net[b], lane, x, y)
+    own, _ = lane_coordinates(roads, drivers.net[b], lane, pose.x, pose.y)
     if _blocks(b, lane, own, own + guards.ego[b].blocked_ahead, roads, drivers, guards):
         bits |= BLOCKED
     alone.labels.bits[b, EGO] = bits
@@ -73,9 +70,12 @@ def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
 
 @jit
 def surely_returns(
-    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: Guards
+    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: ShieldTables
 ) -> bool:
-    """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time."""
+    """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time.
+
+    `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
+    """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
@@ -97,21 +97,20 @@ def surely_returns(
             return False
         if k == 1 and not _overtakes(b, lane, progress, traffic, guards):
             return False
-        if _leaves(lane, x, y, c, s, roads, net, vehicle) or _may_come(
-            b, k, x, y, sight2, state, guards, vehicle
-        ):
+        pose = Pose(x, y, c, s)
+        if _leaves(lane, pose, roads, net, vehicle) or _may_come(b, k, pose, sight2, state, guards, vehicle):
             return False
         tx, ty = lane_direction(roads, net, lane)
         half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
         if lateral + half < guards.ego[b].left_release:
             return True
         before = progress
-        speed, yaw_rate = drive_alone(b, tick + k, lane, x, y, c, s, traffic, guards)
+        speed, yaw_rate = drive_alone(b, tick + k, lane, pose, traffic, guards)
     return False
 
 
 @jit_inline
-def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Guards) -> bool:
+def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: ShieldTables) -> bool:
     """Tell whether an ego overtakes in the next frame, with `progress` then, for the sake of an obstacle."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -124,27 +123,26 @@ def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Gua
 
 @jit
 def _blocks(
-    b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, guards: Guards
+    b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, guards: ShieldTables
 ) -> bool:
     """Tell whether an obstacle blocks a lane where its progress is in [near, far]."""
     vehicle = drivers.vehicle[b]
-    length = roads.segment[roads.seg_off[drivers.net[b]] + (lane >> 1)].length
+    length = roads.segment[int(roads.seg_off[drivers.net[b]]) + (lane >> 1)].length
     place = RightLane(b, lane, length, 2.0 * vehicle.middle)
     needed = vehicle.needed - ROUNDED
     return obstacle_narrows(guards.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
 
 
 @jit_inline
-def _leaves(
-    lane: int, x: float, y: float, c: float, s: float, roads: RoadTable, net: int, vehicle: Vehicle
-) -> bool:
+def _leaves(lane: int, pose: Pose, roads: RoadTable, net: int, vehicle: Vehicle) -> bool:
     """Tell whether an ego at a pose is off the road of its lane, or its body meets a disc."""
+    x, y, c, s = pose
     segment, off2 = nearest_segment(roads, net, x, y)
     edge = float(roads.half_width[net]) - VERGE
     if segment != lane >> 1 or off2 > edge * edge:
         return True
     v, _ = nearest_vertex(roads, net, x, y)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
     rim = vehicle.disc + vehicle.rounding + BRINK
     return distance2_to_body(vx, vy, x, y, c, s, vehicle.half_length, vehicle.half_width) < rim * rim
@@ -152,9 +150,10 @@ def _leaves(
 
 @jit_inline
 def _may_come(
-    b: int, ticks: int, x: float, y: float, sight2: float, state: State, guards: Guards, vehicle: Vehicle
+    b: int, ticks: int, pose: Pose, sight2: float, state: State, guards: ShieldTables, vehicle: Vehicle
 ) -> bool:
-    """Tell whether in `ticks` ticks a car, seen or unseen, could be so near to (x, y) that it might touch the ego."""
+    """Tell whether in `ticks` ticks a car, seen or unseen, could be so near to a pose that it might touch the ego."""
+    x, y = pose.x, pose.y
     near = 2.0 * vehicle.reach + 2.0 * travel_of(vehicle) + GUARD
     far = near + max(vehicle.fastest, -vehicle.slowest) * vehicle.period * ticks
     ex, ey = state.x[b, EGO], state.y[b, EGO]

@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving
 from dubins_traffic.synthesis.queues import (
@@ -31,6 +32,28 @@ from dubins_traffic.synthesis.queues import (
 
 MOST_OTHERS: Final = 62
 """E-agents of the largest game; their moves are bits of a number."""
+
+
+@record
+class Settings:
+    """What the whole game depends on."""
+
+    others: int
+    """How many e-agents there are."""
+    positions: int
+    """How many positions."""
+    cells: int
+    """How many cells."""
+    yields: int
+    """1 if E2 is assumed."""
+    leaves: int
+    """1 if E4 is assumed."""
+    frees: int
+    """1 if E6 is assumed."""
+    unmet: int
+    """1 if e-agents that meet in a bend excuse each other (E4)."""
+    moves_up: int
+    """1 if only the ego, in the way out, excuses who does not enter (E5)."""
 
 
 class Tables(NamedTuple):
@@ -68,9 +91,8 @@ class Tables(NamedTuple):
         How many nodes each goal has.
     crossing, opposite : (V,) int64
         Whether the node is a crossing; the other node of a bend, or -1.
-    switches : (6,) int64
-        Whether E2, E4 and E6 are assumed; number of cells; whether e-agents that meet in a bend excuse each other (E4),
-        and whether only the ego, in the way out, excuses who does not enter (E5).
+    settings : (1,)
+        Numbers, and what is assumed.
     """
 
     base: Ints
@@ -103,7 +125,7 @@ class Tables(NamedTuple):
     goal_nodes: Ints
     crossing: Ints
     opposite: Ints
-    switches: Ints
+    settings: Rows[Settings]
 
 
 @dataclass(frozen=True)
@@ -211,14 +233,18 @@ class Board:
             goal_nodes=_ints(len(own) for own in self.arena.goal_nodes),
             crossing=_ints(node.crossing for node in nodes),
             opposite=_ints(self.arena.opposite(n) for n in range(len(nodes))),
-            switches=_ints(self._switches()),
+            settings=self._settings(),
         )
 
-    def _switches(self) -> tuple[int, ...]:
-        """Return `Tables.switches`."""
-        own = self.assumption
-        leaves, meeting = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
-        return own.yields, leaves, own.frees, self.arena.cells, meeting, own.arrives is Arriving.MOVES_UP
+    def _settings(self) -> Rows[Settings]:
+        """Return `Tables.settings`."""
+        found, own = table(Settings, 1), self.assumption
+        row = found[0]
+        row.others, row.positions, row.cells = self.others, self.positions, self.arena.cells
+        row.yields, row.frees = own.yields, own.frees
+        row.leaves, row.unmet = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
+        row.moves_up = own.arrives is Arriving.MOVES_UP
+        return found
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""
@@ -228,8 +254,8 @@ class Board:
             described = own.described() | {"left": own.left(), "ego_entered": own.ego_entered()}
             for name, row in described.items():
                 found.setdefault(name, []).append(row)
-            for name, table in (("entered", own.entered()), ("removed", own.removed())):
-                found.setdefault(name, []).append(_wider(table, ((0, 0), (0, pad))))
+            for name, changed in (("entered", own.entered()), ("removed", own.removed())):
+                found.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
             found.setdefault("arrived", []).append(_wider(own.arrived(), ((0, 0), (0, pad), (0, 0))))
         return {name: np.concatenate(parts) for name, parts in found.items()}
 

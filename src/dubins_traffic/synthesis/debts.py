@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.synthesis.board import Tables
-from dubins_traffic.synthesis.positions import UNITS, Moves, Work
+from dubins_traffic.synthesis.positions import Moves, Work
 from dubins_traffic.synthesis.queues import EGO, SLOTS
 
 
@@ -54,9 +54,9 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
     opposite = _inside(t, work, t.opposite[node])
     if opposite == EGO + 1:
         return False
-    if t.switches[5]:
+    if t.settings[0].moves_up:
         return free or ego != 2
-    return free and not (t.switches[4] and opposite)
+    return free and not (t.settings[0].unmet and opposite)
 
 
 @jit
@@ -64,7 +64,7 @@ def _may_leave(t: Tables, work: Work, node: int) -> bool:
     """E4: say whether who is in a node has no excuse to stay there."""
     free, _ = _ways_out(t, work, node)
     opposite = _inside(t, work, t.opposite[node])
-    return free and opposite != EGO + 1 and not (t.switches[4] and opposite)
+    return free and opposite != EGO + 1 and not (t.settings[0].unmet and opposite)
 
 
 @jit
@@ -83,10 +83,10 @@ def _to_free(t: Tables, work: Work, goal: int) -> int:
 
 
 @jit
-def owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
+def owe(t: Tables, work: Work, out: Moves) -> bool:
     """Write what the environment owes in `work.scenes`; false if there is no room."""
-    used = out.used[2]
-    if used + 2 * others + t.goal_nodes.shape[0] > out.owed.shape[0]:
+    used = out.used[0].owed
+    if used + 2 * t.settings[0].others + t.goal_nodes.shape[0] > out.owed.shape[0]:
         return False
     for v in range(t.base.shape[0]):
         scene = t.base[v] + work.scenes[v]
@@ -96,18 +96,18 @@ def owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
                     out.owed[used] = t.base.shape[0] + t.inbound[v, slot]
                     out.owed_mask[used] = _bits(work, v)
                     used += 1
-        if t.inside[scene] == 1 and t.switches[1] and _may_leave(t, work, v):
+        if t.inside[scene] == 1 and t.settings[0].leaves and _may_leave(t, work, v):
             out.owed[used] = v
             out.owed_mask[used] = _bits(work, v)
             used += 1
-    if t.switches[2]:
+    if t.settings[0].frees:
         for goal in range(t.goal_nodes.shape[0]):
             v = _to_free(t, work, goal)
             if v >= 0:
-                out.owed[used] = t.switches[3] + goal
+                out.owed[used] = t.settings[0].cells + goal
                 out.owed_mask[used] = _bits(work, v) if t.goal_nodes[goal] == 1 else 0
                 used += 1
-    out.used[2] = used
+    out.used[0].owed = used
     return True
 
 
@@ -115,7 +115,7 @@ def owe(t: Tables, others: int, work: Work, out: Moves) -> bool:
 def _bits(work: Work, node: int) -> int:
     """Return the bits of the e-agents that may move at a node."""
     bits = 0
-    for u in range(work.total[UNITS]):
+    for u in range(work.total[0].units):
         if work.node[u] == node:
             bits |= 1 << u
     return bits

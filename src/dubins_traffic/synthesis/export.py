@@ -28,7 +28,7 @@ def scene_numbers(board: Board) -> Numbers:
     """Return the scene (N, V) of each node in each position, numbered as in the header."""
     found = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
     room = np.empty(len(board.arena.nodes), dtype=np.int64)
-    list_scenes(board.tables, board.others, room, found)
+    list_scenes(board.tables, room, found)
     return found
 
 

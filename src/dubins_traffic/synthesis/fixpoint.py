@@ -18,14 +18,8 @@ from dubins_traffic.synthesis.arrays import Bytes, Flags
 from dubins_traffic.synthesis.moves import environment
 from dubins_traffic.synthesis.positions import unrank
 from dubins_traffic.synthesis.search import (
-    NEXT_RANK,
     NO_DEBT,
     NOBODY,
-    QUEUED,
-    RANKED,
-    STOPPED,
-    TAKEN,
-    UNFRIENDLY,
     UNRANKED,
     Graph,
     Search,
@@ -37,10 +31,10 @@ def _turns(g: Graph, position: int) -> tuple[int, int]:
     """Return where the moves of the environment from a position begin and end in `g.to`; of a lean game, now."""
     if not g.lean:
         return int(g.to_at[position]), int(g.to_at[position + 1])
-    g.out.used[0] = 0
-    unrank(g.tables, g.others, position, g.work.scenes)
-    environment(g.tables, g.others, g.ego_at.shape[0] - 1, g.work, g.out)
-    return 0, int(g.out.used[0])
+    g.out.used[0].to = 0
+    unrank(g.tables, position, g.work.scenes)
+    environment(g.tables, g.work, g.out)
+    return 0, int(g.out.used[0].to)
 
 
 @jit_long
@@ -97,29 +91,31 @@ def _watch_owed(g: Graph, s: Search, o: int) -> None:
 @jit
 def _rank(s: Search, position: int, rank: int) -> None:
     """Take a position into Y."""
+    control = s.control[0]
     s.rank[position] = rank
-    s.queue[s.control[QUEUED]] = position
-    s.control[QUEUED] += 1
-    s.control[RANKED] += 1
+    s.queue[control.queued] = position
+    control.queued += 1
+    control.ranked += 1
 
 
 @jit
 def _attract(g: Graph, s: Search) -> None:
     """Take into Y, again and again, what is in Cpre(Y)."""
-    while s.control[TAKEN] < s.control[QUEUED] and s.control[STOPPED] == 0:
-        reached = s.queue[s.control[TAKEN]]
-        s.control[TAKEN] += 1
+    control = s.control[0]
+    while control.taken < control.queued and control.stopped == 0:
+        reached = s.queue[control.taken]
+        control.taken += 1
         following = int(s.rank[reached]) + 1
-        while following < s.control[NEXT_RANK] and s.start[following] != following:
+        while following < control.next_rank and s.start[following] != following:
             following += 1
         for e in range(g.back_at[reached], g.back_at[reached + 1]):
             _make_ready(g, s, g.back[e], following)
-    if s.control[QUEUED] > 0:
-        last = s.rank[s.queue[s.control[QUEUED] - 1]]
-        for rank in range(s.control[NEXT_RANK], last + 1):
+    if control.queued > 0:
+        last = int(s.rank[s.queue[control.queued - 1]])
+        for rank in range(control.next_rank, last + 1):
             s.start[rank] = rank
             s.debt[rank] = NO_DEBT
-        s.control[NEXT_RANK] = max(s.control[NEXT_RANK], last + 1)
+        control.next_rank = max(control.next_rank, last + 1)
 
 
 @jit
@@ -202,19 +198,20 @@ def _shrink(g: Graph, s: Search, count: int) -> int:
 @jit
 def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
     """Take the members into Y as one layer, ranked by their depth if `layered`; say whether there are any."""
-    first = s.control[NEXT_RANK]
+    control = s.control[0]
+    first = control.next_rank
     rank = first
     for k in range(count):
         position = s.members[k]
         s.mark[position] = 0
         if layered:
-            rank = first + s.depth[position] - 1
+            rank = first + int(s.depth[position]) - 1
         _rank(s, position, rank)
     if count > 0:
         for filled in range(first, rank + 1):
             s.start[filled] = first
             s.debt[filled] = kind
-        s.control[NEXT_RANK] = rank + 1
+        control.next_rank = rank + 1
     return count > 0
 
 
@@ -236,7 +233,7 @@ def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
         before = count
         count = _possible(g, s, count)
         if count < before:
-            s.control[UNFRIENDLY] = 1
+            s.control[0].unfriendly = 1
             count = _shrink(g, s, count)
     return _settle(s, kind, count, True)
 
@@ -308,7 +305,7 @@ def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: Search) -> Non
                 _watch_owed(g, s, o)
     _attract(g, s)
     more = True
-    while more and s.control[STOPPED] == 0:
+    while more and s.control[0].stopped == 0:
         more = False
         for kind in range(s.candidates.shape[0]):
             if s.candidates[kind] == NOBODY or (kind >= cells and more):

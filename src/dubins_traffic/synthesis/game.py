@@ -13,9 +13,11 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import table
 from dubins_traffic.synthesis.arrays import Cells, Flags, Masks, Numbers
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
-from dubins_traffic.synthesis.moves import Moves, Work, expand, list_moves
+from dubins_traffic.synthesis.moves import expand, list_moves
+from dubins_traffic.synthesis.positions import Filled, Moves, Work
 
 Progress: TypeAlias = Callable[[str, float], object]
 """Told what is being done, and which share of it."""
@@ -148,8 +150,8 @@ class Game:
         if not self.lean:
             return self.to[self.to_at[position] : self.to_at[position + 1]]
         out = room(self.board, 1, self.most_moves)
-        list_moves(self.board.tables, self.board.others, self.positions, position, Work.of(self.board), out)
-        return out.to[: int(out.used[0])]
+        list_moves(self.board.tables, position, Work.of(self.board), out)
+        return out.to[: int(out.used[0].to)]
 
     @cached_property
     def bytes(self) -> int:
@@ -168,11 +170,8 @@ def estimate(board: Board) -> Estimate:
     """
     if not 1 <= board.others <= MOST_OTHERS:
         raise InputError(
-            "not a number of e-agents of the game",
-            field="--cars",
-            value=board.others,
-            expected=f"1 to {MOST_OTHERS}",
-        )
+            "not a number of e-agents of the game", field="--cars", value=board.others, expected=f"1 to {MOST_OTHERS}"
+        )  # fmt: skip
     count = board.positions
     if count == 0:
         raise InputError(
@@ -186,9 +185,9 @@ def estimate(board: Board) -> Estimate:
     picked = np.unique(np.linspace(0, count - 1, min(SAMPLE, count)).astype(np.int64))
     work, out = Work.of(board), room(board, 1, LARGEST_CHOICE)
     for position in picked.tolist():
-        out.used[:] = 0
-        expand(board.tables, board.others, count, position, position + 1, work, out, position)
-        sizes += out.used
+        list_moves(board.tables, position, work, out)
+        used = out.used[0]
+        sizes += (used.to, used.ego_to, used.owed)
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
     goals = len(board.arena.targets)
     mask = np.dtype(mask_type(board.others)).itemsize
@@ -285,10 +284,9 @@ def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
     """Return the moves of some positions; `each` guesses how many moves the environment has in one."""
     pieces: list[Moves] = []
     work = Work.of(board)
-    count = board.positions
     while first < last:
         out = room(board, last - first, each)
-        done = expand(board.tables, board.others, count, first, last, work, out, first)
+        done = expand(board.tables, first, last, work, out, first)
         if done == first:
             each *= 2
             continue
@@ -312,7 +310,7 @@ def room(board: Board, rows: int, each: int) -> Moves:
         np.empty(rows, dtype=np.int32),
         np.empty(rows, dtype=np.int32),
         np.empty(rows, dtype=np.int32),
-        np.zeros(3, dtype=np.int64),
+        table(Filled, 1),
     )
 
 
@@ -323,13 +321,13 @@ def mask_type(others: int) -> type[np.uint8] | type[np.int64]:
 
 def _trimmed(out: Moves, rows: int) -> Moves:
     """Return a copy of what has been used."""
-    moves, ego_moves, debts = out.used.tolist()
+    used = out.used[0]
     return Moves(
-        out.to[:moves].copy(),
-        out.moved[:moves].copy(),
-        out.ego_to[:ego_moves].copy(),
-        out.owed[:debts].copy(),
-        out.owed_mask[:debts].copy(),
+        out.to[: used.to].copy(),
+        out.moved[: used.to].copy(),
+        out.ego_to[: used.ego_to].copy(),
+        out.owed[: used.owed].copy(),
+        out.owed_mask[: used.owed].copy(),
         out.ego_cell[:rows].copy(),
         out.many[:rows].copy(),
         out.ego_many[:rows].copy(),

@@ -12,10 +12,7 @@ from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.debts import owe
 from dubins_traffic.synthesis.positions import (
-    ARRIVALS,
     MOST_CHOICES,
-    RAMMED,
-    UNITS,
     Moves,
     Work,
     rank,
@@ -35,7 +32,7 @@ INSIDE = -1
 def _units(t: Tables, work: Work) -> None:
     """List the e-agents that may move and their choices; note whether one may ram the ego."""
     count = 0
-    work.total[RAMMED] = 0
+    work.total[0].rammed = 0
     for v in range(t.base.shape[0]):
         scene = t.base[v] + work.scenes[v]
         if t.inside[scene] == 1:
@@ -47,8 +44,8 @@ def _units(t: Tables, work: Work) -> None:
                 if (t.taken[end] & bit) == 0 or (t.open[end] & bit) != 0:
                     work.choice[count, choices] = lane
                     choices += 1
-                elif (t.others_slots[end] & bit) == 0 and t.switches[0] == 0:
-                    work.total[RAMMED] = 1
+                elif (t.others_slots[end] & bit) == 0 and t.settings[0].yields == 0:
+                    work.total[0].rammed = 1
             count = _unit(work, count, v, INSIDE, choices)
         movable = t.open[scene] | t.may_forfeit[scene] | t.parked[scene]
         for slot in range(SLOTS):
@@ -62,7 +59,7 @@ def _units(t: Tables, work: Work) -> None:
                     work.choice[count, choices] = RENEW
                     choices += 1
                 count = _unit(work, count, v, slot, choices)
-    work.total[UNITS] = count
+    work.total[0].units = count
 
 
 @jit
@@ -79,7 +76,7 @@ def _unit(work: Work, count: int, node: int, slot: int, choices: int) -> int:
 @jit
 def _next_choice(work: Work) -> bool:
     """Go on to the next joint choice; false after the last."""
-    for u in range(work.total[UNITS]):
+    for u in range(work.total[0].units):
         work.chosen[u] += 1
         if work.chosen[u] < work.choices[u]:
             return True
@@ -94,7 +91,7 @@ def _depart(t: Tables, work: Work) -> int:
     arrivals = 0
     for v in range(t.base.shape[0]):
         work.moved_scenes[v] = work.scenes[v]
-    for u in range(work.total[UNITS]):
+    for u in range(work.total[0].units):
         choice = work.choice[u, work.chosen[u]]
         if choice == STAY:
             continue
@@ -113,7 +110,7 @@ def _depart(t: Tables, work: Work) -> int:
             arrivals = _arrival(work, arrivals, to, int(t.lane_slot[choice]), int(t.newcomer[to]))
         if work.moved_scenes[v] == IMPOSSIBLE:
             return -1
-    work.total[ARRIVALS] = arrivals
+    work.total[0].arrivals = arrivals
     return moved
 
 
@@ -137,7 +134,7 @@ def _arrive(t: Tables, work: Work) -> bool:
     """Let all arrive in the order of `turn`; false if a lane is taken."""
     for v in range(t.base.shape[0]):
         work.arrived_scenes[v] = work.moved_scenes[v]
-    for place in range(work.total[ARRIVALS]):
+    for place in range(work.total[0].arrivals):
         k = work.turn[place]
         v = work.to_node[k]
         scene = t.base[v] + work.arrived_scenes[v]
@@ -153,7 +150,7 @@ def _next_turn(work: Work, sorts: Ints) -> bool:
 
     Only nodes with an order (`sorts`) have more than one.
     """
-    high = work.total[ARRIVALS]
+    high = work.total[0].arrivals
     while high > 0:
         low = high - 1
         while low > 0 and work.to_node[low - 1] == work.to_node[high - 1]:
@@ -186,43 +183,43 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
 
 
 @jit
-def environment(t: Tables, others: int, positions: int, work: Work, out: Moves) -> bool:
+def environment(t: Tables, work: Work, out: Moves) -> bool:
     """Write the moves of the environment from `work.scenes`; false if there is no room.
 
-    The game has `positions` (count) positions; that number stands for one in which the ego has been rammed.
+    The number of positions stands for one in which the ego has been rammed.
     """
     _units(t, work)
-    used = out.used[0]
-    if work.total[RAMMED]:
+    used = out.used[0].to
+    if work.total[0].rammed:
         if used >= out.to.shape[0]:
             return False
-        out.to[used] = positions
+        out.to[used] = t.settings[0].positions
         out.moved[used] = 0
         used += 1
     more = True
     while more:
         moved = _depart(t, work)
         turns = moved >= 0
-        for k in range(work.total[ARRIVALS]):
+        for k in range(work.total[0].arrivals):
             work.turn[k] = k
         while turns:
             if not _arrive(t, work):
                 break
             if used >= out.to.shape[0]:
                 return False
-            out.to[used] = rank(t, others, work.arrived_scenes)
+            out.to[used] = rank(t, work.arrived_scenes)
             out.moved[used] = moved
             used += 1
             turns = _next_turn(work, t.sorts)
         more = _next_choice(work)
-    out.used[0] = used
+    out.used[0].to = used
     return True
 
 
 @jit
-def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
+def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
     """Write the moves of the ego from `work.scenes`; return its cell, or -1 if there is no room."""
-    used = out.used[1]
+    used = out.used[0].ego_to
     if used + MOST_CHOICES > out.ego_to.shape[0]:
         return -1
     out.ego_to[used] = position
@@ -242,7 +239,7 @@ def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
                 after = t.arrived[t.base[to] + before, t.lane_slot[t.exits[k]], EGO]
                 if after != IMPOSSIBLE:
                     work.scenes[to] = after
-                    out.ego_to[used] = rank(t, others, work.scenes)
+                    out.ego_to[used] = rank(t, work.scenes)
                     used += 1
                     work.scenes[to] = before
         else:
@@ -252,26 +249,22 @@ def _ego(t: Tables, others: int, position: int, work: Work, out: Moves) -> int:
                     cell = t.base.shape[0] + t.inbound[v, slot]
             if t.ego_entered[scene] != IMPOSSIBLE:
                 work.scenes[v] = t.ego_entered[scene]
-                out.ego_to[used] = rank(t, others, work.scenes)
+                out.ego_to[used] = rank(t, work.scenes)
                 used += 1
         work.scenes[v] = old
         break
-    out.used[1] = used
+    out.used[0].ego_to = used
     return cell
 
 
 @jit_long
-def expand(
-    t: Tables, others: int, positions: int, first: int, last: int, work: Work, out: Moves, begun: int
-) -> int:
+def expand(t: Tables, first: int, last: int, work: Work, out: Moves, begun: int) -> int:
     """Write the moves of the positions from `first` to before `last`; return the first that found no room.
 
     Parameters
     ----------
     t : Tables
         The board.
-    others, positions : int
-        E-agents, and number of positions; that number stands for a position in which the ego has been rammed.
     first, last : int
         Numbers of the positions.
     work : Work
@@ -283,37 +276,37 @@ def expand(
     """
     for position in range(first, last):
         row = position - begun
-        before, ego_before, owed_before = out.used[0], out.used[1], out.used[2]
-        unrank(t, others, position, work.scenes)
-        room = environment(t, others, positions, work, out)
-        room = room and owe(t, others, work, out)
+        used = out.used[0]
+        before, ego_before, owed_before = used.to, used.ego_to, used.owed
+        unrank(t, position, work.scenes)
+        room = environment(t, work, out)
+        room = room and owe(t, work, out)
         cell = -1
         if room:
-            cell = _ego(t, others, position, work, out)
+            cell = _ego(t, position, work, out)
         if cell < 0:
-            out.used[0], out.used[1], out.used[2] = before, ego_before, owed_before
+            used.to, used.ego_to, used.owed = before, ego_before, owed_before
             return position
         out.ego_cell[row] = cell
-        out.many[row] = out.used[0] - before
-        out.ego_many[row] = out.used[1] - ego_before
-        out.owed_many[row] = out.used[2] - owed_before
+        out.many[row] = used.to - before
+        out.ego_many[row] = used.ego_to - ego_before
+        out.owed_many[row] = used.owed - owed_before
     return last
 
 
 @jit_long
-def list_moves(t: Tables, others: int, positions: int, position: int, work: Work, out: Moves) -> None:
+def list_moves(t: Tables, position: int, work: Work, out: Moves) -> None:
     """Write the moves of both sides from one position, the one as if the environment were to move, the other the ego.
 
     Parameters
     ----------
-    t, others, positions, work
-        Board, number of e-agents, number of positions and room, as for `expand`.
+    t, work
+        Board and room, as for `expand`.
     position : int
         The position.
     out : Moves
         Its rows 0 are set; it must have room enough (`game.room`).
     """
-    out.used[0] = 0
-    out.used[1] = 0
-    out.used[2] = 0
-    expand(t, others, positions, position, position + 1, work, out, position)
+    used = out.used[0]
+    used.to, used.ego_to, used.owed = 0, 0, 0
+    expand(t, position, position + 1, work, out, position)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,16 +12,16 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.random import below
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
-from dubins_traffic.synthesis.moves import Moves, Work, list_moves
+from dubins_traffic.synthesis.moves import list_moves
+from dubins_traffic.synthesis.positions import Moves, Work
 from dubins_traffic.synthesis.strategy import Strategy
 
 DRAW: Final = 300
 """The first of the random draws of this room (`kernels.random`)."""
-POSITION, GOAL, TURN, ASTRAY = range(4)
-"""Places in `Table.now`."""
 
 
 class Environment(IntEnum):
@@ -33,7 +33,26 @@ class Environment(IntEnum):
     """What leaves the ego at the highest rank; what it has owed for `PATIENCE` turns it pays."""
 
 
+GREEDY: Final = int(Environment.GREEDY)
 PATIENCE: Final = 24
+
+
+@record
+class Now:
+    """Where a play is."""
+
+    seed: np.uint64
+    """Of what the environment draws."""
+    environment: int
+    """How it plays: the number of an `Environment`."""
+    position: int
+    """The position; the environment is to move."""
+    goal: int
+    """The goal of the ego."""
+    turn: int
+    """Turns played."""
+    astray: int
+    """How often the ego found no ranked move."""
 
 
 class Table(NamedTuple):
@@ -41,15 +60,18 @@ class Table(NamedTuple):
 
     Attributes
     ----------
-    now : (4,) int64
-        Position (the environment is to move), goal of the ego, turns played, how often the ego found no ranked move.
+    ranks : (G, N) int32
+        The strategy.
+    now : (1,)
+        Where it is.
     age : (D,) int64
         For how many turns each debt has been owed.
     visited, visits, gap : (G,) int64
         Turn of the last visit of each goal, number of visits, longest time without one.
     """
 
-    now: Ints
+    ranks: Numbers
+    now: Rows[Now]
     age: Ints
     visited: Ints
     visits: Ints
@@ -59,6 +81,7 @@ class Table(NamedTuple):
 class Room(NamedTuple):
     """Room for the moves of the environment from one position, and of the ego from the next."""
 
+    work: Work
     others: Moves
     ego: Moves
 
@@ -113,39 +136,31 @@ def play(
     if not strategy.wins(first):
         raise InputError("the strategy does not win from there", field="position", value=first)
     targets = len(board.arena.targets)
-    table = Table(
-        np.array([first, 0, 0, 0], dtype=np.int64),
+    started = table(Now, 1)
+    now = started[0]
+    now.seed, now.environment, now.position = np.uint64(seed), int(environment), first
+    state = Table(
+        np.stack([own.rank for own in strategy.ranks]),
+        started,
         np.zeros(board.arena.cells + len(board.arena.goals), dtype=np.int64),
         *(np.zeros(targets, dtype=np.int64) for _ in range(3)),
     )
-    moves = Room(room(board, 1, LARGEST_CHOICE), room(board, 1, LARGEST_CHOICE))
-    ranks = np.stack([own.rank for own in strategy.ranks])
-    play_turns(
-        board.tables,
-        (board.others, board.positions),
-        ranks,
-        int(environment),
-        np.uint64(seed),
-        turns,
-        Work.of(board),
-        moves,
-        table,
-    )
-    return Played(
-        int(table.now[TURN]), int(table.now[ASTRAY]), tuple(table.visits.tolist()), tuple(table.gap.tolist())
-    )
+    moves = Room(Work.of(board), room(board, 1, LARGEST_CHOICE), room(board, 1, LARGEST_CHOICE))
+    play_turns(board.tables, turns, moves, state)
+    return Played(int(now.turn), int(now.astray), tuple(state.visits.tolist()), tuple(state.gap.tolist()))
 
 
 @jit
-def _visited(ranks: Numbers, position: int, turn: int, table: Table) -> int:
+def _visited(table: Table) -> int:
     """Note that the ego is at its goal, if it is; return the goal to seek now."""
-    goal = table.now[GOAL]
-    if ranks[goal, position] == 0:
+    now = table.now[0]
+    goal, turn = now.goal, now.turn
+    if table.ranks[goal, now.position] == 0:
         table.gap[goal] = max(table.gap[goal], turn - table.visited[goal])
         table.visited[goal] = turn
         table.visits[goal] += 1
-        goal = goal + 1 if goal + 1 < ranks.shape[0] else 0
-        table.now[GOAL] = goal
+        goal = goal + 1 if goal + 1 < table.ranks.shape[0] else 0
+        now.goal = goal
     return goal
 
 
@@ -155,7 +170,7 @@ def _grow(out: Moves, table: Table) -> int:
     for kind in range(table.age.shape[0]):
         table.age[kind] = -table.age[kind]
     oldest = -1
-    for o in range(out.used[2]):
+    for o in range(out.used[0].owed):
         kind = out.owed[o]
         if table.age[kind] <= 0:
             table.age[kind] = 1 - table.age[kind]
@@ -170,7 +185,7 @@ def _grow(out: Moves, table: Table) -> int:
 def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
     """Return which of the ego's moves leads to the lowest rank, or -1 if none has a rank."""
     best = -1
-    for k in range(out.used[1]):
+    for k in range(out.used[0].ego_to):
         rank = ranks[goal, out.ego_to[k]]
         if rank >= 0 and (best < 0 or rank < ranks[goal, out.ego_to[best]]):
             best = k
@@ -178,24 +193,22 @@ def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
 
 
 @jit
-def _worst(
-    t: Tables, size: tuple[int, int], ranks: Numbers, goal: int, must: int, work: Work, room: Room, first: int
-) -> int:
+def _worst(t: Tables, ranks: Numbers, goal: int, must: int, room: Room, first: int) -> int:
     """Return the move of the environment that leaves the ego the highest rank.
 
     Of equals the first from `first` on; only moves in which a car of the bits `must` goes, if any.
     """
     out = room.others
-    count = out.used[0]
+    count = out.used[0].to
     picked = first
     highest = -1
     for k in range(count):
         e = first + k if first + k < count else first + k - count
         if must and (out.moved[e] & must) == 0:
             continue
-        list_moves(t, size[0], size[1], out.to[e], work, room.ego)
+        list_moves(t, out.to[e], room.work, room.ego)
         best = _answer(ranks, goal, room.ego)
-        rank = ranks[goal, room.ego.ego_to[best]] if best >= 0 else size[1]
+        rank = ranks[goal, room.ego.ego_to[best]] if best >= 0 else t.settings[0].positions
         if rank > highest:
             highest = rank
             picked = e
@@ -203,52 +216,35 @@ def _worst(
 
 
 @jit_long
-def play_turns(
-    t: Tables,
-    size: tuple[int, int],
-    ranks: Numbers,
-    environment: int,
-    seed: Any,
-    turns: int,
-    work: Work,
-    room: Room,
-    table: Table,
-) -> None:
+def play_turns(t: Tables, turns: int, room: Room, table: Table) -> None:
     """Play turns; stop where a position has no rank.
 
     Parameters
     ----------
-    t, size
-        The board, and its numbers of e-agents and positions.
-    ranks : (G, N) int32
-        The strategy.
-    environment : int
-        Number of an `Environment`.
-    seed : uint64
-        Of what it draws.
+    t
+        The board.
     turns : int
         Number of turns.
-    work, room
+    room
         Room for the moves of a position.
     table : Table
         Updated.
     """
+    now, ranks = table.now[0], table.ranks
     for _ in range(turns):
-        position = table.now[POSITION]
-        turn = table.now[TURN]
-        list_moves(t, size[0], size[1], position, work, room.others)
-        goal = _visited(ranks, position, turn, table)
+        list_moves(t, now.position, room.work, room.others)
+        goal = _visited(table)
         oldest = _grow(room.others, table)
-        picked = below(seed, 0, 0, turn, DRAW, room.others.used[0])
-        if environment == 1:
+        picked = below(now.seed, 0, 0, now.turn, DRAW, room.others.used[0].to)
+        if now.environment == GREEDY:
             must = 0
             if oldest >= 0 and table.age[room.others.owed[oldest]] > PATIENCE:
                 must = room.others.owed_mask[oldest]
-            picked = _worst(t, size, ranks, goal, must, work, room, picked)
-        list_moves(t, size[0], size[1], room.others.to[picked], work, room.ego)
+            picked = _worst(t, ranks, goal, must, room, picked)
+        list_moves(t, room.others.to[picked], room.work, room.ego)
         best = _answer(ranks, goal, room.ego)
         if best < 0:
-            table.now[ASTRAY] += 1
+            now.astray += 1
             return
-        table.now[POSITION] = room.ego.ego_to[best]
-        table.now[TURN] += 1
+        now.position = room.ego.ego_to[best]
+        now.turn += 1

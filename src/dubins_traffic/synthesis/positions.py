@@ -8,14 +8,37 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arrays import Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Board, Tables
 from dubins_traffic.synthesis.queues import SLOTS
 
 MOST_CHOICES = SLOTS + 1
 """Of one car: to stay, or to leave by one of four lanes."""
-UNITS, ARRIVALS, RAMMED = 0, 1, 2
-"""Places in `Work.total`."""
+
+
+@record
+class Totals:
+    """What is counted of a position on the way to its moves."""
+
+    units: int
+    """How many e-agents may move."""
+    arrivals: int
+    """How many arrive."""
+    rammed: int
+    """1 if the ego may be rammed."""
+
+
+@record
+class Filled:
+    """How many entries of the arrays of `Moves` are used."""
+
+    to: int
+    """Of `to` and `moved`."""
+    ego_to: int
+    """Of `ego_to`."""
+    owed: int
+    """Of `owed` and `owed_mask`."""
 
 
 class Work(NamedTuple):
@@ -31,8 +54,8 @@ class Work(NamedTuple):
         STAY, RENEW, ENTER or a lane.
     to_node, to_slot, to_who, turn : (n,) int64
         Those who arrive, by node; `turn` is the order in which they do.
-    total : (3,) int64
-        How many may move, how many arrive, whether the ego may be rammed.
+    total : (1,)
+        Counts.
     """
 
     scenes: Ints
@@ -47,15 +70,17 @@ class Work(NamedTuple):
     to_slot: Ints
     to_who: Ints
     turn: Ints
-    total: Ints
+    total: Rows[Totals]
 
     @classmethod
     def of(cls, board: Board) -> Work:
         """Return room for positions of this board."""
         nodes, cars = len(board.arena.nodes), board.others
         shapes = dict.fromkeys(("scenes", "moved_scenes", "arrived_scenes"), (nodes,))
-        shapes |= {"choice": (cars, MOST_CHOICES), "total": (3,)}
-        return cls(**{name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in cls._fields})
+        shapes |= {"choice": (cars, MOST_CHOICES)}
+        arrays = cls._fields[:-1]
+        found = {name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in arrays}
+        return cls(**found, total=table(Totals, 1))
 
 
 class Moves(NamedTuple):
@@ -77,8 +102,8 @@ class Moves(NamedTuple):
         Cell of the ego.
     many, ego_many, owed_many : (N,) int32
         Entries of each position in the arrays above.
-    used : (3,) int64
-        Entries used of `to`, `ego_to` and `owed`.
+    used : (1,)
+        Entries used of the first five arrays.
     """
 
     to: Numbers
@@ -90,13 +115,13 @@ class Moves(NamedTuple):
     many: Numbers
     ego_many: Numbers
     owed_many: Numbers
-    used: Ints
+    used: Rows[Filled]
 
 
 @jit
-def unrank(t: Tables, others: int, position: int, scenes: Ints) -> None:
+def unrank(t: Tables, position: int, scenes: Ints) -> None:
     """Set `scenes` (V,) to the scene of every node in `position` (number)."""
-    left = others
+    left = t.settings[0].others
     ego = 1
     rest = position
     for v in range(t.base.shape[0]):
@@ -118,9 +143,9 @@ def unrank(t: Tables, others: int, position: int, scenes: Ints) -> None:
 
 
 @jit
-def rank(t: Tables, others: int, scenes: Ints) -> int:
+def rank(t: Tables, scenes: Ints) -> int:
     """Return the number of the position with the scenes `scenes` (V,)."""
-    left = others
+    left = t.settings[0].others
     ego = 1
     total = 0
     for v in range(t.base.shape[0]):
@@ -133,9 +158,9 @@ def rank(t: Tables, others: int, scenes: Ints) -> int:
 
 
 @jit_long
-def list_scenes(t: Tables, others: int, scenes: Ints, found: Numbers) -> None:
+def list_scenes(t: Tables, scenes: Ints, found: Numbers) -> None:
     """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
     for position in range(found.shape[0]):
-        unrank(t, others, position, scenes)
+        unrank(t, position, scenes)
         for v in range(scenes.shape[0]):
             found[position, v] = scenes[v]

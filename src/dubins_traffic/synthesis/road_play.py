@@ -60,16 +60,15 @@ class MoveList:
     def of_others(self, position: int) -> set[int]:
         """Return the positions that the environment may make of a position."""
         self._list(position)
-        return set(self._out.to[: self._out.used[0]].tolist())
+        return set(self._out.to[: self._out.used[0].to].tolist())
 
     def of_ego(self, position: int) -> list[int]:
         """Return the positions that the ego may make of a position, that one first."""
         self._list(position)
-        return self._out.ego_to[: self._out.used[1]].tolist()
+        return self._out.ego_to[: self._out.used[0].ego_to].tolist()
 
     def _list(self, position: int) -> None:
-        board = self._board
-        list_moves(board.tables, board.others, board.positions, position, self._work, self._out)
+        list_moves(self._board.tables, position, self._work, self._out)
 
 
 class RoadPlay:

@@ -8,6 +8,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit_long
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arrays import Bytes, Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import Moves, Work
@@ -15,8 +16,24 @@ from dubins_traffic.synthesis.positions import Moves, Work
 UNRANKED = -1
 NOBODY = -1
 NO_DEBT = -1
-STOPPED, RANKED, NEXT_RANK, QUEUED, TAKEN, UNFRIENDLY = range(6)
-"""Places in `Search.control`."""
+
+
+@record
+class Control:
+    """How far the search for a goal is."""
+
+    stopped: int
+    """1 to stop as soon as possible."""
+    ranked: int
+    """How many positions are ranked."""
+    next_rank: int
+    """The next rank."""
+    queued: int
+    """Length of the queue."""
+    taken: int
+    """How much of it has been taken."""
+    unfriendly: int
+    """1 if something was not ranked because the environment could not keep its assumption there."""
 
 
 class Graph(NamedTuple):
@@ -31,7 +48,6 @@ class Graph(NamedTuple):
 
     lean: bool
     tables: Tables
-    others: int
     work: Work
     out: Moves
     to_at: Ints
@@ -74,9 +90,8 @@ class Search(NamedTuple):
         First rank of the layer of each rank.
     debt : (R,) int16
         What the environment owes in a layer, or NO_DEBT.
-    control : (6,) int64
-        Stop as soon as possible; positions ranked; next rank; length of the queue; how much of it has been taken;
-        whether something was not ranked because the environment could not keep its assumption there.
+    control : (1,)
+        How far it is.
     """
 
     rank: Numbers
@@ -95,7 +110,7 @@ class Search(NamedTuple):
     queue: Numbers
     start: Numbers
     debt: Cells
-    control: Ints
+    control: Rows[Control]
 
     @classmethod
     def of(cls, positions: int, debts: int, kinds: int) -> Search:
@@ -121,7 +136,7 @@ class Search(NamedTuple):
             numbers(positions, 0),
             numbers(positions + 1, 0),
             np.full(positions + 1, NO_DEBT, dtype=np.int16),
-            np.zeros(6, dtype=np.int64),
+            table(Control, 1),
         )
 
 

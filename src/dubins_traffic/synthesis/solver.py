@@ -18,10 +18,6 @@ from dubins_traffic.synthesis.fixpoint import forced, reach
 from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
 from dubins_traffic.synthesis.positions import Work
 from dubins_traffic.synthesis.search import (
-    NEXT_RANK,
-    RANKED,
-    STOPPED,
-    UNFRIENDLY,
     UNRANKED,
     Graph,
     Search,
@@ -123,7 +119,6 @@ def graph(game: Game) -> Graph:
     found = Graph(
         game.lean,
         game.board.tables,
-        game.board.others,
         Work.of(game.board),
         out,
         game.to_at,
@@ -237,21 +232,21 @@ class _Solver:
                         future.result()
             except BaseException:
                 for search in searches:
-                    search.control[STOPPED] = 1
+                    search.control[0].stopped = 1
                 raise
         return [_ranked(search) for search in searches]
 
     def _tell(self, searches: list[Search], what: str) -> None:
         if self._progress:
-            ranked = sum(int(search.control[RANKED]) for search in searches)
+            ranked = sum(int(search.control[0].ranked) for search in searches)
             self._progress(what, ranked / (len(searches) * self._game.positions))
 
 
 def _ranked(search: Search) -> _Ranked:
     """Return what a search has found; its room may go."""
-    used = int(search.control[NEXT_RANK])
+    used = int(search.control[0].next_rank)
     ranks = Ranks(search.rank, search.start[:used].copy(), search.debt[:used].copy())
-    return _Ranked(ranks, bool(search.control[UNFRIENDLY]))
+    return _Ranked(ranks, bool(search.control[0].unfriendly))
 
 
 def _within(ranks: Ranks, won: Flags) -> Ranks:

@@ -80,8 +80,8 @@ class Strategy:
         """
         board = self.board
         out = room(board, 1, LARGEST_CHOICE)
-        list_moves(board.tables, board.others, board.positions, position, Work.of(board), out)
-        options = out.ego_to[: out.used[1]]
+        list_moves(board.tables, position, Work.of(board), out)
+        options = out.ego_to[: out.used[0].ego_to]
         ranks = self.ranks[goal].rank[options]
         if (ranks < 0).all():
             raise InputError("the strategy does not win from there", field="position", value=position)

@@ -22,7 +22,7 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
     What `find_way_past` asks of cars that stand or come is left out: these go.
     """
     roads, obstacles = traffic.roads, traffic.obstacles
-    length = roads.segment[roads.seg_off[net] + (lane >> 1)].length
+    length = roads.segment[int(roads.seg_off[net]) + (lane >> 1)].length
     wide = vehicle.half_width + vehicle.rounding
     done = 0.0
     early = LATE * vehicle.disc + vehicle.reach + QUEUE_GAP
@@ -64,7 +64,7 @@ def has_place(b: int, lane: int, traffic: Traffic) -> bool:
     first, last = obstacles.off[b], obstacles.off[b + 1]
     early = LAST * vehicle.disc + vehicle.reach + OBSTACLE_GAP
     begin, _, _ = next_bar(traffic, net, lane, 0.0, early, first, last, vehicle)
-    return begin >= min(nearest_bar(vehicle), roads.segment[roads.seg_off[net] + (lane >> 1)].length)
+    return begin >= min(nearest_bar(vehicle), roads.segment[int(roads.seg_off[net]) + (lane >> 1)].length)
 
 
 @jit
@@ -123,7 +123,7 @@ def leads_nowhere(b: int, lane: int, traffic: Traffic) -> bool:
     """Tell whether no way on from the end of a lane, nor from the end of the next, is free of what can't be passed."""
     roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
-    row = roads.vert_off[net] + lane_end(roads, net, lane)
+    row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
@@ -137,7 +137,7 @@ def ends_there(b: int, lane: int, traffic: Traffic) -> bool:
     """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
     roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
-    row = roads.vert_off[net] + lane_end(roads, net, lane)
+    row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
         shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), traffic) else 0

@@ -213,7 +213,7 @@ def drive_on(
         speed = max(0.0, line) / vehicle.period
     row.coast_chooses = 1 if chooses else 0
     row.coast_waits = 1 if waits else 0
-    row.coast_stopped = bits & STOPPED if waits else 0
+    row.coast_stopped = int(bits & STOPPED) if waits else 0
     keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:
         count_turn(bits, row, car)

@@ -106,7 +106,7 @@ def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
     car = drivers.car[b, n]
     lane = car.lane
     v = lane_end(roads, net, lane)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     kind = car.kind
     on_loop = kind == LOOP and car.place >= 0
     follow = -1
@@ -174,7 +174,7 @@ def forget(net: int, roads: RoadTable, scratch: Scratch) -> None:
 def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
     """Fill `scratch.hops` with the lanes from each lane to intersection v."""
     forget(net, roads, scratch)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     found = 0
     for k in range(roads.degree[row]):
         found = aim_for(roads.arms[row, k] ^ 1, scratch.hops, scratch.queue, found)
@@ -189,7 +189,7 @@ def seek_ego(b: int, net: int, traffic: Traffic) -> None:
     v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
     count = 0
     while v >= 0 and count < scratch.chain.shape[0]:
-        row = roads.vert_off[net] + v
+        row = int(roads.vert_off[net]) + v
         best = -1
         for k in range(roads.degree[row]):
             out = roads.arms[row, k]
@@ -219,11 +219,11 @@ def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
     best = -1
     least = 1e300
     for k in range(car.first, car.last):
-        goal = drivers.stage[k]
+        goal: int = drivers.stage[k]
         if goal == labels.at[b, 0] or (goal == car.place and car.last - car.first > 1):
             continue
-        dx = roads.vertex[roads.vert_off[net] + goal].x - state.x[b, 0]
-        dy = roads.vertex[roads.vert_off[net] + goal].y - state.y[b, 0]
+        dx = roads.vertex[int(roads.vert_off[net]) + goal].x - state.x[b, 0]
+        dy = roads.vertex[int(roads.vert_off[net]) + goal].y - state.y[b, 0]
         if dx * dx + dy * dy < least:
             least = dx * dx + dy * dy
             best = goal

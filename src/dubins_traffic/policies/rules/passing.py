@@ -96,7 +96,7 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
-    length = roads.segment[roads.seg_off[net] + (drivers.car[b, n].lane >> 1)].length
+    length = roads.segment[int(roads.seg_off[net]) + (drivers.car[b, n].lane >> 1)].length
     if length + own < vehicle.disc + reach + EDGE:
         return
     if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, vehicle):
@@ -174,7 +174,7 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
     )
     net = drivers.net[b]
     v = lane_end(roads, net, drivers.car[b, n].lane)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     for k in range(roads.degree[row]):
         j = scratch.head[roads.arms[row, k] >> 1]
         while j >= 0:

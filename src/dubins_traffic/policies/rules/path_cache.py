@@ -51,8 +51,8 @@ def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
     row.out = car.next_lane
     degree = roads.degree[roads.vert_off[net] + lane_end(roads, net, car.lane)]
     row.crossing = 1 if degree >= vehicle.degree else 0
-    row.length = roads.segment[roads.seg_off[net] + (car.lane >> 1)].length
-    row.out_length = roads.segment[roads.seg_off[net] + (car.next_lane >> 1)].length
+    row.length = roads.segment[int(roads.seg_off[net]) + (car.lane >> 1)].length
+    row.out_length = roads.segment[int(roads.seg_off[net]) + (car.next_lane >> 1)].length
     mouth, _ = queue_lengths(vehicle)
     row.roomy = 1 if row.out_length - mouth - mouth >= 0.0 else 0
     row.x, row.y = way.x, way.y

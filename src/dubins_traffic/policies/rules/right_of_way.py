@@ -210,7 +210,7 @@ def comes_first(b: int, n: int, j: int, v: int, traffic: Traffic) -> bool:
     lane, net = labels.lane[b, j], drivers.net[b]
     if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
         return False
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     dx = state.x[b, j] - roads.vertex[row].x
     dy = state.y[b, j] - roads.vertex[row].y
     near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON

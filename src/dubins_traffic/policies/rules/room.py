@@ -65,7 +65,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     end = lane_end(roads, net, out)
     crossing = roads.degree[roads.vert_off[net] + start] >= vehicle.degree
     tx, ty = lane_direction(roads, net, out)
-    last = roads.segment[roads.seg_off[net] + (out >> 1)].length - mouth
+    last = roads.segment[int(roads.seg_off[net]) + (out >> 1)].length - mouth
     last = min(last, before_obstacles(b, out, traffic))
     wall = INFINITE
     for look in range(2):
@@ -206,7 +206,7 @@ def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
         if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
             far += 2.0 * vehicle.reach + QUEUE_GAP
         j = scratch.link[j]
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     for k in range(roads.degree[row]):
         j = scratch.head[roads.arms[row, k] >> 1]
         while j >= 0:

@@ -101,13 +101,13 @@ def gather(b: int, n: int, lane: int, x: float, y: float, way: ReferencePath, tr
     if labels.segment[b, n] != lane >> 1:
         count = add_segment(lane >> 1, n, count, scratch)
     to_go = -way_to_go(way, x, y)
-    length = roads.segment[roads.seg_off[net] + (lane >> 1)].length
+    length = roads.segment[int(roads.seg_off[net]) + (lane >> 1)].length
     for end in range(2):
         far = to_go if end == 0 else length - to_go
         if far > disc + (1.0 if end == 0 else 0.8):
             continue
         v = lane_end(roads, net, lane) if end == 0 else lane_start(roads, net, lane)
-        row = roads.vert_off[net] + v
+        row = int(roads.vert_off[net]) + v
         for k in range(roads.degree[row]):
             segment = roads.arms[row, k] >> 1
             if segment != lane >> 1 and segment != labels.segment[b, n]:

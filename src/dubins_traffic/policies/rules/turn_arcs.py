@@ -60,7 +60,7 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
     disc
         R, metres.
     """
-    row = roads.vert_off[net] + lane_end(roads, net, lane)
+    row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
     x = roads.vertex[row].x
     y = roads.vertex[row].y
     tx, ty = lane_direction(roads, net, lane)

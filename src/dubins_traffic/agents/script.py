@@ -1,0 +1,43 @@
+"""Scripts: commands that an e-agent plays, each for some ticks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from dubins_traffic.agents.tables import Agent, Stretch
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.records import Rows
+
+
+@jit
+def play(tick: int, agent: Agent, script: Rows[Stretch]) -> tuple[float, float]:
+    """Return (speed, yaw rate) of a script in a tick."""
+    first = agent.first
+    last = agent.last
+    if first == last:
+        return 0.0, 0.0
+    total = int(script[last - 1].end)
+    if total == 0 or (tick >= total and agent.repeat == 0):
+        return 0.0, 0.0
+    tick = tick % total
+    row = agent.place
+    if row < first or (row > first and script[row - 1].end > tick):
+        row = first
+    while script[row].end <= tick:
+        row += 1
+    agent.place = row
+    return script[row].speed, script[row].yaw_rate
+
+
+def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:
+    """Return (tick at which it ends, speed, yaw rate) of commands given as [seconds, speed, yaw rate].
+
+    A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9).
+    """
+    rows: list[tuple[float, float, float]] = []
+    time = 0.0
+    for seconds, speed, yaw_rate in commands:
+        time += seconds
+        rows.append((float(math.ceil(time * rate - 1e-9)), float(speed), float(yaw_rate)))
+    return rows
