@@ -188,7 +188,7 @@ def navigate(b: int, n: int, tick: int, pose: Numbers, seen: bool, weary: bool, 
     else:
         agent.leg = 1
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    x0, y0, tx, ty, length = frame(roads, net, lane)
     progress = length if agent.leg == 1 else 0.0
     _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
 
@@ -214,20 +214,20 @@ def navigate_arcs(b: int, n: int, tick: int, pose: Numbers, seen: bool, scene: S
     if agent.lane < 0:
         begin_lane(pose, roads, net, agent, scene.agents.cycle, -1)
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+    x0, y0, tx, ty, length = frame(roads, net, lane)
     ahead = length - (x - x0) * tx - (y - y0) * ty
     if agent.leg < 0 and ahead <= 2.0 * (offset + radius):
         agent.leg = choose(b, n, tick, lane, seen, scene)
     coming = agent.leg
     if coming >= 0:
-        _, _, ux, uy, _ = frame(roads.seg[roads.seg_off[net] + (coming >> 1)], coming)
+        _, _, ux, uy, _ = frame(roads, net, coming)
         along = tx * ux + ty * uy
         half = (tx * uy - ty * ux) / (1.0 + along) if along > BACK else 0.0
         if ahead <= radius * abs(half) - offset * half:
             lane = coming
             agent.lane = lane
             agent.leg = -1
-            x0, y0, tx, ty, length = frame(roads.seg[roads.seg_off[net] + (lane >> 1)], lane)
+            x0, y0, tx, ty, length = frame(roads, net, lane)
     progress = (x - x0) * tx + (y - y0) * ty + max(AIM * team.w / 0.3, 2.0 * radius)
     _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
 

@@ -11,22 +11,22 @@ FAR = 1 << 40
 
 
 @jit
-def frame(row: Floats, lane: int) -> tuple[float, float, float, float, float]:
-    """Return (x, y, tx, ty, length): start, unit direction and length of a lane on the road's centre line.
-
-    `row` (SEGMENT_FIELDS,) is the row of the lane's segment in `RoadTable.seg`.
-    """
+def frame(roads: RoadTable, net: int, lane: int) -> tuple[float, float, float, float, float]:
+    """Return (x, y, tx, ty, length): start, unit direction and length of a lane on the road's centre line."""
+    row: int = roads.seg_off[net] + (lane >> 1)
+    own = roads.segment[row]
     if lane & 1:
-        return row[0] + row[4] * row[2], row[1] + row[4] * row[3], -row[2], -row[3], row[4]
-    return row[0], row[1], row[2], row[3], row[4]
+        return own.x + own.length * own.tx, own.y + own.length * own.ty, -own.tx, -own.ty, own.length
+    return own.x, own.y, own.tx, own.ty, own.length
 
 
 @jit
 def lane_at(roads: RoadTable, net: int, x: float, y: float, c: float, s: float) -> int:
     """Return the lane of the nearest segment that leads along the heading (its first-to-second end on ties)."""
     segment, _ = nearest_segment(roads, net, x, y)
-    row = roads.seg[roads.seg_off[net] + segment]
-    return 2 * segment + (0 if c * row[2] + s * row[3] >= 0.0 else 1)
+    row: int = roads.seg_off[net] + segment
+    own = roads.segment[row]
+    return 2 * segment + (0 if c * own.tx + s * own.ty >= 0.0 else 1)
 
 
 @jit
