@@ -242,32 +242,36 @@ def test_what_is_no_car_model_is_refused(spec: str, words: str) -> None:
         run_trial(draw(drawn(spec), SEED, 0), "lanes")
 
 
-def run_to_the_end(instance: Instance) -> None:
-    with Trial(instance) as trial:
-        while trial.ending is None:
-            trial.step((0.5, 0.0))
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("self.period = period", "1 / 0"), "Twin raised ZeroDivisionError.* in begin"),
-        (("return speed, yaw_rate", "1 / 0"), "model of the ego is not fit: clip gave ZeroDivisionError"),
-        (("return speed, yaw_rate", "return speed"), "clip gave 0.5.*2 finite numbers"),
+        (
+            ("return speed, yaw_rate", "1 / 0"),
+            "clip gave ZeroDivisionError: division by zero; expected no exception",
+        ),
+        (("return speed, yaw_rate", "return speed"), "; expected 2 finite numbers"),
         (("(speed, yaw_rate, self.period)", ""), "advance gave 0 arcs"),
-        (("self.period)", "0.5 * self.period)"), "arcs that last 0.0166667 s"),
-        (("(speed, yaw", "(float('nan'), yaw"), "advance gave .nan.*3 finite numbers"),
-        (("return [(", "return 5, [("), "advance gave 5"),
+        (("self.period)", "0.5 * self.period)"), "advance gave arcs that last 0.0166667 s"),
+        (("(speed, yaw", "(float('nan'), yaw"), "advance gave (nan, 0.0, "),
+        (("return [(", "return 5, [("), "advance gave 5; expected 3 finite numbers"),
     ],
 )
-def test_what_a_model_gets_wrong_ends_the_run_by_name(
+def test_what_a_model_gets_wrong_ends_its_trial_by_name(
     change: tuple[str, str], words: str, tmp_path: Path
 ) -> None:
     (tmp_path / "bad.py").write_text(TWIN.replace(*change))
-    trial = draw(drawn(f"{tmp_path / 'bad.py'}:Twin", **{"e-agents": []}), SEED, 0)
-    with pytest.raises(InputError, match=words) as caught:
-        run_to_the_end(trial)
-    assert str(caught.value.value).endswith("bad.py:Twin")
+    spec, record = f"{tmp_path / 'bad.py'}:Twin", tmp_path / "a.mcap"
+    ending = run_trial(draw(drawn(spec, **{"e-agents": []}), SEED, 0), "lanes", record=record).ending
+    assert (ending.end, ending.ticks) == (End.WORLD_LOST, 0)
+    assert f"the model {spec} of the ego is not fit: " in ending.detail
+    assert words in ending.detail
+    assert verify(record).verified
+
+
+def test_a_model_that_raises_in_begin_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "bad.py").write_text(TWIN.replace("self.period = period", "1 / 0"))
+    with pytest.raises(InputError, match="Twin raised ZeroDivisionError: division by zero in begin"):
+        run_trial(draw(drawn(f"{tmp_path / 'bad.py'}:Twin"), SEED, 0), "lanes")
 
 
 def test_parameters_are_those_of_the_class() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from math import sqrt
 from typing import Any
 
@@ -10,11 +11,11 @@ import numpy as np
 
 from dubins_traffic.cars.state import NONE, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import bell
-from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.records import Rows, numbers, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import sincos
 
@@ -51,6 +52,16 @@ class Seen(Tables):
 
     poses: Rows[SeenPose]
     labels: Rows[SeenLabels]
+
+    @cached_property
+    def pose_rows(self) -> Floats:
+        """The poses as an array (N, 6), a view."""
+        return numbers(self.poses, np.float64)
+
+    @cached_property
+    def label_rows(self) -> Ints:
+        """The labels as an array (N, 6), a view."""
+        return numbers(self.labels, np.int64)
 
 
 @record

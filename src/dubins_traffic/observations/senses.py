@@ -92,7 +92,7 @@ class Senses:
             blur(self._view, count, seed, trial, tick, noise.position_noise, noise.heading_noise)
         if self._laser is not None:
             self._sweep(tick, state, self._laser)
-        reals: list[list[float]] = numbers(self._view.poses, np.float64)[:count].tolist()
+        reals: list[list[float]] = self._view.pose_rows[:count].tolist()
         body = self._body
         others = tuple(
             [
@@ -108,7 +108,7 @@ class Senses:
 
     def _labelled(self, count: int) -> list[tuple[str, int, Propositions]]:
         """Return name, index and propositions of the first `count` cars seen, which stay the same for most ticks."""
-        wholes: list[list[int]] = numbers(self._view.labels, np.int64)[:count].tolist()
+        wholes: list[list[int]] = self._view.label_rows[:count].tolist()
         return [(self._names[whole[0]], whole[0], new(Propositions, whole[1:])) for whole in wholes]
 
     def sweep(self, state: State) -> Floats:

@@ -190,7 +190,7 @@ def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, cell: 
     The rectangle lies within the cell of the point, and within the disc in which nothing else can become nearest. It
     is empty outside the box of cells. Where it would be small since roads meet, `cell.segment` is -1 instead: nearest
     is always one of the roads that meet in the vertex. Another vertex may become nearest as long as all are more than
-    `radius` metres away.
+    `radius` (m) away.
     """
     cell.low_x = cell.high_x = cell.low_y = cell.high_y = 0.0
     number = cell_of(t, net, x, y)

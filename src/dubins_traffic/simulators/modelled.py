@@ -21,9 +21,10 @@ from dubins_traffic.cars.motion import CROWDED, Motion, step_part
 from dubins_traffic.cars.partners import Meeting, enlarged
 from dubins_traffic.cars.rows import clip
 from dubins_traffic.cars.state import EGO, Contact
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import ControllerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound
+from dubins_traffic.protocols import End
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -65,8 +66,8 @@ class ModelledCars:
 
         Raises
         ------
-        InputError
-            If a model raises, or answers something else than it must.
+        ControllerError
+            If a model raises, or answers something else than it must: the trial ends as `world_lost`.
         """
         self._take(commands)
         rows: list[list[float]] = commands[0].tolist()
@@ -102,12 +103,12 @@ class ModelledCars:
     def _plan(self, n: int, model: MotionModel, speed: float, yaw_rate: float) -> _Plan:
         arcs: Any = self._answer(n, "advance", lambda: tuple(model.advance(speed, yaw_rate)))
         if not 1 <= len(arcs) <= MOST_ARCS:
-            raise self._refuse(n, "advance", f"{len(arcs)} arcs", f"1 to {MOST_ARCS} arcs")
+            raise self._lost(n, "advance", f"{len(arcs)} arcs", f"1 to {MOST_ARCS} arcs")
         rows = [self._numbers(n, "advance", arc, 3) for arc in arcs]
         ends = np.cumsum([seconds for _, _, seconds in rows])
         if min(seconds for _, _, seconds in rows) < 0.0 or abs(ends[-1] / self._period - 1.0) > ROUNDING:
             expected = f"arcs that last {self._period:.6g} s together, none shorter than 0 s"
-            raise self._refuse(n, "advance", f"arcs that last {ends[-1]:.6g} s", expected)
+            raise self._lost(n, "advance", f"arcs that last {ends[-1]:.6g} s", expected)
         return _Plan(rows, ends.tolist())
 
     def _cuts(self, plans: Sequence[_Plan]) -> list[float]:
@@ -135,7 +136,7 @@ class ModelledCars:
         try:
             return call()
         except Exception as error:
-            raise self._refuse(n, method, outside.plainly(error), "no exception") from error
+            raise self._lost(n, method, outside.plainly(error), "no exception") from error
 
     def _numbers(self, n: int, method: str, row: Any, count: int) -> Any:
         """Return a row of finite numbers."""
@@ -144,12 +145,13 @@ class ModelledCars:
         except (TypeError, ValueError):
             numbers = ()
         if len(numbers) != count or not all(map(math.isfinite, numbers)):
-            raise self._refuse(n, method, repr(row), f"{count} finite numbers")
+            raise self._lost(n, method, repr(row), f"{count} finite numbers")
         return numbers
 
-    def _refuse(self, n: int, method: str, got: str, expected: str) -> InputError:
-        problem = f"the model of {'the ego' if n == EGO else f'car {n}'} is not fit: {method} gave {got}"
-        return InputError(problem, field="car.model", value=self._spec, expected=expected)
+    def _lost(self, n: int, method: str, got: str, expected: str) -> ControllerError:
+        who = "the ego" if n == EGO else f"car {n}"
+        detail = f"the model {self._spec} of {who} is not fit: {method} gave {got}; expected {expected}"
+        return ControllerError(End.WORLD_LOST.value, detail)
 
 
 class _Plan:
