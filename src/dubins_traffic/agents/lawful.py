@@ -14,6 +14,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.kept import KeptPath, coasting
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
     ABSENT,
@@ -23,9 +24,7 @@ from dubins_traffic.policies.rules.tables import (
     ROUND,
     Driver,
     Drivers,
-    KeptPath,
     Traffic,
-    coasting,
     scratch,
     vehicles_of,
 )

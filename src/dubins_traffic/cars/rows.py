@@ -14,7 +14,7 @@ import numpy as np
 from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
@@ -161,3 +161,20 @@ def move_fours(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: F
         y[f], y[g], y[h], y[i] = y0, y1, y2, y3
         c[f], c[g], c[h], c[i] = c0, c1, c2, c3
         s[f], s[g], s[h], s[i] = s0, s1, s2, s3
+
+
+@jit_inline
+def bring(source: Floats, first: int, target: Floats, count: int, places: int) -> None:
+    """Copy `count` (numbers) of `source` (N,), from `first` (number) on, to the beginning of `target` (M,).
+
+    Where a trial has a multiple of TOGETHER `places` (cars), so many are copied at once, beyond `count` if need be: all
+    are read before one is written.
+    """
+    if places % TOGETHER != 0:
+        for k in range(count):
+            target[k] = source[first + k]
+        return
+    for k in range(0, count, TOGETHER):
+        n = first + k
+        one, two, three, four = source[n], source[n + 1], source[n + 2], source[n + 3]
+        target[k], target[k + 1], target[k + 2], target[k + 3] = one, two, three, four

@@ -9,15 +9,14 @@ from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.kept import KeptPath, coasting
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
     ROUND,
     Driver,
     Drivers,
-    KeptPath,
     Scratch,
     Traffic,
-    coasting,
     scratch,
     vehicles_of,
 )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.rows import TOGETHER
+from dubins_traffic.cars.rows import bring
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
@@ -137,37 +137,19 @@ def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> 
     past_x, past_y = memory.trail_x[b, then], memory.trail_y[b, then]
     for first in range(0, places, BLOCK):
         block = memory.kept[b, first // BLOCK]
-        here_x, here_y, then_x, then_y = block.here_x, block.here_y, block.then_x, block.then_y
         last = min(places - first, BLOCK)
-        if places % TOGETHER == 0:
-            for k in range(0, last, TOGETHER):
-                n = first + k
-                copy_together(past_x, n, then_x, k)
-                copy_together(past_y, n, then_y, k)
-                copy_together(x, n, here_x, k)
-                copy_together(y, n, here_y, k)
-                copy_together(x, n, now_x, n)
-                copy_together(y, n, now_y, n)
-            continue
-        for k in range(last):
-            n = first + k
-            then_x[k] = past_x[n]
-            then_y[k] = past_y[n]
-            here_x[k] = now_x[n] = x[n]
-            here_y[k] = now_y[n] = y[n]
+        bring(past_x, first, block.then_x, last, places)
+        bring(past_y, first, block.then_y, last, places)
+        bring(x, first, block.here_x, last, places)
+        bring(y, first, block.here_y, last, places)
+        bring(block.here_x, 0, now_x[first:], last, places)
+        bring(block.here_y, 0, now_y[first:], last, places)
 
 
 @jit_inline
 def growth_row(tick: int, own: TrialRules) -> int:
     """Return the row of `Memory.growth` that holds what was `linger_time` ago, until it holds what is now."""
     return tick % max(own.linger_ticks, 1)
-
-
-@jit_inline
-def copy_together(source: Floats, n: int, target: Floats, k: int) -> None:
-    """Copy TOGETHER numbers at once: all are read before one is written."""
-    first, second, third, fourth = source[n], source[n + 1], source[n + 2], source[n + 3]
-    target[k], target[k + 1], target[k + 2], target[k + 3] = first, second, third, fourth
 
 
 @jit_inline

@@ -13,15 +13,8 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.policies.rules.tables import (
-    ROUND,
-    Driver,
-    Drivers,
-    KeptPath,
-    Traffic,
-    coasting,
-    vehicles_of,
-)
+from dubins_traffic.policies.rules.kept import KeptPath, coasting
+from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.barred import has_place, stands_in_disc
 from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
+from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import has_room, is_clear, is_free, is_open, room_in
-from dubins_traffic.policies.rules.tables import KeptPath, Traffic
+from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import BEFORE
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 
@@ -133,7 +134,10 @@ def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
 
 @jit_inline
 def keeps_exit(b: int, n: int, tick: int, way: KeptPath, traffic: Traffic) -> bool:
-    """Tell whether `find_way_out` certainly leaves a car in its crossing its exit, and does nothing but count."""
+    """Tell whether `find_way_out` certainly leaves a car in its crossing its exit, and does nothing but count.
+
+    `way` (row) is its row of `Drivers.way`.
+    """
     return tick % CHOICES != 0 or is_clear(b, n, way, traffic.labels, traffic.state.count[b])
 
 

@@ -12,11 +12,12 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.rows import TOGETHER
+from dubins_traffic.cars.rows import bring
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.choice import keeps_exit
+from dubins_traffic.policies.rules.kept import NOWHERE, Coasting
 from dubins_traffic.policies.rules.path_cache import kept_way
 from dubins_traffic.policies.rules.right_of_way import (
     GOES_NOW,
@@ -31,10 +32,8 @@ from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, follo
 from dubins_traffic.policies.rules.tables import (
     ALONE,
     LEFT_SIDE,
-    NOWHERE,
     ROLLING,
     ROUND,
-    Coasting,
     Driver,
     Drivers,
     Traffic,
@@ -44,7 +43,6 @@ from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, ReferencePat
 from dubins_traffic.policies.safety import VERGE
 from dubins_traffic.roads.lookup import CERTAIN
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.label_cache import copy_together
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, STOPPED
 
 IF_NOT_BEHIND_EGO = 2.0
@@ -72,19 +70,11 @@ def look_who_coasts(b: int, traffic: Traffic) -> None:
 @jit_inline
 def _bring(b: int, first: int, here: int, state: State, block: Coasting) -> None:
     """Put where the `here` cars from car `first` on are beside what they do."""
-    x, y, c, s = state.x[b], state.y[b], state.c[b], state.s[b]
-    here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
-    if state.x.shape[1] % TOGETHER == 0:
-        for k in range(0, here, TOGETHER):
-            n = first + k
-            copy_together(x, n, here_x, k)
-            copy_together(y, n, here_y, k)
-            copy_together(c, n, here_c, k)
-            copy_together(s, n, here_s, k)
-        return
-    for k in range(here):
-        n = first + k
-        here_x[k], here_y[k], here_c[k], here_s[k] = x[n], y[n], c[n], s[n]
+    places = state.x.shape[1]
+    bring(state.x[b], first, block.here_x, here, places)
+    bring(state.y[b], first, block.here_y, here, places)
+    bring(state.c[b], first, block.here_c, here, places)
+    bring(state.s[b], first, block.here_s, here, places)
 
 
 @jit_inline
@@ -155,7 +145,7 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
 def still_meets_nobody(
     b: int, n: int, bend: float, x: float, y: float, way: ReferencePath, traffic: Traffic
 ) -> bool:
-    """Tell what `meets_nobody` does, of a car on its lane in, or in its arc if its line has a `bend`."""
+    """Tell what `meets_nobody` does, of a car on its lane in, or in its arc if its line has a `bend` (1/m)."""
     if bend == 0.0:
         part, key, left, _, _ = on_lane(way, x, y)
     else:

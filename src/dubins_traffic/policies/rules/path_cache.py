@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import queue_lengths
-from dubins_traffic.policies.rules.tables import Drivers, KeptPath
+from dubins_traffic.policies.rules.tables import Drivers
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, way_between
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable

@@ -26,6 +26,7 @@ from dubins_traffic.policies.rules.command_cache import (
     stop_coasting,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
+from dubins_traffic.policies.rules.lists import NOBODY, enlist, unlist_cars
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing
 from dubins_traffic.policies.rules.path_cache import way_of
@@ -66,10 +67,6 @@ BUMPER = 0.005
 """Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
 DAWDLE = 0.12
 """Speed of a nemesis before the ego, m/s."""
-
-
-NOBODY, SEEN, ALL = range(3)
-"""Who is in the lists of the segments: nobody, all whom the ego sees, all."""
 
 
 @jit
@@ -129,45 +126,6 @@ def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
         return False
     bits = np.int64(labels.bits[b, n])
     return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
-
-
-@jit_inline
-def enlist(b: int, n: int, sight2: float, traffic: Traffic) -> None:
-    """Have those in the lists of the segments by whom car n goes: whom it sees if it is the ego, else all."""
-    scratch = traffic.scratch
-    if n > 0 and scratch.listed[0] == SEEN:
-        unlist_cars(b, traffic)
-        scratch.listed[0] = NOBODY
-    if scratch.listed[0] == NOBODY:
-        hidden = list_cars(b, sight2 if n == 0 else -1.0, traffic)
-        scratch.listed[0] = SEEN if hidden > 0 else ALL
-
-
-@jit_inline
-def list_cars(b: int, sight2: float, traffic: Traffic) -> int:
-    """Enter the cars that the ego sees (all if `sight2` is negative) in the lists of their segments.
-
-    Returns how many it does not see.
-    """
-    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
-    hidden = 0
-    for n in range(state.count[b]):
-        dx = state.x[b, n] - state.x[b, 0]
-        dy = state.y[b, n] - state.y[b, 0]
-        if sight2 >= 0.0 and dx * dx + dy * dy > sight2:
-            hidden += 1
-            continue
-        scratch.link[n] = scratch.head[labels.segment[b, n]]
-        scratch.head[labels.segment[b, n]] = n
-    return hidden
-
-
-@jit_inline
-def unlist_cars(b: int, traffic: Traffic) -> None:
-    """Empty the lists of the segments on which there are cars."""
-    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
-    for n in range(state.count[b]):
-        scratch.head[labels.segment[b, n]] = -1
 
 
 @jit_inline

@@ -11,6 +11,7 @@ from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
 from dubins_traffic.policies.rules.exits import ticks_of
+from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
 from dubins_traffic.policies.rules.tables import (
@@ -21,7 +22,6 @@ from dubins_traffic.policies.rules.tables import (
     TAILGATING,
     Driver,
     Drivers,
-    KeptPath,
     Traffic,
     Vehicle,
 )

@@ -7,9 +7,10 @@ from typing import Any
 
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
-from dubins_traffic.policies.rules.tables import KeptPath, Traffic, Vehicle
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.rules.propositions import LEFT, STANDS
 
@@ -93,7 +94,8 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
 def is_clear(b: int, n: int, way: KeptPath, labels: Labels, count: Any) -> bool:
     """Tell whether a car is certain to have room in its exit, without obstacles: on that road all come the other way.
 
-    `way` is its row of `Drivers.way`. What `has_room` would find with some more work is not looked for.
+    `way` (row) is its row of `Drivers.way`; there are `count` (number) cars. What `has_room` would find with some more
+    work is not looked for.
     """
     if way.roomy == 0:
         return False

@@ -105,7 +105,7 @@ def keep_right(
 
 @jit_inline
 def follows_line(b: int, n: int, left: float, traffic: Traffic) -> bool:
-    """Tell whether a car with nothing close around it, `left` of its line, metres, may just follow that."""
+    """Tell whether a car with nothing close around it, `left` (m) of its line, may just follow that."""
     labels, obstacles, drivers = traffic.labels, traffic.obstacles, traffic.drivers
     car = drivers.car[b, n]
     free = obstacles.off[b] == obstacles.off[b + 1] and car.kind != ROUND
@@ -126,7 +126,7 @@ def follow_line(
     traffic: Traffic,
     commands: Floats,
 ) -> None:
-    """Write the command of a car `left` of its line, metres, whose direction is (px, py) and curvature `bend`, 1/m."""
+    """Write the command of a car `left` (m) of its line, whose direction is (px, py) and curvature `bend` (1/m)."""
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     speed = slowed(speed, bend, vehicle.yaw_most)
     commands[b, n, 0], commands[b, n, 1] = steer(

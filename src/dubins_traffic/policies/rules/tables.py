@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_cars
-from dubins_traffic.kernels.arrays import BLOCK, Floats, Ints
-from dubins_traffic.kernels.columns import columns
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.policies.rules.kept import Coasting, KeptPath
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
@@ -36,9 +36,6 @@ ALONE, UNSURE, CROWDED = range(3)
 """What is known of the cars around one: that they make no difference to it; nothing, but it can be found by looking at
 all of them; nothing.
 """
-
-NOWHERE = 1e9
-"""Metres that no way is long: who would have to be so far along its way to go on as it does, doesn't."""
 
 
 @record
@@ -159,104 +156,6 @@ class Vehicle:
     """How near to a crossing a car takes its place in the order, metres."""
     goal_time: float
     """Within how many seconds every goal has to be free once (E6)."""
-
-
-@record
-class KeptPath:
-    """The reference path of a car, kept from tick to tick, and the labels with which one just drives on.
-
-    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`.
-    """
-
-    lane: int = -1
-    """The lane in; -1: there is no path yet."""
-    out: int = -1
-    """The lane out."""
-    crossing: int = -1
-    """1 if there is a crossing between them."""
-    roomy: int = -1
-    """1 if the lane out is long enough for a car that has left the disc."""
-    coast_chooses: int = -1
-    """1 if it is in its crossing, where it may have to take another exit."""
-    coast_lane: int = -1
-    """The lane of its lane state."""
-    coast_crosses: int = -1
-    """The disc that its body meets."""
-    coast_waits: int = -1
-    """1 if it waits at its line, and stays where it is."""
-    coast_stopped: int = -1
-    """STOPPED if it has, else 0."""
-    coast_x: float = -1.0
-    coast_y: float = -1.0
-    """Where it waits."""
-    length: float = -1.0
-    """Of the lane in, metres."""
-    out_length: float = -1.0
-    """Of the lane out, metres."""
-    x: float = -1.0
-    y: float = -1.0
-    tx: float = -1.0
-    ty: float = -1.0
-    ux: float = -1.0
-    uy: float = -1.0
-    cx: float = -1.0
-    cy: float = -1.0
-    radius: float = -1.0
-    side: float = -1.0
-    middle: float = -1.0
-    bend: float = -1.0
-
-
-@columns(BLOCK)
-class Coasting:
-    """Of BLOCK cars, number by number: where a car just drives on as it did, and the command with which it does.
-
-    The loop over the cars of `policies.rules.command_cache.look_who_coasts` reads and writes these columns several cars
-    at once. The path is that of `policies.rules.turn_arcs.ReferencePath`.
-    """
-
-    low: Floats
-    high: Floats
-    """Where a car drives on so: between these two metres along the lane in, from the arc's centre; nowhere at first."""
-    past: Floats
-    """And along the lane out up to here."""
-    minds: Floats
-    """Along the lane in, from here on an e-agent drives on so only while the ego is not ahead in its lane."""
-    astray: Floats
-    """Up to how many metres left of its line it does."""
-    speed: Floats
-    """Its speed, m/s."""
-    bend: Floats
-    """The curvature of its line, 1/m."""
-    x: Floats
-    y: Floats
-    tx: Floats
-    ty: Floats
-    ux: Floats
-    uy: Floats
-    cx: Floats
-    cy: Floats
-    radius: Floats
-    side: Floats
-    middle: Floats
-    """Its path."""
-    here_x: Floats
-    here_y: Floats
-    here_c: Floats
-    here_s: Floats
-    """Where it is in this frame."""
-    holds: Floats
-    """Whether it just drives on, as far as its pose says: 0, 1, or `command_cache.IF_NOT_BEHIND_EGO`."""
-    now: Floats
-    yaw_rate: Floats
-    """Its command in this tick, m/s and rad/s, if it does."""
-
-
-def coasting(trials: int, cars: int) -> Rows[Coasting]:
-    """Return `Drivers.coasting` of cars of which none drives yet, (trials, blocks of cars)."""
-    rows = table(Coasting, (trials, -(-cars // BLOCK)))
-    rows["low"] = NOWHERE
-    return rows
 
 
 class Drivers(Tables):

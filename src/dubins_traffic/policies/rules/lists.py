@@ -1,0 +1,51 @@
+"""The cars of a trial by the segments they are on, for those who look around (compiled)."""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.policies.rules.tables import Traffic
+
+NOBODY, SEEN, ALL = range(3)
+"""Who is in the lists of the segments: nobody, all whom the ego sees, all."""
+
+
+@jit_inline
+def enlist(b: int, n: int, sight2: float, traffic: Traffic) -> None:
+    """Have those in the lists of the segments by whom car n goes: whom it sees if it is the ego, else all.
+
+    `sight2` (m^2) is the square of how far the ego sees, negative if that is everywhere.
+    """
+    scratch = traffic.scratch
+    if n > 0 and scratch.listed[0] == SEEN:
+        unlist_cars(b, traffic)
+        scratch.listed[0] = NOBODY
+    if scratch.listed[0] == NOBODY:
+        hidden = list_cars(b, sight2 if n == 0 else -1.0, traffic)
+        scratch.listed[0] = SEEN if hidden > 0 else ALL
+
+
+@jit_inline
+def list_cars(b: int, sight2: float, traffic: Traffic) -> int:
+    """Enter the cars that the ego sees, by `sight2` (m^2; all if negative), in the lists of their segments.
+
+    Returns how many it does not see.
+    """
+    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
+    hidden = 0
+    for n in range(state.count[b]):
+        dx = state.x[b, n] - state.x[b, 0]
+        dy = state.y[b, n] - state.y[b, 0]
+        if sight2 >= 0.0 and dx * dx + dy * dy > sight2:
+            hidden += 1
+            continue
+        scratch.link[n] = scratch.head[labels.segment[b, n]]
+        scratch.head[labels.segment[b, n]] = n
+    return hidden
+
+
+@jit_inline
+def unlist_cars(b: int, traffic: Traffic) -> None:
+    """Empty the lists of the segments on which there are cars."""
+    state, labels, scratch = traffic.state, traffic.labels, traffic.scratch
+    for n in range(state.count[b]):
+        scratch.head[labels.segment[b, n]] = -1
