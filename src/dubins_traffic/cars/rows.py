@@ -164,17 +164,10 @@ def move_fours(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: F
 
 
 @jit_inline
-def bring(source: Floats, first: int, target: Floats, count: int, places: int) -> None:
-    """Copy `count` (numbers) of `source` (N,), from `first` (number) on, to the beginning of `target` (M,).
+def copy_together(source: Floats, n: int, target: Floats, k: int) -> None:
+    """Copy TOGETHER numbers of `source` (N,), from number n on, to `target` (M,), from number `k` (number) on.
 
-    Where a trial has a multiple of TOGETHER `places` (cars), so many are copied at once, beyond `count` if need be: all
-    are read before one is written.
+    All are read before one is written, which is one instruction each.
     """
-    if places % TOGETHER != 0:
-        for k in range(count):
-            target[k] = source[first + k]
-        return
-    for k in range(0, count, TOGETHER):
-        n = first + k
-        one, two, three, four = source[n], source[n + 1], source[n + 2], source[n + 3]
-        target[k], target[k + 1], target[k + 2], target[k + 3] = one, two, three, four
+    one, two, three, four = source[n], source[n + 1], source[n + 2], source[n + 3]
+    target[k], target[k + 1], target[k + 2], target[k + 3] = one, two, three, four

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.rows import bring
+from dubins_traffic.cars.rows import TOGETHER, copy_together
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
@@ -137,13 +137,24 @@ def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> 
     past_x, past_y = memory.trail_x[b, then], memory.trail_y[b, then]
     for first in range(0, places, BLOCK):
         block = memory.kept[b, first // BLOCK]
+        here_x, here_y, then_x, then_y = block.here_x, block.here_y, block.then_x, block.then_y
         last = min(places - first, BLOCK)
-        bring(past_x, first, block.then_x, last, places)
-        bring(past_y, first, block.then_y, last, places)
-        bring(x, first, block.here_x, last, places)
-        bring(y, first, block.here_y, last, places)
-        bring(block.here_x, 0, now_x[first:], last, places)
-        bring(block.here_y, 0, now_y[first:], last, places)
+        if places % TOGETHER == 0:
+            for k in range(0, last, TOGETHER):
+                n = first + k
+                copy_together(past_x, n, then_x, k)
+                copy_together(past_y, n, then_y, k)
+                copy_together(x, n, here_x, k)
+                copy_together(y, n, here_y, k)
+                copy_together(x, n, now_x, n)
+                copy_together(y, n, now_y, n)
+            continue
+        for k in range(last):
+            n = first + k
+            then_x[k] = past_x[n]
+            then_y[k] = past_y[n]
+            here_x[k] = now_x[n] = x[n]
+            here_y[k] = now_y[n] = y[n]
 
 
 @jit_inline

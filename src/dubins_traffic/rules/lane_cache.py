@@ -19,11 +19,11 @@ def keep_road(
     block: Kept, n: int, lane: int, segment: int, vertex: int, lateral: float, outside: float, t: RoadTable,
     own: TrialRules,
 ) -> bool:  # fmt: skip
-    """Keep the vertex of car n of a `block` (columns), its segment, where along it and beside it labels are the same.
+    """Keep the vertex of car n of a `block` (columns), its segment, and where along and beside it labels are the same.
 
-    `lateral` is its lateral offset in `lane` (-1: none), metres; its labels are not the same within
-    `outside` (m) of the end of that. Progress is measured as `roads.lookup.lane_coordinates` does. Tells whether the car
-    is on the road, or off it, in all these places as it is now; if not, that is not known.
+    `lateral` is its lateral offset in `lane` (-1: none), metres; its labels are not the same within `outside` (m) of
+    the end of that. Progress is measured as `roads.lookup.lane_coordinates` does. Tells whether the car is on the road,
+    or off it, in all these places as it is now; if not, that is not known.
     """
     k = n & (BLOCK - 1)
     net = own.net

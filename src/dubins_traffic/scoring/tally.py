@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.near import ticks_within
-from dubins_traffic.cars.rows import bring
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.compile import jit, jit_inline
@@ -57,9 +56,9 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
         spare = _count_goals(b, tick, x, y, roads, tally)
         spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
         own.again = tick + ticks_within(spare - ROUNDING, spacing, b)
-    places = state.x.shape[1]
-    bring(state.x[b], 0, tally.before_x[b], state.count[b], places)
-    bring(state.y[b], 0, tally.before_y[b], state.count[b], places)
+    for n in range(state.count[b]):
+        tally.before_x[b, n] = state.x[b, n]
+        tally.before_y[b, n] = state.y[b, n]
 
 
 @jit_inline

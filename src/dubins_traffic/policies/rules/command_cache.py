@@ -12,7 +12,7 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.rows import bring
+from dubins_traffic.cars.rows import TOGETHER, copy_together
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
@@ -70,11 +70,19 @@ def look_who_coasts(b: int, traffic: Traffic) -> None:
 @jit_inline
 def _bring(b: int, first: int, here: int, state: State, block: Coasting) -> None:
     """Put where the `here` cars from car `first` on are beside what they do."""
-    places = state.x.shape[1]
-    bring(state.x[b], first, block.here_x, here, places)
-    bring(state.y[b], first, block.here_y, here, places)
-    bring(state.c[b], first, block.here_c, here, places)
-    bring(state.s[b], first, block.here_s, here, places)
+    x, y, c, s = state.x[b], state.y[b], state.c[b], state.s[b]
+    here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
+    if state.x.shape[1] % TOGETHER == 0:
+        for k in range(0, here, TOGETHER):
+            n = first + k
+            copy_together(x, n, here_x, k)
+            copy_together(y, n, here_y, k)
+            copy_together(c, n, here_c, k)
+            copy_together(s, n, here_s, k)
+        return
+    for k in range(here):
+        n = first + k
+        here_x[k], here_y[k], here_c[k], here_s[k] = x[n], y[n], c[n], s[n]
 
 
 @jit_inline
