@@ -128,13 +128,15 @@ def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]
                 return str(there / Path(place).relative_to(inside))
         return place
 
-    package = seen("/own/dubins_traffic")
-    steps = [
-        *steps,
-        "mkdir -p /run/dubins-traffic/own",
-        f"ln -s {package} /run/dubins-traffic/own/dubins_traffic",
-    ]
-    folders = ["/run/dubins-traffic/own", *(seen(path) for path in paths if path != "/own")]
+    package = Path(seen("/own/dubins_traffic"))
+    if package.name != "dubins_traffic":
+        steps = [
+            *steps,
+            f"mkdir {package.parent}/own",
+            f"ln -s {package} {package.parent}/own/dubins_traffic",
+        ]
+        package = package.parent / "own" / "dubins_traffic"
+    folders = [str(package.parent), *(seen(path) for path in paths if path != "/own")]
     environment = {
         "PATH": os.environ["PATH"],
         "PYTHONPATH": ":".join(folders),

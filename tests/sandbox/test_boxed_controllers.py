@@ -95,6 +95,26 @@ def test_a_decision_may_take_longer_while_the_bank_lasts(tmp_path: Path) -> None
     assert 3 <= beyond.ending.ticks <= 6
 
 
+def test_what_a_controller_could_do_in_the_judges_process_it_can_not_do_from_a_box(tmp_path: Path) -> None:
+    """In process one of these read the instance's seed through `gc`, and another replaced `Scorer.result`."""
+    body = """
+import gc
+if seen.tick == 0:
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.scoring.score import Scorer
+    print([each.seed for each in gc.get_objects() if isinstance(each, Instance)])
+    Scorer.result = lambda self, **more: 1 / 0
+class Lying(float):
+    def __repr__(self): return 'os.system'
+return Lying(0.25), True
+"""
+    result, controller = driven(written(tmp_path, body))
+    assert controller.log_tail == "[]"
+    plain, _ = driven(written(tmp_path, "return 0.25, 1.0", "plain.py"))
+    assert result.ending.end is End.DURATION, result.ending
+    assert result.score.asdict() == {**plain.score.asdict(), "record": result.score.asdict().get("record")}
+
+
 def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
     program = tmp_path / "drive"
     program.write_text(

@@ -184,7 +184,10 @@ class Box:
         if not data and self._prints:
             self._poll.unregister(self._processes.printed)
             self._prints = False
+        stood = self._printed.stands
         self._printed.add(data)
+        if self._printed.stands and not stood:
+            self._processes.note()
         if self._judges and self._printed.count > self._limits.output:
             raise self.fault(End.OUTPUT_FLOOD, f"it printed more than {self._limits.output} bytes")
 
