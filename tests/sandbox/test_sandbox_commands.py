@@ -34,11 +34,11 @@ sys.stdin.read()
 def test_run_and_batch_score_alike_in_boxes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     controller = written(tmp_path, GOOD)
     words = ["demo", "--controller", controller, "--trials", "2", "--json"]
-    scores: list[list[float]] = []
+    scores: list[list[object]] = []
     for command in (["run", *words], ["run", *words, "--sandbox"], ["batch", *words, "--sandbox"]):
         assert main(command) == 0
         trials = json.loads(capsys.readouterr().out)["trials"]
-        scores.append([each["paper"] for each in trials])
+        scores.append([[each["goals"], each["collisions"], each["distance_m"]] for each in trials])
         assert [each["end"] for each in trials] == ["duration", "duration"]
     assert scores[0] == scores[1] == scores[2]
 
@@ -68,8 +68,8 @@ def test_a_campaign_in_boxes(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     pytest.importorskip("pyarrow")
     spec = written(tmp_path, GOOD)
     (tmp_path / "c.toml").write_text(
-        f'version = 0\nseed = 3\ntrials = 2\ncontrollers = ["{spec}", "{written(tmp_path, BROKEN, "bad.py")}"]\n'
-        '[[configurations]]\nfile = "demo"\n'
+        f'version = 0\nname = "small"\nseed = 3\ntrials = 2\nconfigurations = ["demo"]\nfactors.duration = [1.0]\n'
+        f'controllers = ["{spec}", "{written(tmp_path, BROKEN, "bad.py")}"]\n'
     )
     words = ["campaign", "run", str(tmp_path / "c.toml"), "-o", str(tmp_path / "out"), "--workers", "1"]
     assert main([*words, "--sandbox"]) == 1
