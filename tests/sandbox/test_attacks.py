@@ -51,6 +51,21 @@ def test_all_attacks_are_stopped_as_an_ordinary_user() -> None:
 
 
 @needs_boxes
+@as_root
+def test_a_controller_drives_in_a_box_of_an_ordinary_user_as_in_process(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ["run", "demo", "--controller", "simple", "--trials", "2", "--json"]
+    done = as_user(USER, ["-m", "dubins_traffic.cli", *words, "--sandbox"])
+    assert done.returncode == 0, done.stderr
+    assert main(words) == 0
+    here = json.loads(capsys.readouterr().out)["trials"]
+    for trial, own in zip(json.loads(done.stdout)["trials"], here, strict=True):
+        assert trial["controller"] == "simple+sandbox"
+        assert (trial["goals"], trial["distance_m"]) == (own["goals"], own["distance_m"])
+
+
+@needs_boxes
 @pytest.mark.parametrize("attack", [each for each in ATTACKS if each.alone], ids=lambda own: own.name)
 def test_an_attack_gets_through_once_its_layers_are_taken_away(attack: Attack) -> None:
     """So the suite notices when a layer is gone: what stops an attack is what is said to stop it."""

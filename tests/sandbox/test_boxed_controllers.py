@@ -170,3 +170,13 @@ def test_a_campaign_can_tell_who_answers_for_every_end() -> None:
     from dubins_traffic.sandbox import owner_of
 
     assert {json.dumps(owner_of(end)) for end in End} == {'"platform"', '"submission"'}
+
+
+def test_what_closing_does_in_a_box_is_told_as_in_process(tmp_path: Path) -> None:
+    spec = written(tmp_path, "return 0.1, 0.0")
+    with (tmp_path / "mine.py").open("a") as file:
+        file.write("    def close(self): raise ValueError('not yet')\n")
+    result, _ = driven(spec)
+    assert result.ending.end is End.DURATION
+    assert "close raised" in result.ending.detail
+    assert "ValueError: not yet" in result.ending.detail

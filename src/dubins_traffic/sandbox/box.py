@@ -20,6 +20,8 @@ LOOK: Final = 0.02
 """Seconds between two looks at the clocks while an answer is waited for."""
 SLACK: Final = 5.0
 """So many times its processor time an answer may take before the rest counts as sleep."""
+FAREWELL: Final = 30.0
+"""Seconds that a program is waited for that has been told that its trial is over."""
 GRACE: Final = 10.0
 """Seconds within which a program that has closed its output ends."""
 
@@ -63,7 +65,7 @@ class Box:
         self._limits, self._judges = limits, JUDGE in layers
         self.bank = limits.bank_seconds
         self.over: BoxEnd | None = None
-        self._allowed = limits.start_seconds
+        self._allowed, self._patience = limits.start_seconds, limits.wall_seconds
         self._spent = self._began = self._waited = 0.0
         self._said = bytearray()
         self._printed, self._prints = Printed(), True
@@ -109,6 +111,11 @@ class Box:
     def decide(self) -> None:
         """From here on an answer may take the processor time of a decision, not that of the start."""
         self._allowed = self._limits.decision_seconds
+
+    def part(self) -> None:
+        """From here on an answer is waited for as long as one waits to say goodbye."""
+        spent = self.seconds()
+        self._patience = min(self._patience, self._waited - SLACK * spent + FAREWELL)
 
     def seconds(self) -> float:
         """Return the processor time that the box has used so far."""
@@ -209,7 +216,7 @@ class Box:
         if spent - self._spent > self._allowed + self.bank:
             raise self._out_of_time()
         waited = self._waited + monotonic() - self._began
-        if waited - SLACK * spent > self._limits.wall_seconds:
+        if waited - SLACK * spent > self._patience:
             detail = f"no answer: {waited:.0f} s waited for, {spent:.1f} s of processor time used"
             raise self.fault(End.PEER_SILENT, detail)
         if self._processes.out_of_memory():

@@ -27,6 +27,8 @@ USER: Final = 1000
 FIRST_USER: Final = 0x20000000
 """Boxes that root begins have users of their own from here on, who own nothing and have no name."""
 OPEN_FILES: Final = 256
+STAGE: Final = 1 << 30
+"""Bytes of a submission's folder at most, where root has to copy it."""
 DEVICES: Final = ("null", "zero", "full", "random", "urandom")
 SETTINGS: Final = ("ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives")
 """What is seen of /etc: what the dynamic linker needs."""
@@ -129,7 +131,7 @@ def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
         return found, []
     folders = [place for each, place in hidden if not each.own and Path(each.source).is_dir()]
     files = [place for each, place in hidden if not each.own and not Path(each.source).is_dir()]
-    steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev box {stage}"]
+    steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev,size={STAGE} box {stage}"]
     steps += [f"mkdir {' '.join(folders)}"] if folders else []
     steps += [f": >{place}" for place in files]
     for each, place in hidden:
