@@ -6,11 +6,13 @@ import json
 import os
 import shlex
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+import dubins_traffic
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.sandbox import Layers, available_layers, boxed_controller
@@ -116,6 +118,26 @@ def test_a_machine_that_can_not_hold_a_program_refuses_it(
         assert json.loads(capsys.readouterr().out)["trials"][0]["end"] == "duration"
     finally:
         available_layers.cache_clear()
+
+
+@needs_boxes
+@as_root
+def test_a_kernel_that_forbids_namespaces_is_told_of_in_one_line() -> None:
+    """In a user namespace of its own, of which the kernel forbids more."""
+    check = shlex.join([sys.executable, "-m", "dubins_traffic.cli", "sandbox", "check"])
+    forbid = "echo 0 >/proc/sys/user/max_user_namespaces"
+    done = subprocess.run(
+        ["unshare", "--user", "--map-root-user", "--", "/bin/sh", "-c", f"{forbid} && exec {check}"],
+        env={**os.environ, "PYTHONPATH": str(Path(dubins_traffic.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("dubins-traffic: --sandbox: bubblewrap makes no boxes here: ")
+    assert "--trust-submissions" in line
 
 
 @pytest.mark.skipif(not MISSING, reason="boxes can be made here")

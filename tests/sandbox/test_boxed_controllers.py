@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import stat
+import subprocess
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -138,6 +140,30 @@ def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
     (folder / "controller.toml").write_text('program = ["./drive"]\n')
     result, _ = driven(str(folder))
     assert result.ending.end is End.DURATION
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
+def test_a_program_in_cpp_with_threads_drives(tmp_path: Path) -> None:
+    source = tmp_path / "drive.cc"
+    source.write_text(
+        textwrap.dedent("""\
+        #include <iostream>
+        #include <string>
+        #include <thread>
+        int main() {
+            std::string line;
+            for (int tick = 0; std::getline(std::cin, line);) {
+                if (line.rfind("{\\"frame\\"", 0) != 0) continue;
+                double speed = 0.0;
+                std::thread([&] { speed = 0.25; }).join();
+                std::cout << "{\\"command\\": [" << speed << ", 0], \\"tick\\": " << tick++ << "}" << std::endl;
+            }
+        }
+        """)
+    )
+    subprocess.run(["g++", "-pthread", source, "-o", tmp_path / "drive"], check=True, timeout=300)
+    result, controller = driven(f"program:{tmp_path / 'drive'}")
+    assert result.ending.end is End.DURATION, controller.end
 
 
 def test_a_folder_with_a_manifest_may_import_its_neighbours(tmp_path: Path) -> None:
