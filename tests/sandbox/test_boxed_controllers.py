@@ -206,3 +206,11 @@ def test_what_closing_does_in_a_box_is_told_as_in_process(tmp_path: Path) -> Non
     assert result.ending.end is End.DURATION
     assert "close raised" in result.ending.detail
     assert "ValueError: not yet" in result.ending.detail
+
+
+def test_what_a_controller_makes_that_answers_at_once_is_looked_at_too(tmp_path: Path) -> None:
+    body = "for k in range(200): open(f'/tmp/{seen.tick}-{k}', 'w').close()\nreturn 0.1, 0.0"
+    result, controller = driven(written(tmp_path, body), Limits(files=1 << 20), ticks=3000)
+    assert result.ending.end is End.OUT_OF_MEMORY
+    assert "more than 1024 files" in result.ending.detail
+    assert controller.end is not None

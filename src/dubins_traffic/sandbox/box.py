@@ -18,6 +18,8 @@ from dubins_traffic.transports.answers import LONGEST
 
 LOOK: Final = 0.02
 """Seconds between two looks at the clocks while an answer is waited for."""
+SELDOM: Final = 0.1
+"""Seconds between two looks at memory and files of a program that answers at once."""
 SLACK: Final = 5.0
 """So many times its processor time an answer may take before the rest counts as sleep."""
 FAREWELL: Final = 30.0
@@ -66,7 +68,7 @@ class Box:
         self.bank = limits.bank_seconds
         self.over: BoxEnd | None = None
         self._allowed, self._patience = limits.start_seconds, limits.wall_seconds
-        self._spent = self._began = self._waited = 0.0
+        self._spent = self._began = self._waited = self._looked = 0.0
         self._said = bytearray()
         self._printed, self._prints = Printed(), True
         try:
@@ -203,13 +205,16 @@ class Box:
         spent = self._processes.seconds()
         self._waited += monotonic() - self._began
         used, self._spent = spent - self._spent, spent
+        if monotonic() - self._looked > SELDOM:
+            self._watch()
         if used > self._allowed and self._judges:
             self.bank -= used - self._allowed
             if self.bank < 0.0:
                 raise self._out_of_time()
 
     def _watch(self) -> None:
-        """End what uses more than it may while an answer is waited for."""
+        """End what uses more than it may: while an answer is waited for, and now and then."""
+        self._looked = monotonic()
         if not self._judges:
             return
         spent = self.seconds()
@@ -221,6 +226,9 @@ class Box:
             raise self.fault(End.PEER_SILENT, detail)
         if self._processes.out_of_memory():
             raise self._out_of_memory()
+        if self._processes.files() > self._limits.most_files:
+            detail = f"more than {self._limits.most_files} files"
+            raise self.fault(End.OUT_OF_MEMORY, detail)
 
     def _out_of_time(self) -> BoxOverError:
         limits = self._limits

@@ -63,6 +63,7 @@ class Processes:
         for each in own:
             os.set_blocking(each, False)
         self._others: list[int] = []
+        self._first = 0
         self._clocks = ProcessClocks(self._process.pid)
 
     def _begin(self, program: Program) -> None:
@@ -103,6 +104,16 @@ class Processes:
             return self._group.out_of_memory()
         return self._clocks.memory > self._limits.memory
 
+    def files(self) -> int:
+        """Return how many files the box has of its own, 0 where that can't be seen."""
+        if not self._first:
+            return 0
+        try:
+            found = os.statvfs(f"/proc/{self._first}/root/tmp")
+        except OSError:
+            return 0
+        return found.f_files - found.f_ffree
+
     def status(self, seconds: float) -> str | None:
         """Return how the first process ended, None if it does not within some `seconds`."""
         for first in _opened([self._process.pid]):
@@ -120,7 +131,8 @@ class Processes:
     def note(self) -> None:
         """Note the first process of the box itself, with whose end that of all others is waited for."""
         if self._layers.boxes and not self._others:
-            self._others = _opened(children(self._process.pid))
+            found = children(self._process.pid)
+            self._others, self._first = _opened(found), next(iter(found), 0)
 
     def _kill(self) -> None:
         """Kill the first process, and with it the box."""
