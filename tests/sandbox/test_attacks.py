@@ -7,7 +7,9 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -153,8 +155,21 @@ def test_layers_are_named() -> None:
     assert {name for attack in ATTACKS for name in attack.layers} <= set(NAMES)
 
 
+@contextmanager
+def open_folder() -> Generator[Path]:
+    """Yield a folder that every user can read, as those of pytest are not."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
 def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run this interpreter as another user, who sees it and its packages in places that all can read."""
+    with open_folder() as folder:
+        return _as_user(user, words, folder)
+
+
+def _as_user(user: int, words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     name, shown, paths = interpreter()
     places, steps = staged(shown)
     where = {Path(own.place): Path(there.source) for own, there in zip(shown, places, strict=True)}
@@ -165,15 +180,8 @@ def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]
                 return str(there / Path(place).relative_to(inside))
         return place
 
-    package = Path(seen("/own/dubins_traffic"))
-    if package.name != "dubins_traffic":
-        steps = [
-            *steps,
-            f"mkdir {package.parent}/own",
-            f"ln -s {package} {package.parent}/own/dubins_traffic",
-        ]
-        package = package.parent / "own" / "dubins_traffic"
-    folders = [str(package.parent), *(seen(path) for path in paths if path != "/own")]
+    (folder / "dubins_traffic").symlink_to(seen("/own/dubins_traffic"))
+    folders = [str(folder), *(seen(path) for path in paths if path != "/own")]
     environment = {
         "PATH": os.environ["PATH"],
         "PYTHONPATH": ":".join(folders),

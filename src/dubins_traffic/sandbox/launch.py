@@ -123,24 +123,30 @@ def _entered(command: Sequence[str], doors: Sequence[str], steps: Sequence[str])
 
 
 def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
-    """Return what is shown from places that everybody can read, and the steps of a shell that put it there."""
+    """Return what is shown from places that everybody can read, and the steps of a shell that put it there.
+
+    Folders are bound, and the rest is copied: what a submission's owner can read, a box need not be able to.
+    """
     stage = _stage()
-    found = [each if _is_open(each) else Shown(f"{stage}/{k}", each.place) for k, each in enumerate(shown)]
-    hidden = [(each, there.source) for each, there in zip(shown, found, strict=True) if each is not there]
-    if not hidden:
-        return found, []
-    folders = [place for each, place in hidden if not each.own and Path(each.source).is_dir()]
-    files = [place for each, place in hidden if not each.own and not Path(each.source).is_dir()]
-    steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev,size={STAGE} box {stage}"]
-    steps += [f"mkdir {' '.join(folders)}"] if folders else []
-    steps += [f": >{place}" for place in files]
-    for each, place in hidden:
+    found: list[Shown] = []
+    binds: list[str] = []
+    copies: list[str] = []
+    for number, each in enumerate(shown):
+        if _is_open(each):
+            found.append(each)
+            continue
         source = shlex.quote(each.source)
-        if each.own:
-            steps += [f"cp -R -P -- {source} {place}", f"chmod -R a+rX {place}"]
+        if each.own or not Path(each.source).is_dir():
+            place = f"{stage}/copies/{number}"
+            copies += [f"cp -R -P -- {source} {place}", f"chmod -R a+rX {place}"]
         else:
-            steps += [f"mount --bind {source} {place}"]
-    return found, steps
+            place = f"{stage}/{number}"
+            Path(place).mkdir(mode=0o755, exist_ok=True)
+            binds.append(f"mount --bind {source} {place}")
+        found.append(Shown(place, each.place))
+    if copies:
+        copies.insert(0, f"mount -t tmpfs -o mode=755,nosuid,nodev,size={STAGE} box {stage}/copies")
+    return found, binds + copies
 
 
 def _is_open(shown: Shown) -> bool:
@@ -158,13 +164,15 @@ def _is_open(shown: Shown) -> bool:
 
 @cache
 def _stage() -> str:
-    """Return an empty folder over which a box's own mount lies, in namespaces of its own."""
-    fixed = Path("/run/dubins-traffic")
+    """Return a folder with empty ones, over which a box's own mounts lie, in namespaces of their own."""
+    place = "/run/dubins-traffic"
     try:
-        fixed.mkdir(mode=0o755, exist_ok=True)
+        Path(place).mkdir(mode=0o755, exist_ok=True)
     except OSError:
-        return tempfile.mkdtemp(prefix="dubins-traffic-")
-    return str(fixed)
+        place = tempfile.mkdtemp(prefix="dubins-traffic-")
+        Path(place).chmod(0o755)
+    (Path(place) / "copies").mkdir(mode=0o755, exist_ok=True)
+    return place
 
 
 def _bubblewrap(
