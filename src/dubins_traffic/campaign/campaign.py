@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
@@ -133,8 +133,15 @@ class Campaign:
         return Chunk(number, cell.settled, cell.seed, place, trial, 1, deadline, self.metrics)
 
 
-def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -> Campaign:
     """Return the campaign in the TOML file at `path`.
+
+    Parameters
+    ----------
+    path : path
+        A campaign file.
+    sandbox : str, optional
+        What each controller may use in a box (`controllers.registry.sandboxed`); by default as the file names them.
 
     Raises
     ------
@@ -148,6 +155,12 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
         raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
     except ValueError as error:
         raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
+    specs: Any = document.get("controllers")
+    if sandbox is not None and isinstance(specs, list):
+        named = cast("list[Any]", specs)
+        document["controllers"] = [
+            controllers.sandboxed(spec, sandbox) if isinstance(spec, str) else spec for spec in named
+        ]
     return Campaign.from_document(document, name, Path(name).parent)
 
 

@@ -69,6 +69,9 @@ def batch(
     overwrite: options.Overwrite = False,
     append: options.Append = False,
     shield: options.Shield = False,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
@@ -76,7 +79,7 @@ def batch(
 
     Ctrl-C keeps the scores of all finished trials.
     """
-    from dubins_traffic.controllers.registry import shielded
+    from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.engine.batch import run_batch
     from dubins_traffic.problem.configuration import load_config
 
@@ -85,7 +88,7 @@ def batch(
     run = partial(
         run_batch,
         drawn,
-        shielded(controller) if shield else controller,
+        dressed(controller, shield=shield, sandbox=options.boxes(sandbox, limits, trust)),
         trials=trials,
         seed=seed,
         batch=together,

@@ -21,6 +21,7 @@ EXAMPLES = options.examples(
     "run out/trial-0003.mcap --controller simple --json",
     "run town --controller lanes --shield",
     "run demo --simulator gazebo --records out",
+    "run demo --controller theirs.py:Driver --sandbox --limits memory=512M",
 )
 
 ControllerOption = Annotated[
@@ -89,6 +90,9 @@ def run(
     simulator: SimulatorOption = None,
     gui: GuiOption = False,
     shield: options.Shield = False,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
@@ -111,6 +115,7 @@ def run(
         simulator=simulator,
         show=gui,
         shield=shield,
+        sandbox=options.boxes(sandbox, limits, trust),
         metrics=metric or (),
     )
     if todo.before:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from typing import Any, Final, cast
 
 from dubins_traffic import outside
@@ -30,6 +31,10 @@ BUILT_IN: Final = {
     ),
 }
 """Class and description of each controller that comes with the package, by the name of its module."""
+SANDBOXED: Final = "+sandbox"
+"""What ends the name of a controller that drives in a box (`dubins_traffic.sandbox`), before that of a shield; behind
+it there may be limits, as in ``my.py:Mine+sandbox,memory=512M``."""
+SANDBOX: Final = re.compile(re.escape(SANDBOXED) + r"(?P<limits>(?:,[\w=.+-]*)*)$")
 _SEAM = Seam(
     "--controller",
     "controller",
@@ -42,6 +47,10 @@ _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
 def load(spec: str) -> Controller:
     """Return a new controller, as `controllers.registry.load` does for names that end in no shield."""
+    boxed = SANDBOX.search(spec)
+    if boxed is not None:
+        module = importlib.import_module("dubins_traffic.sandbox.controller")
+        return cast(Controller, module.named(spec[: boxed.start()], boxed["limits"].lstrip(",")))
     if spec in BUILT_IN:
         return cast(Controller, getattr(_module(spec), BUILT_IN[spec][0])())
     if spec.endswith(".mcap"):

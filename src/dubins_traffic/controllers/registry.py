@@ -73,7 +73,7 @@ def load(spec: str) -> Controller:
         directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
         strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`. Followed by
         ``+shield``: the same under the shield; by ``+shield:law`` or ``+shield:never`` under one that overtakes
-        otherwise (`controllers.shield.Shield`).
+        otherwise (`controllers.shield.Shield`). Followed by ``+sandbox``: the same in a box (`dubins_traffic.sandbox`).
 
     Raises
     ------
@@ -95,6 +95,29 @@ def is_shielded(spec: str) -> bool:
 def shielded(spec: str) -> str:
     """Return the name of a controller under the shield."""
     return spec if is_shielded(spec) else spec + SHIELDED
+
+
+def sandboxed(spec: str, limits: str = "") -> str:
+    """Return the name of a controller in a box, which is inside its shield if it has one.
+
+    Parameters
+    ----------
+    spec : str
+        Its name.
+    limits : str
+        What it may use, as ``memory=512M,bank_seconds=10``.
+    """
+    shield = _SHIELD.search(spec)
+    bare, ending = (spec, "") if shield is None else (spec[: shield.start()], shield[0])
+    if named.SANDBOX.search(bare) is None:
+        bare += named.SANDBOXED + (f",{limits}" if limits else "")
+    return bare + ending
+
+
+def dressed(spec: str, *, shield: bool = False, sandbox: str | None = None) -> str:
+    """Return the name of a controller in a box unless `sandbox` is None, and under the shield if `shield`."""
+    boxed = spec if sandbox is None else sandboxed(spec, sandbox)
+    return shielded(boxed) if shield else boxed
 
 
 def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:

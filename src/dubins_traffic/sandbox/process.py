@@ -1,0 +1,214 @@
+"""The processes of a box: begun, counted, and killed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+from collections.abc import Generator, Sequence
+from typing import Final
+
+from dubins_traffic.sandbox import cgroups, seccomp
+from dubins_traffic.sandbox.clocks import ProcessClocks, children
+from dubins_traffic.sandbox.launch import Program, command_line, outside
+from dubins_traffic.sandbox.layers import CLOCK, ENVIRONMENT, MEMORY, PROCESSES, SECCOMP, Layers
+from dubins_traffic.sandbox.limits import Limits
+
+GRACE: Final = 10.0
+"""Seconds within which processes that have been killed are gone."""
+
+
+class Processes:
+    """The processes of a box, in their control group if there is one.
+
+    Parameters
+    ----------
+    program : Program
+        What runs in the box.
+    limits : Limits
+        What it may use.
+    layers : Layers
+        The layers of the box.
+    prints : bool
+        Whether what is printed goes where this process prints.
+
+    Attributes
+    ----------
+    questions, answers, printed : int
+        Descriptors of the program's standard input, output and error; none of them blocks. `printed` is -1 if what is
+        printed goes elsewhere.
+
+    Raises
+    ------
+    OSError
+        If they can't be begun; then nothing is left behind.
+    """
+
+    def __init__(self, program: Program, limits: Limits, layers: Layers, *, prints: bool = False) -> None:
+        self._errors = None if prints else subprocess.PIPE
+        self._limits, self._layers = limits, layers
+        where = _groups(layers)
+        self._group = cgroups.Group(where, limits) if where else None
+        try:
+            self._begin(program)
+        except BaseException:
+            if self._group is not None:
+                self._group.close()
+            raise
+        self._streams = [self._process.stdin, self._process.stdout, self._process.stderr]
+        own = [stream.fileno() for stream in self._streams if stream is not None]
+        self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
+        for each in own:
+            os.set_blocking(each, False)
+        self._others: list[int] = []
+        self._first = 0
+        self._clocks = ProcessClocks(self._process.pid)
+
+    def _begin(self, program: Program) -> None:
+        group = self._group
+        self._timed = group if CLOCK in self._layers and group is not None and group.has_clock else None
+        rules = seccomp.program(counts_children=self._timed is None) if SECCOMP in self._layers else b""
+        doors = () if group is None else group.doors
+        with _piped(rules) as source:
+            line = command_line(
+                program,
+                self._limits,
+                self._layers,
+                doors=doors,
+                seccomp=source,
+                told=self._errors is not None,
+            )
+            self._process = subprocess.Popen(
+                line,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                pass_fds=() if source < 0 else (source,),
+                env=_environment(program, self._layers),
+                cwd="/",
+                start_new_session=True,
+                bufsize=0,
+            )
+
+    def seconds(self, *, now: bool = False) -> float:
+        """Return the processor time so far; by the clocks of the processes as of the last look, unless `now`."""
+        if self._timed is not None:
+            return self._timed.seconds()
+        return self._clocks.seconds(now=now)
+
+    def out_of_memory(self) -> bool:
+        """Tell whether they have been stopped, or are to be stopped, for the memory that they use."""
+        if self._group is not None and MEMORY in self._layers:
+            return self._group.out_of_memory()
+        return self._clocks.memory > self._limits.memory
+
+    def files(self) -> int:
+        """Return how many files the box has of its own, 0 where that can't be seen."""
+        if not self._first:
+            return 0
+        try:
+            found = os.statvfs(f"/proc/{self._first}/root/tmp")
+        except OSError:
+            return 0
+        return found.f_files - found.f_ffree
+
+    def status(self, seconds: float) -> str | None:
+        """Return how the first process ended, None if it does not within some `seconds`."""
+        for first in _opened([self._process.pid]):
+            ended = _ends(first, seconds)
+            os.close(first)
+            if not ended:
+                return None
+        status = self._process.wait()
+        number = -status if status < 0 else status - 128
+        try:
+            return f"signal {signal.Signals(number).name}" if number > 0 else f"status {status}"
+        except ValueError:
+            return f"status {status}"
+
+    def note(self) -> None:
+        """Note the first process of the box itself, with whose end that of all others is waited for."""
+        if self._layers.boxes and not self._others:
+            found = children(self._process.pid)
+            self._others, self._first = _opened(found), next(iter(found), 0)
+
+    def _kill(self) -> None:
+        """Kill the first process, and with it the box."""
+        self.note()
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def close(self) -> None:
+        """Kill them all and leave nothing behind. May be called twice."""
+        if self._process.returncode is None:
+            self._kill()
+        while self._others:
+            _see_off(self._others.pop())
+        for stream in filter(None, self._streams):
+            stream.close()
+        if self._group is not None:
+            self._group.close()
+            self._group = self._timed = None
+
+
+def _opened(processes: Sequence[int]) -> list[int]:
+    """Return descriptors of processes that are there."""
+    found: list[int] = []
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            found.append(os.pidfd_open(process))
+    return found
+
+
+def _see_off(process: int) -> None:
+    """Kill the process of a descriptor, wait until it has gone, and close the descriptor.
+
+    The first process of a process namespace goes last.
+    """
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        signal.pidfd_send_signal(process, signal.SIGKILL)
+    _ends(process, GRACE)
+    os.close(process)
+
+
+def _ends(process: int, seconds: float) -> bool:
+    """Wait for the end of the process of a descriptor; return whether it came."""
+    waiting = select.poll()
+    waiting.register(process, select.POLLIN)
+    return bool(waiting.poll(seconds * 1000.0))
+
+
+def _groups(layers: Layers) -> cgroups.Trees:
+    """Return where a box's groups are, of the controllers that are wanted."""
+    where = cgroups.trees()
+    wanted = {"memory": MEMORY in layers, "pids": PROCESSES in layers, "cpuacct": CLOCK in layers}
+    return cgroups.Trees(where.version, {name: each for name, each in where.folders.items() if wanted[name]})
+
+
+def _environment(program: Program, layers: Layers) -> dict[str, str]:
+    own = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
+    if layers.boxes:
+        return own
+    more = {name: outside(program, value) for name, value in program.environment.items()}
+    return own | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
+
+
+@contextlib.contextmanager
+def _piped(data: bytes) -> Generator[int]:
+    """Yield a descriptor from which `data` is read once; -1 if there is none.
+
+    Each start has a descriptor of its own: one that has been read would have to be rewound, and two starts share it.
+    """
+    if not data:
+        yield -1
+        return
+    read, write = os.pipe()
+    try:
+        os.write(write, data)
+        os.close(write)
+        yield read
+    finally:
+        os.close(read)
