@@ -17,7 +17,8 @@ from dubins_traffic.competition.submission import check_submission, load_submiss
 from dubins_traffic.errors import InputError
 
 CONTROLLER = b"class Controller:\n    pass\n"
-PROGRAM = b'run = ["./drive", "--fast"]\nabout = "fast"\n'
+PROGRAM = b'program = ["./drive", "--fast"]\n'
+ALONE = b'python = "controller.py:Controller"\n'
 
 
 def archive(files: Mapping[str, bytes], modes: Mapping[str, int] | None = None) -> bytes:
@@ -50,9 +51,9 @@ def test_a_file_a_folder_and_an_archive_of_the_same_are_the_same(tmp_path: Path)
     folder = put(tmp_path / "entry", {**files, "__pycache__/x.pyc": b"1", ".git/config": b"2"})
     store = tmp_path / "store"
     found = check_submission(folder, store)
-    assert (found.kind, found.controller) == ("python", "controller.py:Controller")
+    assert found.kind == "python"
     assert found.path == store / found.digest
-    assert stored(found.path) == files
+    assert stored(found.path) == {**files, "controller.toml": ALONE}
     (tmp_path / "entry.zip").write_bytes(archive(files))
     assert check_submission(tmp_path / "entry.zip", store) == found
     assert (
@@ -62,21 +63,21 @@ def test_a_file_a_folder_and_an_archive_of_the_same_are_the_same(tmp_path: Path)
     assert load_submission(store, found.digest) == found
     assert [path.name for path in store.iterdir()] == [found.digest]
     alone = check_submission(folder / "controller.py", store)
-    assert stored(alone.path) == {"controller.py": CONTROLLER}
+    assert stored(alone.path) == {"controller.py": CONTROLLER, "controller.toml": ALONE}
     assert check_submission(CONTROLLER, store) == alone
 
 
 def test_programs_are_told_by_their_manifest_or_their_first_bytes(tmp_path: Path) -> None:
-    found = check_submission(archive({"drive": b"#!/bin/sh\n", "submission.toml": PROGRAM}), tmp_path)
-    assert (found.kind, found.run, found.about) == ("program", ("./drive", "--fast"), "fast")
+    found = check_submission(archive({"drive": b"#!/bin/sh\n", "controller.toml": PROGRAM}), tmp_path)
+    assert found.kind == "program"
     assert os.access(found.path / "drive", os.X_OK)
-    assert not os.access(found.path / "submission.toml", os.X_OK)
+    assert not os.access(found.path / "controller.toml", os.X_OK)
     script = check_submission(b"#!/usr/bin/python3\n", tmp_path)
-    assert script.run == ("./program",)
+    assert (script.path / "controller.toml").read_bytes() == b'program = ["./program"]\n'
     assert os.access(script.path / "program", os.X_OK)
-    own = b'controller = "pkg/mine.py:Mine"\n'
-    package = check_submission(archive({"pkg/mine.py": CONTROLLER, "submission.toml": own}), tmp_path)
-    assert package.controller == "pkg/mine.py:Mine"
+    own = b'python = "pkg/mine.py:Mine"\n'
+    package = check_submission(archive({"pkg/mine.py": CONTROLLER, "controller.toml": own}), tmp_path)
+    assert package.kind == "python"
 
 
 BAD_NAMES = [
@@ -174,14 +175,16 @@ def test_damaged_and_unusual_archives_are_refused(tmp_path: Path) -> None:
         ({"controller.py": b"x = 1"}, "no class Controller"),
         ({"controller.py": b"\xff Controller"}, "not UTF-8"),
         ({"controller.py": b"Controller\0"}, "not text"),
-        ({"submission.toml": b"run = ["}, "not TOML"),
-        ({"submission.toml": b"a = " + b"[" * 9000}, "not TOML"),
-        ({"submission.toml": b""}, "either controller or run"),
-        ({"submission.toml": b'run = ["a"]\ncontroller = "a.py:A"'}, "either controller or run"),
-        ({"submission.toml": b'controller = "a.py:A"'}, "no such file"),
-        ({"submission.toml": b'controller = "../a.py:A"', "a.py": b""}, "no such file"),
-        ({"submission.toml": b"run = [1]"}, "a text"),
-        ({"submission.toml": PROGRAM + b"limits = 3"}, "unknown key"),
+        ({"controller.toml": b"program = ["}, "not TOML"),
+        ({"controller.toml": b"a = " + b"[" * 9000}, "not TOML"),
+        ({"controller.toml": b""}, "either python or program"),
+        ({"controller.toml": b'program = ["a"]\npython = "a.py:A"'}, "either python or program"),
+        ({"controller.toml": b'python = "a.py:A"'}, "no such file"),
+        ({"controller.toml": b'python = "../a.py:A"', "a.py": b""}, "no such file"),
+        ({"controller.toml": b"program = [1]"}, "a text"),
+        ({"controller.toml": PROGRAM + b"limits = 3"}, "unknown key"),
+        ({"controller.toml": b'program = ["./drive"]'}, "no such file"),
+        ({"controller.toml": b'program = ["/bin/sh"]'}, "no such file"),
         ({"controller.py": CONTROLLER, "CONTROLLER.py": b""}, "by case alone"),
         ({"controller.py": CONTROLLER, "a": b"", "a/b": b""}, "a folder that is a file"),
     ],

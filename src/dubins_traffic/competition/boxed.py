@@ -32,4 +32,4 @@ class _InProcess:
 
 def boxed(submission: Submission, limits: Limits, *, trust: bool = False) -> Boxed:  # noqa: ARG001
     """Return the controller of a submission for one trial, within its limits."""
-    return _InProcess(f"{submission.path}/{submission.controller}")
+    return _InProcess(f"{submission.path}/controller.py:Controller")

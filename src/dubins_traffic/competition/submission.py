@@ -18,7 +18,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_bytes
 from dubins_traffic.problem.faults import Strict, fault, parse
 
-MANIFEST = "submission.toml"
+MANIFEST = "controller.toml"
 CONTROLLER = "controller.py"
 CLASS = "Controller"
 PROGRAM = "program"
@@ -32,21 +32,19 @@ Kind = Literal["python", "program"]
 
 
 class Manifest(Strict):
-    """What `submission.toml` may say."""
+    """What `controller.toml` may say, as the boxes of controllers read it."""
 
-    version: Annotated[int, Field(ge=0, le=0)] = Field(default=0, description="0")
-    controller: Annotated[str, Field(pattern=r"^[\w./-]+\.py:[A-Za-z_]\w*$", max_length=200)] | None = Field(
+    python: Annotated[str, Field(pattern=r"^[\w./-]+\.py:[A-Za-z_]\w*$", max_length=200)] | None = Field(
         default=None, description="the class of a controller in Python, as `my/controller.py:Mine`"
     )
-    run: Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1)] | None = (
-        Field(default=None, description="a program that speaks lines, and its arguments")
-    )
-    about: str = Field(default="", max_length=2000, description="a text for people")
+    program: (
+        Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1)] | None
+    ) = Field(default=None, description="a program that speaks lines, as `./drive`, and its arguments")
 
     @model_validator(mode="after")
     def _one(self) -> Manifest:
-        if (self.controller is None) == (self.run is None):
-            raise fault("not one thing to run", "either controller or run")
+        if (self.python is None) == (self.program is None):
+            raise fault("not one thing to run", "either python or program")
         return self
 
 
@@ -62,20 +60,11 @@ class Submission:
         ``python``: a class that our shim drives; ``program``: anything else, which speaks lines.
     path : Path
         The folder in which it is stored.
-    controller : str or None
-        Of ``python``: ``file.py:Class``, the file below `path`.
-    run : tuple of str
-        Of ``program``: what is run in `path`, with its arguments.
-    about : str
-        What it says of itself.
     """
 
     digest: str
     kind: Kind
     path: Path
-    controller: str | None = None
-    run: tuple[str, ...] = ()
-    about: str = ""
 
 
 def check_submission(
@@ -101,13 +90,14 @@ def check_submission(
     name = "upload" if isinstance(source, bytes) else os.fspath(source)
     try:
         files = without_folder(_files(source, bounds), frozenset({MANIFEST, CONTROLLER}))
+        _complete(files)
         manifest = _manifest(files)
     except InputError as error:
         raise error.within(file=name) from None
     digest = content_digest(files)
     path = Path(store) / digest
     if not path.is_dir():
-        _store(files, _program_of(manifest, files), path)
+        _store(files, _program_of(manifest), path)
     return _submission(digest, path, manifest)
 
 
@@ -135,8 +125,7 @@ def content_digest(files: dict[str, bytes]) -> str:
 
 
 def _submission(digest: str, path: Path, manifest: Manifest) -> Submission:
-    kind: Kind = "program" if manifest.run else "python"
-    return Submission(digest, kind, path, manifest.controller, tuple(manifest.run or ()), manifest.about)
+    return Submission(digest, "program" if manifest.program else "python", path)
 
 
 def _files(source: str | os.PathLike[str] | bytes, bounds: Bounds) -> dict[str, bytes]:
@@ -153,27 +142,36 @@ def _files(source: str | os.PathLike[str] | bytes, bounds: Bounds) -> dict[str, 
     if suffix == ".zip":
         raise InputError("not a zip archive", expected="a zip archive")
     if data.startswith((b"\x7fELF", b"#!")):
-        return {PROGRAM: data, MANIFEST: f'run = ["./{PROGRAM}"]\n'.encode()}
+        return {PROGRAM: data, MANIFEST: f'program = ["./{PROGRAM}"]\n'.encode()}
     return {CONTROLLER: data}
 
 
+def _complete(files: dict[str, bytes]) -> None:
+    """Add the manifest that a `controller.py` alone would have; InputError if there is nothing to run."""
+    if MANIFEST in files:
+        return
+    if CONTROLLER not in files:
+        raise InputError("nothing to run", value=sorted(files)[:10], expected=_EXPECTED)
+    if not _NAMED.search(files[CONTROLLER]):
+        raise InputError(f"no class {CLASS}", field=CONTROLLER, expected=_EXPECTED)
+    files[MANIFEST] = f'python = "{CONTROLLER}:{CLASS}"\n'.encode()
+
+
 def _manifest(files: dict[str, bytes]) -> Manifest:
-    """Return the manifest of a submission, or the one that it would have for its `controller.py`."""
-    if MANIFEST not in files:
-        if CONTROLLER not in files:
-            raise InputError("nothing to run", value=sorted(files)[:10], expected=_EXPECTED)
-        manifest = Manifest(controller=f"{CONTROLLER}:{CLASS}")
-        if not _NAMED.search(files[CONTROLLER]):
-            raise InputError(f"no class {CLASS}", field=CONTROLLER, expected=_EXPECTED)
-    else:
-        manifest = parse(Manifest, _toml(files[MANIFEST]), field=MANIFEST)
-    if manifest.controller is not None:
-        place = manifest.controller.rpartition(":")[0]
+    """Return the manifest of a submission, having looked at the file that it names."""
+    manifest = parse(Manifest, _toml(files[MANIFEST]), field=MANIFEST)
+    if manifest.python is not None:
+        place = manifest.python.rpartition(":")[0]
         if place not in files:
             raise InputError(
-                "no such file", field=f"{MANIFEST}.controller", value=place, expected="one in the submission"
+                "no such file", field=f"{MANIFEST}.python", value=place, expected="one in the submission"
             )
         _check_source(place, files[place])
+    program = _program_of(manifest)
+    if program is not None and program not in files:
+        raise InputError(
+            "no such file", field=f"{MANIFEST}.program", value=program, expected="one in the submission"
+        )
     return manifest
 
 
@@ -200,10 +198,10 @@ def _check_source(name: str, data: bytes) -> None:
         raise InputError("not text", field=name, expected="Python")
 
 
-def _program_of(manifest: Manifest, files: dict[str, bytes]) -> str | None:
-    """Return the file of the submission that is to be executable."""
-    name = (manifest.run or [""])[0].removeprefix("./")
-    return name if name in files else None
+def _program_of(manifest: Manifest) -> str | None:
+    """Return the file of the submission that is to be executable; a word without a slash is a program elsewhere."""
+    first = (manifest.program or [""])[0]
+    return first.removeprefix("./") if "/" in first else None
 
 
 def _store(files: dict[str, bytes], program: str | None, path: Path) -> None:
