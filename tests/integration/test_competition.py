@@ -17,12 +17,14 @@ import pytest
 
 from dubins_traffic.competition.competition import Competition, load_competition
 from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evaluation
+from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.ranking import rank
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.errors import InputError
+from dubins_traffic.runs.single import run_trial
 from dubins_traffic import load_record
-from tests.competitions import CONTROLLERS, PRACTICE, ROAD, competition
+from tests.competitions import CONTROLLERS, IDLE, PRACTICE, ROAD, competition
 
 ROOT = Path(__file__).parents[2]
 SHORT = {**ROAD, "duration": 6}
@@ -47,19 +49,30 @@ def command(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) -> None:
-    phase, submission = short(24).phase("practice"), entry("homes", tmp_path / "store")
+    phase, submission = short(40).phase("practice"), entry("speaks_lines", tmp_path / "store")
     first = evaluate(phase, submission, tmp_path / "one")
-    second = evaluate(phase, submission, tmp_path / "two", workers=2)
+    evaluate(phase, submission, tmp_path / "two", workers=2)
     assert (tmp_path / "one" / RESULTS).read_bytes() == (tmp_path / "two" / RESULTS).read_bytes()
-    assert first == second
     order = list(phase.numbers)
     random.Random(1).shuffle(order)
     assert told(list(judge(phase, order, submission))) == told(first.results)
-    assert len({own.frames for own in first.results}) == 24
+    assert len({own.frames for own in first.results}) == 40
+    assert {own.end for own in first.results} == {"duration"}
+
+
+def test_the_box_changes_no_frame(tmp_path: Path) -> None:
+    phase, submission = short(3).phase("practice"), entry("homes", tmp_path / "store")
+    boxed = list(judge(phase, phase.numbers, submission))
+    for own, seed in zip(boxed, phase.seeds(), strict=True):
+        digest = FramesHash()
+        controller = f"{submission.path}/controller.py:Controller"
+        run_trial(phase.instance(own.number, seed), controller, sinks=(digest,))
+        assert own.frames == digest.result()
+        assert "goals" in own.log
 
 
 def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
-    phase, submission = short(4).phase("practice"), entry("homes", tmp_path / "store")
+    phase, submission = short(4).phase("practice"), entry("speaks_lines", tmp_path / "store")
     whole = evaluate(phase, submission, tmp_path / "out")
     lines = (tmp_path / "out" / RESULTS).read_text().splitlines()
     changed = lines[1].replace('"log":"', '"log":"kept ')
@@ -70,13 +83,13 @@ def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
     assert [own.frames for own in again.results] == [own.frames for own in whole.results]
     assert again.results[0].log.startswith("kept ")
     with pytest.raises(InputError, match="holds another evaluation"):
-        evaluate(phase, entry("stands", tmp_path / "store"), tmp_path / "out")
+        evaluate(phase, entry("homes", tmp_path / "store"), tmp_path / "out")
     with pytest.raises(InputError, match="holds another evaluation"):
         evaluate(short(5).phase("practice"), submission, tmp_path / "out")
 
 
 def test_records_hold_what_was_judged(tmp_path: Path) -> None:
-    phase, submission = short(2).phase("practice"), entry("homes", tmp_path / "store")
+    phase, submission = short(2).phase("practice"), entry("speaks_lines", tmp_path / "store")
     found = evaluate(phase, submission, tmp_path / "out", records=True)
     for own in found.results:
         record = load_record(tmp_path / "out" / "records" / f"trial-{own.number:06d}.mcap")
@@ -85,20 +98,13 @@ def test_records_hold_what_was_judged(tmp_path: Path) -> None:
 
 
 def test_entries_that_do_not_drive_rank_last(tmp_path: Path) -> None:
-    found = competition(phases={"practice": {**PRACTICE, "trials": 4}})
-    phase = found.phase("practice")
-    entries = {
-        name: list(judge(phase, phase.numbers, entry(name, tmp_path)))
-        for name in CONTROLLERS
-        if name != "homes"
-    }
+    phase = competition(phases={"practice": {**PRACTICE, "trials": 2}}).phase("practice")
+    entries = {name: list(judge(phase, phase.numbers, entry(name, tmp_path))) for name in ("rules", *IDLE)}
     places = rank(entries, phase)
     assert places[0].entry == "rules"
     assert places[0].estimate.mean is not None
     assert places[0].estimate.mean > 0
-    assert {own.entry: own.place for own in places[1:]} == dict.fromkeys(
-        ["circles", "crashes", "gives_up", "never_starts", "stands"], 2
-    )
+    assert {own.entry: own.place for own in places[1:]} == dict.fromkeys(IDLE, 2)
     ends = {name: {own.end for own in results} for name, results in entries.items()}
     owners = {name: {own.owner for own in results} for name, results in entries.items()}
     assert ends["crashes"] == ends["never_starts"] == {"controller_fault"}
@@ -154,15 +160,17 @@ def test_a_season_on_the_command_line(tmp_path: Path) -> None:
     )
     assert places[0]["place"] == 1
     assert {own["entry"] for own in places} == {"ours", "second"}
-    assert "can't be told" in ours("competition", "rank", "spring", "--phase", "test", "results/ours")
+    assert "counted_rounds of 2 trials" in ours(
+        "competition", "rank", "spring", "--phase", "test", "results/ours"
+    )
 
 
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
-    (tmp_path / "controller.py").write_text(CONTROLLERS["rules"])
+    (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
     file = tmp_path / "spring" / "competition.toml"
-    file.write_text(file.read_text().replace("trials = 4", "trials = 40"))
-    line = ["evaluate", "controller.py", "--competition", "spring", "-o", "out", "--workers", "2"]
+    file.write_text(file.read_text().replace("trials = 4", "trials = 200"))
+    line = ["evaluate", "entry", "--competition", "spring", "-o", "out", "--workers", "2"]
     results = tmp_path / "out" / RESULTS
     with subprocess.Popen(
         [sys.executable, "-m", "dubins_traffic.cli", *line],
@@ -179,9 +187,9 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)
         _, stderr = process.communicate(timeout=300)
     assert process.returncode == 1
-    assert "of 40 trials are kept, the same command goes on" in stderr
+    assert "of 200 trials are kept, the same command goes on" in stderr
     kept = len(load_evaluation(tmp_path / "out").results)
-    assert 3 <= kept < 40
+    assert 3 <= kept < 200
 
 
 @pytest.mark.parametrize("name", ["python", "cpp", "competition"])
