@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,10 +19,10 @@ from dubins_traffic.campaign.rows import RESULT, WALL
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import is_file, read_text
+from dubins_traffic.files import is_file
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.faults import parse
-from dubins_traffic.problem.files import plain
+from dubins_traffic.problem.files import plain, read_toml
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Column
@@ -142,12 +141,7 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
         If there is no such file or something in it is wrong.
     """
     name = os.fspath(path)
-    try:
-        document = tomllib.loads(read_text(name))
-    except RecursionError:
-        raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
-    except ValueError as error:
-        raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
+    document = read_toml(name, "a campaign file, TOML")
     return Campaign.from_document(document, name, Path(name).parent)
 
 

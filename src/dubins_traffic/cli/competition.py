@@ -67,7 +67,7 @@ def check(file: File) -> None:
     found = load_competition(file)
     print(f"{found.title}: {found.ranking.metric}, ties by {found.ranking.ties}")
     for phase in found.phases:
-        print(f"  {phase.name}: {_told(phase)}")
+        print(f"  {phase.name}: {_phase_line(phase)}")
 
 
 @competition.command("seal", epilog=SEAL_EXAMPLES)
@@ -186,7 +186,7 @@ def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
     return checked_key(text.encode())
 
 
-def _told(phase: Phase) -> str:
+def _phase_line(phase: Phase) -> str:
     """Return a phase in a line."""
     names = ", ".join(own.name for own in phase.configurations)
     parts = [f"{len(phase.numbers)} trials of {names}", f"shows {phase.shows}"]
