@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import shown
 
 if TYPE_CHECKING:
     from dubins_traffic.competition.competition import Phase
@@ -61,11 +62,13 @@ def new(
 
 @competition.command("check", epilog=CHECK_EXAMPLES)
 def check(file: File) -> None:
-    """Check a competition file, and say what its phases are."""
+    """Check a competition file, draw a trial of each configuration, and say what its phases are."""
     from dubins_traffic.competition.competition import load_competition
 
     found = load_competition(file)
-    print(f"{found.title}: {found.ranking.metric}, ties by {found.ranking.ties}")
+    for phase in found.phases:
+        phase.check_draws()
+    print(f"{shown(found.title)}: {found.ranking.metric}, ties by {found.ranking.ties}")
     for phase in found.phases:
         print(f"  {phase.name}: {_phase_line(phase)}")
 
@@ -162,11 +165,13 @@ def rank(
     """Rank entries by their results in the same trials, with intervals, and say which places are ties."""
     from dubins_traffic.competition.evaluating import load_entries
     from dubins_traffic.competition.ranking import rank as ranked
+    from dubins_traffic.competition.ranking import ranking_document
 
     own = _phase(file, phase)
-    places = ranked(load_entries(entries, own), own)
+    found = load_entries(entries, own)
+    places = ranked(found, own)
     if json:
-        print(json_text.dumps([place.to_json() for place in places], indent=2))
+        print(json_text.dumps(ranking_document(found, own), indent=2))
     else:
         _show(places, own)
 

@@ -15,6 +15,7 @@ from typing import Protocol
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
+from dubins_traffic.problem.instance import Instance
 
 HEADING = "dubins-traffic seeds 1"
 _SALT = re.compile(r"[0-9a-f]{64}")
@@ -53,6 +54,10 @@ class Seeded(Protocol):
     @property
     def closes(self) -> datetime | None:
         """When it is over."""
+        ...
+
+    def instance(self, number: int, seed: int) -> Instance:
+        """Return what a trial is drawn to be from its seed; InputError if it can't be drawn."""
         ...
 
     def is_closed(self, now: datetime | None = None) -> bool:

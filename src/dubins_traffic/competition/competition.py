@@ -152,6 +152,15 @@ class Phase:
             )
         return self.configurations[number // self.model.trials], number % self.model.trials
 
+    def check_draws(self) -> None:
+        """Draw the first trial of each configuration; InputError if one can't be drawn."""
+        for number in self.numbers[:: self.model.trials]:
+            try:
+                self.instance(number, 0 if self.secret else self.seeds()[number])
+            except InputError as error:
+                named, _ = self.place(number)
+                raise error.within(field=f"phases.{self.name}: {named.name}") from None
+
     def instance(self, number: int, seed: int) -> Instance:
         """Return what trial `number` is drawn to be from its seed."""
         named, trial = self.place(number)

@@ -8,6 +8,7 @@ is published when the phase opens, and ``published/PHASE.seeds.txt`` what is rev
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import secrets
@@ -27,6 +28,8 @@ from dubins_traffic.problem.files import dumps, parse_json
 
 COST = 1 << 15
 """N of scrypt: 32 MiB and some tenths of a second for each guess (r = 8, p = 1)."""
+MOST_DRAWS = 20
+"""So many seeds are tried for a trial that can't always be drawn, such as one of many cars on few roads."""
 _BLOCK, _LANES = 8, 1
 _MEMORY = 1 << 26
 
@@ -73,9 +76,26 @@ def revealed_path(phase: Seeded) -> Path:
 
 
 def draw_seeds(phase: Seeded) -> Seeds:
-    """Return new seeds for a phase, from the system's source of secrets."""
-    seeds = tuple(secrets.randbits(64) for _ in phase.numbers)
+    """Return new seeds for a phase, from the system's source of secrets, from which all its trials can be drawn.
+
+    Raises
+    ------
+    InputError
+        If a trial can't be drawn from any of `MOST_DRAWS` seeds.
+    """
+    seeds = tuple(_drawable(phase, number) for number in phase.numbers)
     return Seeds(phase.name, phase.rules, secrets.token_hex(32), seeds)
+
+
+def _drawable(phase: Seeded, number: int) -> int:
+    for _ in range(MOST_DRAWS - 1):
+        seed = secrets.randbits(64)
+        with contextlib.suppress(InputError):
+            phase.instance(number, seed)
+            return seed
+    seed = secrets.randbits(64)
+    phase.instance(number, seed)
+    return seed
 
 
 def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bool = False) -> str:
