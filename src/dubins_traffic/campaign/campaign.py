@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
@@ -132,8 +132,15 @@ class Campaign:
         return Chunk(number, cell.settled, cell.seed, place, trial, 1, deadline, self.metrics)
 
 
-def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -> Campaign:
     """Return the campaign in the TOML file at `path`.
+
+    Parameters
+    ----------
+    path : path
+        A campaign file.
+    sandbox : str, optional
+        What each controller may use in a box (`controllers.registry.sandboxed`); by default as the file names them.
 
     Raises
     ------
@@ -142,6 +149,12 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
     """
     name = os.fspath(path)
     document = read_toml(name, "a campaign file, TOML")
+    specs: Any = document.get("controllers")
+    if sandbox is not None and isinstance(specs, list):
+        named = cast("list[Any]", specs)
+        document["controllers"] = [
+            controllers.sandboxed(spec, sandbox) if isinstance(spec, str) else spec for spec in named
+        ]
     return Campaign.from_document(document, name, Path(name).parent)
 
 
