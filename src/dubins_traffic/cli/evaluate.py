@@ -101,20 +101,23 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
 
     from dubins_traffic.competition.visibility import summary, tail
 
+    several = len(phase.configurations) > 1
     table = Table(title=f"{phase.name}, submission {done.submission[:12]}")
-    for heading in ("trial", "configuration", "end", "rounds", "counted", "verdict", "collisions", "fault"):
+    where = ("configuration",) if several else ()
+    for heading in ("trial", *where, "end", "rounds", "counted", "verdict", "collisions", "fault"):
         table.add_column(heading, justify="right" if heading in ("trial", "rounds", "counted") else "left")
     for own in done.results:
-        named, _ = phase.place(own.number)
+        place = (phase.place(own.number)[0].name,) if several else ()
         cells = [own.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
         texts = ["" if cell is None else str(cell) for cell in cells]
-        table.add_row(str(own.number), named.name, own.end, *texts, own.owner or "")
+        table.add_row(str(own.number), *place, own.end, *texts, own.owner or "")
     console = Console(highlight=False, markup=False)
     console.print(table)
     faulty = [own for own in done.results if own.owner is not None]
     if faulty:
         console.print(f"trial {faulty[0].number} ended by {faulty[0].end}: {faulty[0].row['reason'] or ''}")
         console.print(tail(faulty[0].log, phase.model.log_lines))
-    for name, value in (summary(phase, done.results) or {}).items():
-        console.print(f"{name}: {value:.4g}")
+    means = summary(phase, done.results) or {"trials": 0}
+    told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")
+    console.print(f"means of {means['trials']} trials: {told}")
     options.tell(str(folder / "results.jsonl"))
