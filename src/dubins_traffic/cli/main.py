@@ -25,6 +25,7 @@ from dubins_traffic.cli import (
     plot,
     replay,
     run,
+    sandbox,
     score,
     session,
     spec,
@@ -87,6 +88,7 @@ transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items
 transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
 transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)
 app.add_typer(gazebo.app, name="gazebo")
+app.add_typer(sandbox.app, name="sandbox")
 for name, transport in transports.items():
     app.add_typer(transport, name=name)
 app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
