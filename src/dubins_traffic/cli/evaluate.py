@@ -19,7 +19,6 @@ EXAMPLES = options.examples(
     "evaluate my_entry --competition spring/competition.toml --workers 2 --records",
     "evaluate entry.zip --competition spring --phase test",
 )
-FOLDER = "evaluations"
 
 
 def evaluate(
@@ -48,7 +47,7 @@ def evaluate(
             "-o",
             metavar="DIR",
             help="Where results are kept as they come.",
-            show_default=f"{FOLDER}/PHASE-DIGEST",
+            show_default="evaluations/PHASE-DIGEST",
         ),
     ] = None,
     workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
@@ -68,11 +67,13 @@ def evaluate(
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.competition import evaluating
     from dubins_traffic.competition.competition import load_competition
+    from dubins_traffic.competition.contents import EVALUATIONS, check_apart
     from dubins_traffic.competition.submission import check_submission
     from dubins_traffic.competition.visibility import summary
 
     own = load_competition(competition).phase(phase)
-    base = Path(output or FOLDER)
+    base = Path(output or EVALUATIONS)
+    check_apart(Path(path), base)
     submission = check_submission(path, base / "submissions")
     folder = base if output else base / f"{phase}-{submission.digest[:12]}"
     try:
