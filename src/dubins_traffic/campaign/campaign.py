@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,10 +19,10 @@ from dubins_traffic.campaign.rows import RESULT, WALL
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import is_file, read_text
+from dubins_traffic.files import is_file
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.faults import parse
-from dubins_traffic.problem.files import plain
+from dubins_traffic.problem.files import plain, read_toml
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Column
@@ -96,10 +95,10 @@ class Campaign:
         model = parse(CampaignModel, own, file=file)
         try:
             configurations = [
-                _configuration(entry, k, folder) for k, entry in enumerate(model.configurations)
+                configuration_of(entry, k, folder) for k, entry in enumerate(model.configurations)
             ]
-            _check_names([entry.name for entry in model.configurations], "configurations")
-            _check_names([bare_name(spec) for spec in model.controllers], "controllers")
+            check_names([entry.name for entry in model.configurations], "configurations")
+            check_names([bare_name(spec) for spec in model.controllers], "controllers")
             found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
             further = metrics or _metrics(model.metrics, folder)
             cells = tuple(_cells(model, configurations))
@@ -149,12 +148,7 @@ def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -
         If there is no such file or something in it is wrong.
     """
     name = os.fspath(path)
-    try:
-        document = tomllib.loads(read_text(name))
-    except RecursionError:
-        raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
-    except ValueError as error:
-        raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
+    document = read_toml(name, "a campaign file, TOML")
     specs: Any = document.get("controllers")
     if sandbox is not None and isinstance(specs, list):
         named = cast("list[Any]", specs)
@@ -173,7 +167,8 @@ def seed_of(root: int, configuration: str, values: Mapping[str, Scalar]) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
 
 
-def _configuration(entry: ConfigurationEntry, index: int, folder: Path | None) -> Configuration:
+def configuration_of(entry: ConfigurationEntry, index: int, folder: Path | None) -> Configuration:
+    """Return the configuration that entry number `index` names; InputError, with its field, if it is wrong."""
     where = f"configurations[{index}]"
     try:
         if entry.document is not None:
@@ -213,7 +208,8 @@ def _metrics(specs: list[str], folder: Path | None) -> tuple[tuple[str, ...], tu
     return places, tuple(found)
 
 
-def _check_names(names: list[str], what: str) -> None:
+def check_names(names: list[str], what: str) -> None:
+    """Refuse a name that stands twice in the field `what`."""
     for k, name in enumerate(names):
         if name in names[:k]:
             raise InputError("name taken", field=f"{what}[{k}]", value=name, expected="a name of its own")
@@ -268,7 +264,7 @@ def _settled(
     rest = {name: value for name, value in chosen.items() if name not in factors}
     with_ = ", ".join(f"{name} = {value}" for name, value in scalars.items())
     try:
-        document = vary(_inlined(configuration), named, rest)
+        document = vary(inlined(configuration), named, rest)
         settled = Configuration.from_document(document)
         simulators.load(settled.settings.simulator).close()
     except InputError as error:
@@ -278,7 +274,7 @@ def _settled(
     return settled
 
 
-def _inlined(configuration: Configuration) -> dict[str, Any]:
+def inlined(configuration: Configuration) -> dict[str, Any]:
     """Return the document of a configuration with the road network written in that it names by path."""
     document = configuration.to_document()
     if configuration.network is not None and not isinstance(document.get("rnd"), dict):
@@ -292,7 +288,7 @@ def _complete(model: CampaignModel, configurations: list[Configuration]) -> dict
         del document["metrics"]
     document["factors"] = levels(model.factors)
     document["configurations"] = [
-        {"name": entry.name, "document": _inlined(configuration)}
+        {"name": entry.name, "document": inlined(configuration)}
         for entry, configuration in zip(model.configurations, configurations, strict=True)
     ]
     return document

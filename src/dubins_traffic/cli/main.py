@@ -13,7 +13,9 @@ from dubins_traffic.cli import (
     campaign,
     check,
     check_controller,
+    competition,
     convert,
+    evaluate,
     faults,
     gazebo,
     instance,
@@ -28,6 +30,7 @@ from dubins_traffic.cli import (
     session,
     spec,
     synth,
+    template,
     verify,
     warm,
 )
@@ -78,6 +81,9 @@ app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
+app.add_typer(competition.competition, name="competition")
+app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
+app.command("template", epilog=template.EXAMPLES)(template.template)
 transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items()}
 transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
 transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)

@@ -1,0 +1,124 @@
+"""`dubins-traffic evaluate`."""
+
+from __future__ import annotations
+
+import json as json_text
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+
+if TYPE_CHECKING:
+    from dubins_traffic.competition.competition import Phase
+    from dubins_traffic.competition.evaluating import Evaluation
+
+EXAMPLES = options.examples(
+    "evaluate controller.py --competition spring",
+    "evaluate my_entry --competition spring/competition.toml --workers 2 --records",
+    "evaluate entry.zip --competition spring --phase test",
+)
+
+
+def evaluate(
+    path: Annotated[
+        str,
+        typer.Argument(
+            metavar="PATH",
+            help="A controller.py, a folder, a zip archive or a program that speaks lines.",
+            show_default=False,
+        ),
+    ],
+    competition: Annotated[
+        str,
+        typer.Option(
+            "--competition", metavar="FILE|URL", help="A competition file or its folder.", show_default=False
+        ),
+    ],
+    phase: Annotated[
+        str,
+        typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed."),
+    ] = "practice",
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Where results are kept as they come.",
+            show_default="evaluations/PHASE-DIGEST",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
+    records: Annotated[bool, typer.Option("--records", help="Keep the records of the trials.")] = False,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run it too where this machine can't enforce all limits of the box."
+        ),
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Run a submission at home as the competition would: the same box, the same limits, the same frames.
+
+    What is finished is kept; the same command goes on after Ctrl-C.
+    """
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.competition import evaluating
+    from dubins_traffic.competition.competition import load_competition
+    from dubins_traffic.competition.contents import EVALUATIONS, check_apart
+    from dubins_traffic.competition.submission import check_submission
+    from dubins_traffic.competition.visibility import summary
+
+    own = load_competition(competition).phase(phase)
+    base = Path(output or EVALUATIONS)
+    check_apart(Path(path), base)
+    submission = check_submission(path, base / "submissions")
+    folder = base if output else base / f"{phase}-{submission.digest[:12]}"
+    try:
+        with progress() as show:
+            done = evaluating.evaluate(
+                own, submission, folder, workers=workers, trust=trust, records=records, progress=show
+            )
+    except KeyboardInterrupt:
+        faults.tell(
+            f"interrupted; {evaluating.kept(folder)} of {len(own.numbers)} trials are kept, "
+            "the same command goes on"
+        )
+        raise typer.Exit(faults.FAILED) from None
+    if json:
+        print(json_text.dumps({**done.to_json(), "summary": summary(own, done.results)}, indent=2))
+    else:
+        _show(done, own, folder)
+    if any(result.owner is not None for result in done.results):
+        raise typer.Exit(faults.FAILED)
+
+
+def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
+    """Print what came of each trial, the log of the first that ended by a fault, and the means."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from dubins_traffic.competition.visibility import summary, tail
+
+    several = len(phase.configurations) > 1
+    table = Table(title=f"{phase.name}, submission {done.submission[:12]}")
+    where = ("configuration",) if several else ()
+    for heading in ("trial", *where, "end", "rounds", "counted", "verdict", "collisions", "fault"):
+        table.add_column(heading, justify="right" if heading in ("trial", "rounds", "counted") else "left")
+    for own in done.results:
+        place = (phase.place(own.number)[0].name,) if several else ()
+        cells = [own.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
+        texts = ["" if cell is None else str(cell) for cell in cells]
+        table.add_row(str(own.number), *place, own.end, *texts, own.owner or "")
+    console = Console(highlight=False, markup=False)
+    console.print(table)
+    faulty = [own for own in done.results if own.owner is not None]
+    if faulty:
+        console.print(f"trial {faulty[0].number} ended by {faulty[0].end}: {faulty[0].row['reason'] or ''}")
+        console.print(tail(faulty[0].log, phase.model.log_lines))
+    means = summary(phase, done.results) or {"trials": 0}
+    told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")
+    console.print(f"means of {means['trials']} trials: {told}")
+    options.tell(str(folder / "results.jsonl"))

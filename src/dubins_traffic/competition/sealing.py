@@ -1,0 +1,338 @@
+"""Secret seeds: drawn, encrypted on disk, committed to, and revealed.
+
+In the folder of a competition ``sealed/PHASE.json`` holds the seeds encrypted (AES-256-GCM; the key is derived by
+scrypt from a passphrase or the contents of a key file, which lies elsewhere), ``published/PHASE.commitment.json`` what
+is published when the phase opens, and ``published/PHASE.seeds.txt`` what is revealed after it has closed.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import json
+import secrets
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from dubins_traffic.competition.commitment import Seeded, Seeds, check_belong, read_seeds
+from dubins_traffic.competition.keys import checked_key
+from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.files import is_file, read_text, replace_file
+from dubins_traffic.problem.faults import Strict, parse
+from dubins_traffic.problem.files import dumps, parse_json
+
+COST = 1 << 15
+"""N of scrypt: 32 MiB and some tenths of a second for each guess (r = 8, p = 1)."""
+MOST_DRAWS = 20
+"""So many seeds are tried for a trial that can't always be drawn, such as one of many cars on few roads."""
+_BLOCK, _LANES = 8, 1
+_MEMORY = 1 << 26
+
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Base64 = Annotated[str, Field(pattern=r"^[A-Za-z0-9+/]+={0,2}$", max_length=1 << 24)]
+
+
+class Sealed(Strict):
+    """What is on disk of secret seeds."""
+
+    version: Literal[1]
+    phase: str
+    commitment: Digest
+    cipher: Literal["scrypt-32768-8-1 aes-256-gcm"] = "scrypt-32768-8-1 aes-256-gcm"
+    salt: Base64
+    nonce: Base64
+    sealed: Base64
+
+
+class Published(Strict):
+    """What is published of a phase with secret seeds when it opens."""
+
+    version: Literal[1]
+    title: str
+    phase: str
+    rules: Digest
+    commitment: Digest
+    published: str
+
+
+def sealed_path(phase: Seeded) -> Path:
+    """Return where the encrypted seeds of a phase lie."""
+    return _folder(phase) / "sealed" / f"{phase.name}.json"
+
+
+def commitment_path(phase: Seeded) -> Path:
+    """Return where the published commitment of a phase lies."""
+    return _folder(phase) / "published" / f"{phase.name}.commitment.json"
+
+
+def revealed_path(phase: Seeded) -> Path:
+    """Return where the revealed seeds of a phase lie."""
+    return _folder(phase) / "published" / f"{phase.name}.seeds.txt"
+
+
+def draw_seeds(phase: Seeded) -> Seeds:
+    """Return new seeds for a phase, from the system's source of secrets, from which all its trials can be drawn.
+
+    Raises
+    ------
+    InputError
+        If a trial can't be drawn from any of `MOST_DRAWS` seeds.
+    """
+    seeds = tuple(_drawable(phase, number) for number in phase.numbers)
+    return Seeds(phase.name, phase.rules, secrets.token_hex(32), seeds)
+
+
+def _drawable(phase: Seeded, number: int) -> int:
+    for _ in range(MOST_DRAWS - 1):
+        seed = secrets.randbits(64)
+        with contextlib.suppress(InputError):
+            phase.instance(number, seed)
+            return seed
+    seed = secrets.randbits(64)
+    phase.instance(number, seed)
+    return seed
+
+
+def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bool = False) -> str:
+    """Draw the secret seeds of a phase and write them, encrypted; return their commitment.
+
+    Parameters
+    ----------
+    phase : Seeded
+        Of a competition that has a folder.
+    key : bytes
+        Passphrase, or contents of a key file.
+    seeds : Seeds, optional
+        Instead of new ones.
+    overwrite : bool
+        Whether seeds that are there may be replaced; those whose commitment has been published never are.
+
+    Raises
+    ------
+    InputError
+        If the phase has no secret seeds, they are there, or they can't be written.
+    MissingExtraError
+        Without the extra `competition`.
+    """
+    _check_secret(phase)
+    path = sealed_path(phase)
+    if is_file(commitment_path(phase)):
+        raise InputError("its commitment has been published", file=str(commitment_path(phase)))
+    if is_file(path) and not overwrite:
+        raise InputError("holds sealed seeds", file=str(path), expected="none; --overwrite draws others")
+    seeds = seeds or draw_seeds(phase)
+    check_belong(seeds, phase)
+    salt, nonce = secrets.token_bytes(16), secrets.token_bytes(12)
+    head = {"version": 1, "phase": phase.name, "commitment": seeds.commitment}
+    hidden = _cipher(key, salt).encrypt(nonce, seeds.text.encode(), _bound(head))
+    texts = {name: _text(own) for name, own in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
+    _write(path, dumps(Sealed.model_validate({**head, **texts}).model_dump()))
+    return seeds.commitment
+
+
+def unsealed(phase: Seeded, key: bytes) -> Seeds:
+    """Return the secret seeds of a phase.
+
+    Raises
+    ------
+    InputError
+        If there are none, the key is another, or the file has been changed.
+    MissingExtraError
+        Without the extra `competition`.
+    """
+    path = sealed_path(phase)
+    found = _sealed(phase)
+    head = {"version": 1, "phase": found.phase, "commitment": found.commitment}
+    cipher = _cipher(key, _bytes(found.salt, path))
+    nonce, hidden = _bytes(found.nonce, path), _bytes(found.sealed, path)
+    from cryptography.exceptions import InvalidTag
+
+    try:
+        text = cipher.decrypt(nonce, hidden, _bound(head)).decode()
+    except (InvalidTag, ValueError):
+        raise InputError(
+            "can't be decrypted: another passphrase or key, or the file has been changed", file=str(path)
+        ) from None
+    seeds = read_seeds(text, str(path))
+    if seeds.commitment != found.commitment:
+        raise InputError("the seeds are not those committed to", file=str(path), field="commitment")
+    check_belong(seeds, phase, str(path))
+    return seeds
+
+
+def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published:
+    """Write the commitment of a phase for everybody to see, and return it; a second time it is the same.
+
+    Raises
+    ------
+    InputError
+        If the seeds have not been sealed, another commitment has been published, or it can't be written.
+    """
+    sealed = _sealed(phase)
+    path = commitment_path(phase)
+    if is_file(path):
+        found = read_published(path)
+        if found.commitment != sealed.commitment:
+            raise InputError(
+                "another commitment has been published",
+                file=str(path),
+                field="commitment",
+                value=found.commitment,
+                expected=sealed.commitment,
+            )
+        return found
+    made = Published(
+        version=1,
+        title=title,
+        phase=phase.name,
+        rules=phase.rules,
+        commitment=sealed.commitment,
+        published=(now or datetime.now(UTC)).isoformat(timespec="seconds"),
+    )
+    _write(path, dumps(made.model_dump()))
+    return made
+
+
+def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
+    """Write the seeds of a phase that has closed for everybody to see; return where.
+
+    Raises
+    ------
+    InputError
+        If the phase is not over, its commitment was never published or is another, or the key is wrong.
+    """
+    _check_secret(phase)
+    if not phase.is_closed(now):
+        raise InputError(
+            "the phase has not closed",
+            field=f"phases.{phase.name}.closes",
+            value=phase.closes and phase.closes.isoformat(),
+            expected="a time that is past",
+        )
+    if not is_file(commitment_path(phase)):
+        raise InputError("no commitment has been published", file=str(commitment_path(phase)))
+    seeds = unsealed(phase, key)
+    check_revealed(seeds, phase, read_published(commitment_path(phase)).commitment)
+    _write(revealed_path(phase), seeds.text)
+    return revealed_path(phase)
+
+
+def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
+    """Refuse seeds that are not those of a phase that were committed to.
+
+    Raises
+    ------
+    InputError
+        If they are not.
+    """
+    check_belong(seeds, phase)
+    if seeds.commitment != commitment:
+        raise InputError(
+            "the seeds are not those that were committed to",
+            field="commitment",
+            value=seeds.commitment,
+            expected=commitment,
+        )
+
+
+def secret_seeds(phase: Seeded, key: bytes | None) -> tuple[int, ...]:
+    """Return the seeds of a phase that has secret ones: the revealed ones, else those that `key` decrypts.
+
+    Raises
+    ------
+    InputError
+        If they are still secret and the key is missing or wrong.
+    """
+    if phase.folder is not None and is_file(revealed_path(phase)):
+        path = revealed_path(phase)
+        seeds = read_seeds(read_text(path), str(path))
+        check_belong(seeds, phase, str(path))
+        if is_file(commitment_path(phase)):
+            check_revealed(seeds, phase, read_published(commitment_path(phase)).commitment)
+        return seeds.seeds
+    if key is None:
+        raise InputError(
+            "the seeds are secret",
+            field=f"phases.{phase.name}",
+            expected="a phase whose seeds are known, or the key",
+        )
+    return unsealed(phase, key).seeds
+
+
+def read_published(path: Path) -> Published:
+    """Return a published commitment; InputError if the file holds none."""
+    return parse(Published, parse_json(read_text(path), str(path)), file=str(path))
+
+
+def _sealed(phase: Seeded) -> Sealed:
+    path = sealed_path(phase)
+    _check_secret(phase)
+    if not is_file(path):
+        raise InputError(
+            "no sealed seeds",
+            file=str(path),
+            expected="the file that `dubins-traffic competition seal` makes",
+        )
+    found = parse(Sealed, parse_json(read_text(path), str(path)), file=str(path))
+    if found.phase != phase.name:
+        raise InputError(
+            "seeds of another phase", file=str(path), field="phase", value=found.phase, expected=phase.name
+        )
+    return found
+
+
+def _check_secret(phase: Seeded) -> None:
+    if not phase.secret:
+        raise InputError(
+            "its seeds are no secret",
+            field=f"phases.{phase.name}.seed",
+            expected='a phase with seed = "secret"',
+        )
+
+
+def _folder(phase: Seeded) -> Path:
+    if phase.folder is None:
+        raise InputError(
+            "a competition without a folder", field=f"phases.{phase.name}", expected="one that is a file"
+        )
+    return phase.folder
+
+
+def _cipher(key: bytes, salt: bytes) -> Any:
+    try:
+        from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+    except ImportError as error:
+        raise MissingExtraError("sealed seeds", "competition") from error
+    derived = hashlib.scrypt(
+        checked_key(key), salt=salt, n=COST, r=_BLOCK, p=_LANES, maxmem=_MEMORY, dklen=32
+    )
+    return AESGCM(derived)
+
+
+def _bound(head: Mapping[str, object]) -> bytes:
+    """Return what the ciphertext is bound to: another phase or commitment in the file is found out."""
+    return json.dumps(head, sort_keys=True).encode()
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _bytes(text: str, path: Path) -> bytes:
+    try:
+        return base64.b64decode(text, validate=True)
+    except ValueError:
+        raise InputError("not Base64", file=str(path), value=text) from None
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"can't be written ({error.strerror})", file=str(path)) from None
+    replace_file(path, lambda neighbour: neighbour.write_text(text, encoding="utf-8"), durable=True)
