@@ -26,12 +26,14 @@ from dubins_traffic.cli import (
     replay,
     run,
     score,
+    serve,
     session,
     spec,
     synth,
     template,
     verify,
     warm,
+    worker,
 )
 from dubins_traffic.sessions.registry import TRANSPORTS
 
@@ -89,6 +91,8 @@ transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm
 app.add_typer(gazebo.app, name="gazebo")
 for name, transport in transports.items():
     app.add_typer(transport, name=name)
+app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
+app.command("worker", epilog=worker.EXAMPLES)(worker.worker)
 app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 
