@@ -65,8 +65,23 @@ class Controller:
         ahead, left = c * dx + s * dy, c * dy - s * dx
         return (0.0, 0.9) if ahead < abs(left) else (0.5, max(-0.9, min(left, 0.9)))
 """,
+    "speaks_lines": """#!/usr/bin/python3
+import json, sys
+
+for line in sys.stdin:
+    message = json.loads(line)
+    if "problem" in message:
+        print(len(message["problem"]["goals"]), "goals", file=sys.stderr)
+    elif "frame" in message:
+        frame = message["frame"]
+        turn = 0.1 * len(frame["others"]) - 0.01 * frame["pose"][0]
+        print(json.dumps({"command": [0.3, turn], "tick": frame["tick"]}), flush=True)
+    else:
+        break
+""",
 }
-"""The files of controllers: one that drives well, one that drives badly, and those that do not drive."""
+"""The files of controllers: some that drive well or badly, one that is a program, and those that do not drive."""
+IDLE = ("circles", "crashes", "gives_up", "never_starts", "stands")
 
 
 def judged(number: int, **changes: Any) -> Judged:

@@ -1,35 +1,44 @@
-"""The seat of a submission: the one place where the code of a stranger is let near a trial."""
+"""The seat of a submission: the one place where the code of a stranger is let near a trial, in a box."""
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from dubins_traffic.competition.settings import Limits
 from dubins_traffic.competition.submission import Submission
-from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.protocols import Controller
+from dubins_traffic.sandbox import BoxedController, boxed_controller
+from dubins_traffic.sandbox import Limits as BoxLimits
+
+_KIB, _MIB = 1 << 10, 1 << 20
 
 
-class Boxed(Protocol):
-    """The controller of a submission in its box."""
+def boxed(submission: Submission, limits: Limits, *, trust: bool = False) -> BoxedController:
+    """Return the controller of a submission for one trial, in a box of its own.
 
-    @property
-    def controller(self) -> Controller:
-        """Who drives."""
-        ...
+    Parameters
+    ----------
+    submission : Submission
+        What drives.
+    limits : Limits
+        What it may use in the trial.
+    trust : bool
+        Whether it may drive where this machine can't enforce all limits, with those that it can.
 
-    @property
-    def log(self) -> str:
-        """The tail of what it has printed."""
-        ...
+    Raises
+    ------
+    InputError
+        If this machine can't hold a stranger's program and `trust` is not given.
+    """
+    return boxed_controller(str(submission.path), box_limits(limits), trust=trust)
 
 
-class _InProcess:
-    def __init__(self, spec: str) -> None:
-        self.controller = controllers.made(lambda: controllers.load(spec))
-        self.log = ""
-
-
-def boxed(submission: Submission, limits: Limits, *, trust: bool = False) -> Boxed:  # noqa: ARG001
-    """Return the controller of a submission for one trial, within its limits."""
-    return _InProcess(f"{submission.path}/controller.py:Controller")
+def box_limits(limits: Limits) -> BoxLimits:
+    """Return the limits of a phase as boxes take them: seconds and bytes."""
+    return BoxLimits(
+        start_seconds=limits.start,
+        decision_seconds=limits.decision,
+        bank_seconds=limits.bank,
+        wall_seconds=limits.wall,
+        memory=limits.memory * _MIB,
+        processes=limits.processes,
+        files=limits.files * _MIB,
+        output=limits.output * _KIB,
+    )

@@ -16,20 +16,12 @@ from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraEr
 from dubins_traffic.problem.faults import Strict, parse
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sandbox import owner_of
 
 Owner = Literal["submission", "platform"]
+_OWN_ENDS = (End.DURATION, End.COLLISION)
 OWNERS: Final[Mapping[str, Owner]] = {
-    End.CONTROLLER_FAULT: "submission",
-    End.DEADLINE: "submission",
-    End.PEER_SILENT: "submission",
-    End.PEER_LOST: "submission",
-    End.PEER_FLOOD: "submission",
-    End.PEER_GARBAGE: "submission",
-    End.AGENT_FAULT: "platform",
-    End.TRANSPORT_LOST: "platform",
-    End.WORLD_LOST: "platform",
-    End.INTERRUPTED: "platform",
-    End.RESET: "platform",
+    **{end.value: owner_of(end) for end in End if end not in _OWN_ENDS},
     rows.FAILED: "platform",
     rows.CRASHED: "platform",
 }
@@ -150,7 +142,7 @@ def _judged(
         seat = boxed(submission, phase.limits, trust=trust)
         result = run_trial(
             instance,
-            seat.controller,
+            seat,
             record=path,
             overwrite=True,
             sinks=(digest,),
@@ -164,7 +156,7 @@ def _judged(
     row = rows.row(number, result.ending, result.score, {})
     end = result.ending.end.value
     own = {name: _plain(row[name]) for name in rows.RESULT}
-    return Judged(number, own, end, OWNERS.get(end), seat.log, digest.result(), path)
+    return Judged(number, own, end, OWNERS.get(end), seat.log_tail, digest.result(), path)
 
 
 def _failed(number: int, reason: str) -> Judged:

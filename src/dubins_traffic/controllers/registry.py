@@ -35,6 +35,10 @@ SHIELDED = "+shield"
 """What ends the name of a controller that drives under the shield (`controllers.shield`); behind it there may be a
 colon and when the ego may overtake, as in ``lanes+shield:never``."""
 _SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
+SANDBOXED = "+sandbox"
+"""What ends the name of a controller that drives in a box (`dubins_traffic.sandbox`), before that of a shield; behind
+it there may be limits, as in ``my.py:Mine+sandbox,memory=512M``."""
+_SANDBOX = re.compile(re.escape(SANDBOXED) + r"(?P<limits>(?:,[\w=.+-]*)*)$")
 _SEAM = Seam(
     "--controller",
     "controller",
@@ -94,7 +98,7 @@ def load(spec: str) -> Controller:
         directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
         strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`. Followed by
         ``+shield``: the same under the shield; by ``+shield:law`` or ``+shield:never`` under one that overtakes
-        otherwise (`controllers.shield.Shield`).
+        otherwise (`controllers.shield.Shield`). Followed by ``+sandbox``: the same in a box (`dubins_traffic.sandbox`).
 
     Raises
     ------
@@ -105,6 +109,10 @@ def load(spec: str) -> Controller:
     """
     if is_shielded(spec):
         return under_shield(load(_SHIELD.sub("", spec)), spec)
+    boxed = _SANDBOX.search(spec)
+    if boxed is not None:
+        module = importlib.import_module("dubins_traffic.sandbox.controller")
+        return cast(Controller, module.named(spec[: boxed.start()], boxed["limits"].lstrip(",")))
     if spec in _BUILT_IN:
         module, name = _BUILT_IN[spec]
         return cast(Controller, getattr(importlib.import_module(module), name)())
@@ -127,6 +135,31 @@ def is_shielded(spec: str) -> bool:
 def shielded(spec: str) -> str:
     """Return the name of a controller under the shield."""
     return spec if is_shielded(spec) else spec + SHIELDED
+
+
+def sandboxed(spec: str, limits: str = "") -> str:
+    """Return the name of a controller in a box, which is inside its shield if it has one.
+
+    Parameters
+    ----------
+    spec : str
+        Its name.
+    limits : str
+        What it may use, as ``memory=512M,bank_seconds=10``.
+    """
+    shield = _SHIELD.search(spec)
+    bare, ending = (spec, "") if shield is None else (spec[: shield.start()], shield[0])
+    if _SANDBOX.search(bare) is None:
+        bare += SANDBOXED + (f",{limits}" if limits else "")
+    return bare + ending
+
+
+def unboxed(spec: str) -> tuple[str, str]:
+    """Return a name without what says that it drives in a box, and that, "" for none."""
+    shield = _SHIELD.search(spec)
+    bare, ending = (spec, "") if shield is None else (spec[: shield.start()], shield[0])
+    boxed = _SANDBOX.search(bare)
+    return (spec, "") if boxed is None else (bare[: boxed.start()] + ending, boxed[0])
 
 
 def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:

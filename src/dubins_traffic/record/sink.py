@@ -18,7 +18,8 @@ class End(StrEnum):
 
     The `peer_` ends are of drivers in other processes: no command for too long, gone and not back, more messages than
     anyone needs, what is no message. `transport_lost`: what carried the messages has failed. `world_lost`: the
-    poses of a world that is not simulated here were missing, late, frozen or jumped.
+    poses of a world that is not simulated here were missing, late, frozen or jumped. Four ends are of controllers in a
+    box (docs/sandbox.md): more processor time, memory or printed text than it may use, and a box that can't be made.
     """
 
     DURATION = "duration"
@@ -35,6 +36,10 @@ class End(StrEnum):
     PEER_GARBAGE = "peer_garbage"
     TRANSPORT_LOST = "transport_lost"
     WORLD_LOST = "world_lost"
+    OUT_OF_TIME = "out_of_time"
+    OUT_OF_MEMORY = "out_of_memory"
+    OUTPUT_FLOOD = "output_flood"
+    BOX_FAILED = "box_failed"
 
 
 FAULTS = frozenset(
@@ -48,6 +53,10 @@ FAULTS = frozenset(
         End.PEER_GARBAGE,
         End.TRANSPORT_LOST,
         End.WORLD_LOST,
+        End.OUT_OF_TIME,
+        End.OUT_OF_MEMORY,
+        End.OUTPUT_FLOOD,
+        End.BOX_FAILED,
     }
 )
 """Ends that are somebody's fault and not a trial's own."""

@@ -1,0 +1,173 @@
+"""A controller in a box, as a trial knows it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.public_problem import problem_to_document
+from dubins_traffic.protocols import End
+from dubins_traffic.sandbox.box import Box, BoxOverError
+from dubins_traffic.sandbox.launch import Program
+from dubins_traffic.sandbox.layers import Layers, available_layers
+from dubins_traffic.sandbox.limits import BoxEnd, Limits
+from dubins_traffic.sandbox.submission import program_of
+from dubins_traffic.transports.answers import AnswerError, command_in, message_in
+from dubins_traffic.transports.observed import observation_to_document
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+TRUST: Final = "trust"
+"""Stands among the limits of a name where `boxed_controller` is told to trust."""
+
+
+class BoxedController:
+    """Drives by a program in a box, a new one for each trial (a `protocols.Controller`).
+
+    Parameters
+    ----------
+    program : Program
+        What drives.
+    limits : Limits
+        What it may use in a trial.
+    layers : Layers
+        The layers of its boxes.
+
+    Attributes
+    ----------
+    end : BoxEnd or None
+        How the last driving ended, None if with its trial.
+    log_tail : str
+        The last that the program printed in the last trial.
+    """
+
+    def __init__(self, program: Program, limits: Limits, layers: Layers) -> None:
+        self._program, self._limits, self._layers = program, limits, layers
+        self._box: Box | None = None
+        self._reports: tuple[tuple[str, str], ...] = ()
+        self.end: BoxEnd | None = None
+        self.log_tail = ""
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Refuse: a program drives in one trial at a time."""
+        raise InputError(
+            "a controller in a box can't go on in two trials", field="controller", expected="one of ours"
+        )
+
+    def start(self, problem: Problem) -> None:
+        """Begin a box and tell its program the problem."""
+        self._drop()
+        self.end, self.log_tail, self._reports = None, "", ()
+        try:
+            self._box = Box(self._program, self._limits, self._layers)
+            ready = self._program.says_ready
+            line = self._box.ask(_line({"problem": problem_to_document(problem)}), answered=ready)
+            if ready and message_in(line) != {"started": True}:
+                raise AnswerError(End.PEER_GARBAGE, "it did not say that it has started")
+            if ready:
+                self._box.decide()
+        except (BoxOverError, AnswerError) as error:
+            raise self._over(error) from None
+
+    def act(self, observation: Observation) -> Command:
+        """Return the command that answers a frame."""
+        box = self._box
+        assert box is not None
+        try:
+            line = box.ask(_line({"frame": observation_to_document(observation)}))
+            answer = command_in(line, observation.tick)
+        except (BoxOverError, AnswerError) as error:
+            raise self._over(error) from None
+        if observation.tick == 0:
+            box.decide()
+        self._reports = answer.reports
+        return Command(answer.speed, answer.yaw_rate)
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what the controller has reported with its last command."""
+        return self._reports
+
+    def close(self) -> None:
+        """Tell the program that its trial is over, and end its box."""
+        box = self._box
+        if box is None:
+            return
+        try:
+            if box.over is None and self._program.says_ready:
+                message_in(box.ask(_line({"end": {}})))
+        except AnswerError as error:
+            raise CloseError(error.detail) from None
+        finally:
+            self._drop()
+
+    def _over(self, error: BoxOverError | AnswerError) -> BoxOverError:
+        """Note how the driving ended, and end the box."""
+        if isinstance(error, AnswerError):
+            assert self._box is not None
+            error = self._box.fault(error.end, error.detail)
+        self.end = error.end
+        self._drop()
+        return error
+
+    def _drop(self) -> None:
+        if self._box is not None:
+            self.log_tail = self._box.log_tail
+            self._box.close()
+            self._box = None
+
+    def __del__(self) -> None:
+        """Leave no box behind."""
+        self._drop()
+
+
+class CloseError(Exception):
+    """What the controller in a box raised when it was closed."""
+
+
+def boxed_controller(
+    path: str, limits: Limits | None = None, *, trust: bool = False, layers: Layers | None = None
+) -> BoxedController:
+    """Return a controller that drives in a box; nothing of it is loaded in this process.
+
+    Parameters
+    ----------
+    path : str
+        What drives; see `submission.program_of`.
+    limits : Limits, optional
+        What it may use in a trial.
+    trust : bool
+        Whether it may drive where this machine can't enforce all limits, with those that it can.
+    layers : Layers, optional
+        The layers of its boxes; by default all that this machine has.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller, or this machine can't hold a stranger's program and `trust` is not given.
+    """
+    program = program_of(path)
+    held = available_layers() if layers is None else layers
+    if not trust and layers is None:
+        held.require()
+    return BoxedController(program, limits or Limits(), held)
+
+
+def named(path: str, text: str) -> BoxedController:
+    """Return a controller in a box as a name tells: what drives, and its limits, ``trust`` perhaps among them.
+
+    Raises
+    ------
+    InputError
+        As `boxed_controller`, and if there is no such limit.
+    """
+    parts = [part for part in text.split(",") if part]
+    limits = Limits.from_text(",".join(part for part in parts if part != TRUST))
+    return boxed_controller(path, limits, trust=TRUST in parts)
+
+
+def _line(message: Mapping[str, Any]) -> bytes:
+    return json.dumps(message, separators=(",", ":")).encode() + b"\n"

@@ -1,0 +1,192 @@
+"""The command line that begins a box: what is seen in it, who it is, and what it may use.
+
+Three programs follow each other. As root a shell with mounts of its own puts what the box shall see where an ordinary
+user can read it, since an interpreter may lie under a folder that only root may enter, and `setpriv` becomes an
+ordinary user for good; `bwrap --uid` alone would map to root. Then bubblewrap makes the namespaces. In the box a shell
+sets the limits of each process, says that the box stands, and becomes the program.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+from dubins_traffic.sandbox.layers import Layers
+from dubins_traffic.sandbox.limits import Limits
+
+SYSTEM: Final = "/usr/bin:/bin"
+USER: Final = 1000
+"""User and group in a box, as it sees itself."""
+FIRST_USER: Final = 0x20000000
+"""Boxes that root begins have users of their own from here on, who own nothing and have no name."""
+OPEN_FILES: Final = 256
+DEVICES: Final = ("null", "zero", "full", "random", "urandom")
+SETTINGS: Final = ("ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives")
+"""What is seen of /etc: what the dynamic linker needs."""
+STANDS: Final = "dubins-traffic: the box stands"
+"""The first line on standard error of a box; what comes before it is not the program's."""
+_numbers = count()
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A file or folder that a box sees, read-only: `source` of the host at `place`.
+
+    `own`: whether it is the submission's own, of which root gives the box a copy that it can read.
+    """
+
+    source: str
+    place: str
+    own: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What runs in a box: its command line as the box sees it, what it sees, and its environment.
+
+    `says_ready`: whether it says when it is ready to drive, as our shim does.
+    """
+
+    command: tuple[str, ...]
+    shown: tuple[Shown, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict[str, str])
+    says_ready: bool = False
+
+
+def command_line(
+    program: Program, limits: Limits, layers: Layers, *, doors: Sequence[str], seccomp: int
+) -> list[str]:
+    """Return the command line that begins a box.
+
+    Parameters
+    ----------
+    program : Program
+        What runs in it.
+    limits : Limits
+        What it may use.
+    layers : Layers
+        Which layers it has.
+    doors : sequence of str
+        Files of its control group into which the first process writes its number.
+    seccomp : int
+        Descriptor from which bubblewrap reads the filter of system calls; -1 for none.
+    """
+    root = os.getuid() == 0 and layers.boxes
+    inner = ["/bin/sh", "-c", _limits(limits, layers), "box", *program.command]
+    if not layers.boxes:
+        return _entered(inner, doors, ())
+    staged, steps = _staged(program.shown) if root else (program.shown, [])
+    more = ["--seccomp", str(seccomp)] if seccomp >= 0 else []
+    outer = _bubblewrap(program.environment, staged, limits, layers) + more + ["--", *inner]
+    if not root:
+        return _entered(outer, doors, ())
+    dropped = [*_setpriv(), *outer]
+    return ["unshare", "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
+
+
+def probe() -> list[str]:
+    """Return a command line that succeeds where boxes can be made."""
+    return command_line(Program(("/bin/true",)), Limits(), Layers().without("rlimits"), doors=(), seccomp=-1)
+
+
+def _setpriv() -> list[str]:
+    user = str(FIRST_USER + (os.getpid() % (1 << 22)) * 64 + next(_numbers) % 64)
+    drop = ["--clear-groups", "--inh-caps=-all", "--bounding-set=-all", "--no-new-privs"]
+    return ["setpriv", f"--reuid={user}", f"--regid={user}", *drop, "--"]
+
+
+def _entered(command: Sequence[str], doors: Sequence[str], steps: Sequence[str]) -> list[str]:
+    """Return `command` as a shell begins it that goes through the doors of a control group first."""
+    if not doors and not steps:
+        return list(command)
+    lines = ["set -e", *(f"echo $$ >{shlex.quote(door)}" for door in doors), *steps, 'exec "$@"']
+    return ["/bin/sh", "-c", "\n".join(lines), "box", *command]
+
+
+def _staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
+    """Return what is shown from places that everybody can read, and the steps that put it there."""
+    stage = _stage()
+    steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev box {stage}"]
+    found: list[Shown] = []
+    for number, each in enumerate(shown):
+        source, place = shlex.quote(each.source), f"{stage}/{number}"
+        if each.own:
+            steps += [f"cp -R -P -- {source} {place}", f"chmod -R a+rX {place}"]
+        elif Path(each.source).is_dir():
+            steps += [f"mkdir {place}", f"mount --bind {source} {place}"]
+        else:
+            steps += [f": >{place}", f"mount --bind {source} {place}"]
+        found.append(Shown(place, each.place))
+    return found, steps
+
+
+@cache
+def _stage() -> str:
+    """Return an empty folder over which a box's own mount lies, in namespaces of its own."""
+    fixed = Path("/run/dubins-traffic")
+    try:
+        fixed.mkdir(mode=0o755, exist_ok=True)
+    except OSError:
+        return tempfile.mkdtemp(prefix="dubins-traffic-")
+    return str(fixed)
+
+
+def _bubblewrap(
+    environment: Mapping[str, str], shown: Sequence[Shown], limits: Limits, layers: Layers
+) -> list[str]:
+    """Return the command line of bubblewrap up to the program."""
+    words = ["bwrap", "--unshare-user", "--unshare-uts", "--hostname", "box", "--unshare-cgroup-try"]
+    words += ["--uid", str(USER), "--gid", str(USER), "--die-with-parent", "--new-session"]
+    for option, on in (("net", layers.network), ("pid", layers.pids), ("ipc", layers.ipc)):
+        words += [f"--unshare-{option}"] if on else []
+    words += ["--disable-userns"] if layers.users else []
+    if layers.environment:
+        words += ["--clearenv", "--setenv", "PATH", SYSTEM, "--setenv", "HOME", "/tmp"]
+        words += ["--setenv", "TMPDIR", "/tmp", "--setenv", "LANG", "C.UTF-8"]
+    for name, value in environment.items():
+        words += ["--setenv", name, value]
+    words += _system()
+    for each in shown:
+        words += ["--ro-bind", each.source, each.place]
+    words += ["--proc", "/proc"] if layers.pids else ["--ro-bind", "/proc", "/proc"]
+    words += ["--size", str(limits.files), "--tmpfs", "/tmp", "--chdir", "/tmp"]
+    return [*words, "--remount-ro", "/"]
+
+
+@cache
+def _system() -> list[str]:
+    """Return what every box sees of the system, as options of bubblewrap."""
+    words = ["--ro-bind", "/usr", "/usr"]
+    for name in ("bin", "sbin", "lib", "lib64", "lib32"):
+        path = Path("/") / name
+        if path.is_symlink():
+            words += ["--symlink", str(path.readlink()), str(path)]
+        elif path.is_dir():
+            words += ["--ro-bind", str(path), str(path)]
+    for name in SETTINGS:
+        words += ["--ro-bind-try", f"/etc/{name}", f"/etc/{name}"]
+    for name in DEVICES:
+        words += ["--dev-bind", f"/dev/{name}", f"/dev/{name}"]
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        words += ["--symlink", f"/proc/self/fd/{number}", f"/dev/{name}"]
+    return [*words, "--symlink", "/proc/self/fd", "/dev/fd", "--symlink", "/tmp", "/dev/shm"]
+
+
+def _limits(limits: Limits, layers: Layers) -> str:
+    """Return what the shell in the box does before it becomes the program."""
+    lines = ["set -e"]
+    if layers.rlimits:
+        most = {"c": 0, "n": OPEN_FILES, "f": -(-limits.files // 512), "l": 64}
+        if layers.boxes:
+            most["p"] = limits.processes + 1
+        if not layers.memory:
+            most["v"] = limits.memory // 1024
+        lines += [f"ulimit -{letter} {value}" for letter, value in most.items()]
+    return "\n".join([*lines, f"echo {STANDS} >&2", 'exec "$@"'])

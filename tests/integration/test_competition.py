@@ -1,0 +1,204 @@
+"""A competition from nothing: entries judged at home, the same however they are run; seeds, places, the commands."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from dubins_traffic.competition.competition import Competition, load_competition
+from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evaluation
+from dubins_traffic.competition.frames_hash import FramesHash
+from dubins_traffic.competition.judging import Judged, judge
+from dubins_traffic.competition.ranking import rank
+from dubins_traffic.competition.submission import Submission, check_submission
+from dubins_traffic.errors import InputError
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic import load_record
+from tests.competitions import CONTROLLERS, IDLE, PRACTICE, ROAD, competition
+
+ROOT = Path(__file__).parents[2]
+SHORT = {**ROAD, "duration": 6}
+
+
+def short(trials: int, **more: object) -> Competition:
+    practice = {**PRACTICE, "trials": trials, **more}
+    return competition(configurations=[{"name": "road", "document": SHORT}], phases={"practice": practice})
+
+
+def entry(name: str, store: Path) -> Submission:
+    return check_submission(CONTROLLERS[name].encode(), store)
+
+
+def told(results: Sequence[Judged]) -> dict[int, object]:
+    return {own.number: own.to_json() for own in results}
+
+
+def command(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "dubins_traffic.cli", *map(str, words)]
+    return subprocess.run(line, cwd=cwd, capture_output=True, text=True, check=False, timeout=600)
+
+
+def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) -> None:
+    phase, submission = short(40).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    first = evaluate(phase, submission, tmp_path / "one")
+    evaluate(phase, submission, tmp_path / "two", workers=2)
+    assert (tmp_path / "one" / RESULTS).read_bytes() == (tmp_path / "two" / RESULTS).read_bytes()
+    order = list(phase.numbers)
+    random.Random(1).shuffle(order)
+    assert told(list(judge(phase, order, submission))) == told(first.results)
+    assert len({own.frames for own in first.results}) == 40
+    assert {own.end for own in first.results} == {"duration"}
+
+
+def test_the_box_changes_no_frame(tmp_path: Path) -> None:
+    phase, submission = short(3).phase("practice"), entry("homes", tmp_path / "store")
+    boxed = list(judge(phase, phase.numbers, submission))
+    for own, seed in zip(boxed, phase.seeds(), strict=True):
+        digest = FramesHash()
+        controller = f"{submission.path}/controller.py:Controller"
+        run_trial(phase.instance(own.number, seed), controller, sinks=(digest,))
+        assert own.frames == digest.result()
+        assert "goals" in own.log
+
+
+def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
+    phase, submission = short(4).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    whole = evaluate(phase, submission, tmp_path / "out")
+    lines = (tmp_path / "out" / RESULTS).read_text().splitlines()
+    changed = lines[1].replace('"log":"', '"log":"kept ')
+    (tmp_path / "out" / RESULTS).write_text("\n".join([lines[0], changed, lines[3], lines[4][:50]]))
+    seen: list[tuple[int, int]] = []
+    again = evaluate(phase, submission, tmp_path / "out", progress=lambda done, of: seen.append((done, of)))
+    assert seen == [(2, 4), (3, 4), (4, 4)]
+    assert [own.frames for own in again.results] == [own.frames for own in whole.results]
+    assert again.results[0].log.startswith("kept ")
+    with pytest.raises(InputError, match="holds another evaluation"):
+        evaluate(phase, entry("homes", tmp_path / "store"), tmp_path / "out")
+    with pytest.raises(InputError, match="holds another evaluation"):
+        evaluate(short(5).phase("practice"), submission, tmp_path / "out")
+
+
+def test_records_hold_what_was_judged(tmp_path: Path) -> None:
+    phase, submission = short(2).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    found = evaluate(phase, submission, tmp_path / "out", records=True)
+    for own in found.results:
+        record = load_record(tmp_path / "out" / "records" / f"trial-{own.number:06d}.mcap")
+        assert record.instance.trial == own.number
+        assert record.controller == submission.digest[:12]
+
+
+def test_entries_that_do_not_drive_rank_last(tmp_path: Path) -> None:
+    phase = competition(phases={"practice": {**PRACTICE, "trials": 2}}).phase("practice")
+    entries = {name: list(judge(phase, phase.numbers, entry(name, tmp_path))) for name in ("rules", *IDLE)}
+    places = rank(entries, phase)
+    assert places[0].entry == "rules"
+    assert places[0].estimate.mean is not None
+    assert places[0].estimate.mean > 0
+    assert {own.entry: own.place for own in places[1:]} == dict.fromkeys(IDLE, 2)
+    ends = {name: {own.end for own in results} for name, results in entries.items()}
+    owners = {name: {own.owner for own in results} for name, results in entries.items()}
+    assert ends["crashes"] == ends["never_starts"] == {"controller_fault"}
+    assert ends["gives_up"] == {"gave_up"}
+    assert owners["crashes"] == {"submission"}
+    assert owners["stands"] == {None}
+
+
+def test_a_season_on_the_command_line(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
+    file = tmp_path / "spring" / "competition.toml"
+    dates = {"2027-02-15": "2026-01-01", "2027-03-01": "2026-02-01", "2027-01-01": "2025-12-01"}
+    text = file.read_text().replace("trials = 20", "trials = 2").replace("trials = 4", "trials = 2")
+    for before, after in dates.items():
+        text = text.replace(before, after)
+    file.write_text(text)
+    key = tmp_path / "spring.key"
+
+    def ours(*words: str | Path, status: int = 0) -> str:
+        done = command(*words, cwd=tmp_path)
+        assert done.returncode == status, done.stderr
+        return done.stdout if status == 0 else done.stderr
+
+    assert "2 trials of town; shows nothing; secret seeds" in ours("competition", "check", "spring")
+    sealed = ours("competition", "seal", "spring", "--phase", "test", "--key-file", key)
+    assert ours("competition", "open", "spring", "--phase", "test") == sealed
+    assert "outside" in ours(
+        "competition", "reveal", "spring", "--phase", "test", "--key-file", "spring/key", status=2
+    )
+    ours("template", "python", "entry")
+    (tmp_path / "good.py").write_text(CONTROLLERS["rules"])
+    late = ours("evaluate", "entry", "--competition", "spring", "--phase", "test", status=2)
+    assert "the seeds are secret" in late
+    ours("competition", "reveal", "spring", "--phase", "test", "--key-file", key)
+    digest = sealed.split()[1]
+    assert "2 seeds, as committed to" in ours("competition", "verify", "spring", "--phase", "test")
+    ours("competition", "verify", "spring", "--phase", "test", "--commitment", digest)
+    wrong = ours("competition", "verify", "spring", "--phase", "test", "--commitment", "0" * 64, status=2)
+    assert "not those that were committed to" in wrong
+    for name, path in (("ours", "entry"), ("good", "good.py")):
+        ours("evaluate", path, "--competition", "spring", "--phase", "test", "-o", f"results/{name}")
+    places = json.loads(
+        ours(
+            "competition",
+            "rank",
+            "spring",
+            "--phase",
+            "test",
+            "results/ours",
+            "second=results/good",
+            "--json",
+        )
+    )
+    assert places[0]["place"] == 1
+    assert {own["entry"] for own in places} == {"ours", "second"}
+    assert "counted_rounds of 2 trials" in ours(
+        "competition", "rank", "spring", "--phase", "test", "results/ours"
+    )
+
+
+def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
+    (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
+    shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
+    file = tmp_path / "spring" / "competition.toml"
+    file.write_text(file.read_text().replace("trials = 4", "trials = 200"))
+    line = ["evaluate", "entry", "--competition", "spring", "-o", "out", "--workers", "2"]
+    results = tmp_path / "out" / RESULTS
+    with subprocess.Popen(
+        [sys.executable, "-m", "dubins_traffic.cli", *line],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        deadline = time.monotonic() + 300
+        while not results.exists() or len(results.read_bytes().splitlines()) < 4:
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        os.killpg(process.pid, signal.SIGINT)
+        _, stderr = process.communicate(timeout=300)
+    assert process.returncode == 1
+    assert "of 200 trials are kept, the same command goes on" in stderr
+    kept = len(load_evaluation(tmp_path / "out").results)
+    assert 3 <= kept < 200
+
+
+@pytest.mark.parametrize("name", ["python", "cpp", "competition"])
+def test_templates_are_whole_and_spoil_nothing(tmp_path: Path, name: str) -> None:
+    from dubins_traffic.competition.templates import write_template
+
+    paths = write_template(name, tmp_path / "new")
+    assert all(path.read_text() for path in paths)
+    with pytest.raises(InputError, match="a new or empty folder"):
+        write_template(name, tmp_path / "new")
+    if name == "competition":
+        assert load_competition(tmp_path / "new").title == "My competition"

@@ -1,0 +1,151 @@
+"""Controllers in boxes: the same frames as in process, and a named end with an owner for what goes wrong."""
+
+from __future__ import annotations
+
+import json
+import stat
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import dubins_traffic as dt
+from dubins_traffic.errors import InputError
+from dubins_traffic.protocols import End
+from dubins_traffic.sandbox import Limits, boxed_controller
+from tests.boxes import driven, needs_boxes, written
+from tests.conformance.transport import frames
+from tests.recordings import make_instance
+
+pytestmark = needs_boxes
+HOMING = f"{Path(__file__).parents[2] / 'examples' / 'controller.py'}:Homing"
+
+
+def test_twenty_trials_in_a_box_have_the_frames_of_the_same_controller_in_process(tmp_path: Path) -> None:
+    configuration = dt.load_config("demo")
+    for trial in range(20):
+        instance = replace(dt.draw(configuration, seed=7, trial=trial), duration=2.0)
+        there = dt.run_trial(instance, boxed_controller(HOMING), record=tmp_path / f"{trial}.mcap")
+        here = dt.run_trial(instance, HOMING, record=tmp_path / f"{trial}-here.mcap")
+        assert there.ending == here.ending
+        assert frames(tmp_path / f"{trial}.mcap") == frames(tmp_path / f"{trial}-here.mcap")
+
+
+def test_a_built_in_controller_in_a_box_drives_as_it_does_in_process(tmp_path: Path) -> None:
+    instance = replace(dt.draw(dt.load_config("demo"), seed=3), duration=3.0)
+    dt.run_trial(instance, "lanes+sandbox", record=tmp_path / "there.mcap")
+    dt.run_trial(instance, "lanes", record=tmp_path / "here.mcap")
+    assert frames(tmp_path / "there.mcap") == frames(tmp_path / "here.mcap")
+
+
+@pytest.mark.parametrize(
+    ("body", "end", "words"),
+    [
+        ("return None", End.GAVE_UP, "gave up at tick 0"),
+        ("raise ValueError('lost')", End.CONTROLLER_FAULT, "ValueError: lost at tick 0 (mine.py:"),
+        ("return 1.0", End.CONTROLLER_FAULT, "two numbers"),
+        ("return float('nan'), 0.0", End.CONTROLLER_FAULT, "finite"),
+        ("os._exit(3)", End.PEER_LOST, "status 3"),
+        ("print('here'); sys.exit(4)", End.CONTROLLER_FAULT, "SystemExit: 4"),
+        ("os.close(3); os.close(4)", End.PEER_LOST, "Bad file descriptor"),
+        ("while True: pass", End.OUT_OF_TIME, "processor time"),
+        ("time.sleep(1e6)", End.PEER_SILENT, "no answer"),
+        ("sys.stdout.write('x' * 200_000); return 0.1, 0.0", End.OUTPUT_FLOOD, "printed more"),
+        ("os.write(3, b'[' * 60_000 + b'\\n'); time.sleep(1e6)", End.PEER_GARBAGE, "not a message"),
+        ("os.write(3, b'x' * 70_000); time.sleep(1e6)", End.PEER_GARBAGE, "longer"),
+        ("os.write(3, b'{}\\n{}\\n'); time.sleep(1e6)", End.PEER_FLOOD, "more than it was asked"),
+        ("return 0.5, 1 << 2000", End.CONTROLLER_FAULT, ""),
+    ],
+)
+def test_a_driving_ends_by_name_and_its_owner_is_told(
+    body: str, end: End, words: str, tmp_path: Path
+) -> None:
+    limits = Limits(decision_seconds=0.5, bank_seconds=0.5, wall_seconds=20.0, output=100_000)
+    if "sleep" in body and end is End.PEER_SILENT:
+        limits = replace(limits, wall_seconds=5.0)
+    result, controller = driven(written(tmp_path, body), limits)
+    assert result.ending.end is end, result.ending
+    assert words in result.ending.detail
+    assert controller.end is not None
+    assert (controller.end.name, controller.end.fault) == (end.value, "submission")
+
+
+def test_a_fault_in_a_box_is_told_as_in_process(tmp_path: Path) -> None:
+    spec = written(tmp_path, "return 1 / (3 - seen.tick), 0.0")
+    instance = make_instance(names=(), ticks=30)
+    there, here = dt.run_trial(instance, boxed_controller(spec)), dt.run_trial(instance, spec)
+    assert there.ending == here.ending
+
+
+def test_what_a_controller_prints_is_no_message_and_its_end_is_kept(tmp_path: Path) -> None:
+    spec = written(tmp_path, "print('tick', seen.tick, flush=True)\nos.write(1, b'raw ')\nreturn 0.1, 0.0")
+    result, controller = driven(spec)
+    assert result.ending.end is End.DURATION
+    assert "tick 29" in controller.log_tail.splitlines()[-2]
+
+
+def test_a_decision_may_take_longer_while_the_bank_lasts(tmp_path: Path) -> None:
+    body = "until = time.process_time() + 0.2\nwhile time.process_time() < until: pass\nreturn 0.1, 0.0"
+    spec = written(tmp_path, body)
+    within, _ = driven(spec, Limits(decision_seconds=0.1, bank_seconds=60.0), ticks=10)
+    assert within.ending.end is End.DURATION
+    beyond, _ = driven(spec, Limits(decision_seconds=0.1, bank_seconds=0.5), ticks=10)
+    assert beyond.ending.end is End.OUT_OF_TIME
+    assert 3 <= beyond.ending.ticks <= 6
+
+
+def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
+    program = tmp_path / "drive"
+    program.write_text(
+        textwrap.dedent("""\
+        #!/bin/sh
+        tick=0
+        while read -r line; do
+            case "$line" in
+            '{"frame"'*) echo "{\\"command\\":[0.25,0.125],\\"tick\\":$tick}"; tick=$((tick + 1)) ;;
+            esac
+        done
+        """)
+    )
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    result, controller = driven(f"program:{program}")
+    assert result.ending.end is End.DURATION, controller.log_tail
+    folder = tmp_path / "entry"
+    folder.mkdir()
+    program.rename(folder / "drive")
+    (folder / "controller.toml").write_text('program = ["./drive"]\n')
+    result, _ = driven(str(folder))
+    assert result.ending.end is End.DURATION
+
+
+def test_a_folder_with_a_manifest_may_import_its_neighbours(tmp_path: Path) -> None:
+    (tmp_path / "near.py").write_text("SPEED = 0.125\n")
+    (tmp_path / "main.py").write_text(
+        "import near\nclass Mine:\n    def start(self, problem): pass\n"
+        "    def act(self, seen): return near.SPEED, 0.0\n"
+    )
+    (tmp_path / "controller.toml").write_text('python = "main.py:Mine"\n')
+    result, _ = driven(str(tmp_path))
+    assert result.ending.end is End.DURATION
+
+
+@pytest.mark.parametrize("spec", ["keyboard", "nobody", "program:/no/such", "no.py:Mine", "nowhere:Mine"])
+def test_what_can_not_drive_in_a_box_is_refused(spec: str) -> None:
+    with pytest.raises(InputError):
+        boxed_controller(spec)
+
+
+def test_limits_are_read_as_they_are_written() -> None:
+    limits = Limits.from_text("memory=512M,decision_seconds=0.25")
+    assert limits == Limits(memory=512 << 20, decision_seconds=0.25)
+    assert Limits.from_text(limits.text()) == limits
+    for text in ("memory=0", "speed=1", "memory=1.5", "bank_seconds=-1", "wall_seconds=nan"):
+        with pytest.raises(InputError):
+            Limits.from_text(text)
+
+
+def test_a_campaign_can_tell_who_answers_for_every_end() -> None:
+    from dubins_traffic.sandbox import owner_of
+
+    assert {json.dumps(owner_of(end)) for end in End} == {'"platform"', '"submission"'}
