@@ -3,9 +3,10 @@
 `boxed_controller` returns a controller that drives in a box; `available_layers` says what this machine can enforce.
 """
 
+from dubins_traffic.sandbox.available import available_layers
 from dubins_traffic.sandbox.box import Box, BoxOverError
 from dubins_traffic.sandbox.controller import BoxedController, boxed_controller
-from dubins_traffic.sandbox.layers import Layers, available_layers
+from dubins_traffic.sandbox.layers import Layers
 from dubins_traffic.sandbox.limits import BoxEnd, Limits, owner_of
 
 __all__ = [

@@ -10,9 +10,10 @@ from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.public_problem import problem_to_document
 from dubins_traffic.protocols import End
+from dubins_traffic.sandbox.available import available_layers
 from dubins_traffic.sandbox.box import Box, BoxOverError
 from dubins_traffic.sandbox.launch import Program
-from dubins_traffic.sandbox.layers import Layers, available_layers
+from dubins_traffic.sandbox.layers import Layers
 from dubins_traffic.sandbox.limits import BoxEnd, Limits
 from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.transports.answers import AnswerError, command_in, message_in

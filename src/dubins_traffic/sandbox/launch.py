@@ -18,7 +18,7 @@ from itertools import count
 from pathlib import Path
 from typing import Final
 
-from dubins_traffic.sandbox.layers import Layers
+from dubins_traffic.sandbox.layers import ENVIRONMENT, IPC, MEMORY, NETWORK, PIDS, RLIMITS, USERS, Layers
 from dubins_traffic.sandbox.limits import Limits
 
 SYSTEM: Final = "/usr/bin:/bin"
@@ -91,11 +91,6 @@ def command_line(
     return ["unshare", "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
 
 
-def probe() -> list[str]:
-    """Return a command line that succeeds where boxes can be made."""
-    return command_line(Program(("/bin/true",)), Limits(), Layers().without("rlimits"), doors=(), seccomp=-1)
-
-
 def _setpriv() -> list[str]:
     user = str(FIRST_USER + (os.getpid() % (1 << 22)) * 64 + next(_numbers) % 64)
     drop = ["--clear-groups", "--inh-caps=-all", "--bounding-set=-all", "--no-new-privs"]
@@ -144,10 +139,10 @@ def _bubblewrap(
     """Return the command line of bubblewrap up to the program."""
     words = ["bwrap", "--unshare-user", "--unshare-uts", "--hostname", "box", "--unshare-cgroup-try"]
     words += ["--uid", str(USER), "--gid", str(USER), "--die-with-parent", "--new-session"]
-    for option, on in (("net", layers.network), ("pid", layers.pids), ("ipc", layers.ipc)):
+    for option, on in (("net", NETWORK in layers), ("pid", PIDS in layers), ("ipc", IPC in layers)):
         words += [f"--unshare-{option}"] if on else []
-    words += ["--disable-userns"] if layers.users else []
-    if layers.environment:
+    words += ["--disable-userns"] if USERS in layers else []
+    if ENVIRONMENT in layers:
         words += ["--clearenv", "--setenv", "PATH", SYSTEM, "--setenv", "HOME", "/tmp"]
         words += ["--setenv", "TMPDIR", "/tmp", "--setenv", "LANG", "C.UTF-8"]
     for name, value in environment.items():
@@ -155,7 +150,7 @@ def _bubblewrap(
     words += _system()
     for each in shown:
         words += ["--ro-bind", each.source, each.place]
-    words += ["--proc", "/proc"] if layers.pids else ["--ro-bind", "/proc", "/proc"]
+    words += ["--proc", "/proc"] if PIDS in layers else ["--ro-bind", "/proc", "/proc"]
     words += ["--size", str(limits.files), "--tmpfs", "/tmp", "--chdir", "/tmp"]
     return [*words, "--remount-ro", "/"]
 
@@ -182,11 +177,11 @@ def _system() -> list[str]:
 def _limits(limits: Limits, layers: Layers) -> str:
     """Return what the shell in the box does before it becomes the program."""
     lines = ["set -e"]
-    if layers.rlimits:
+    if RLIMITS in layers:
         most = {"c": 0, "n": OPEN_FILES, "f": -(-limits.files // 512), "l": 64}
         if layers.boxes:
             most["p"] = limits.processes + 1
-        if not layers.memory:
+        if MEMORY not in layers:
             most["v"] = limits.memory // 1024
         lines += [f"ulimit -{letter} {value}" for letter, value in most.items()]
     return "\n".join([*lines, f"echo {STANDS} >&2", 'exec "$@"'])

@@ -1,0 +1,145 @@
+"""The processes of a box: begun, counted, and killed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+from collections.abc import Generator
+
+from dubins_traffic.sandbox import cgroups, seccomp
+from dubins_traffic.sandbox.clocks import ProcessClocks
+from dubins_traffic.sandbox.launch import Program, command_line
+from dubins_traffic.sandbox.layers import CLOCK, ENVIRONMENT, MEMORY, PROCESSES, SECCOMP, Layers
+from dubins_traffic.sandbox.limits import Limits
+
+
+class Processes:
+    """The processes of a box, in their control group if there is one.
+
+    Parameters
+    ----------
+    program : Program
+        What runs in the box.
+    limits : Limits
+        What it may use.
+    layers : Layers
+        The layers of the box.
+
+    Attributes
+    ----------
+    questions, answers, printed : int
+        Descriptors of the program's standard input, output and error; none of them blocks.
+
+    Raises
+    ------
+    OSError
+        If they can't be begun; then nothing is left behind.
+    """
+
+    def __init__(self, program: Program, limits: Limits, layers: Layers) -> None:
+        self._limits, self._layers = limits, layers
+        where = _groups(layers)
+        self._group = cgroups.Group(where, limits) if where else None
+        try:
+            self._begin(program)
+        except BaseException:
+            if self._group is not None:
+                self._group.close()
+            raise
+        self._streams = [self._process.stdin, self._process.stdout, self._process.stderr]
+        own = [stream.fileno() for stream in self._streams if stream is not None]
+        self.questions, self.answers, self.printed = own
+        for each in own:
+            os.set_blocking(each, False)
+        self._clocks = ProcessClocks(self._process.pid)
+
+    def _begin(self, program: Program) -> None:
+        group = self._group
+        self._timed = group if CLOCK in self._layers and group is not None and group.has_clock else None
+        rules = seccomp.program(counts_children=self._timed is None) if SECCOMP in self._layers else b""
+        doors = () if group is None else group.doors
+        with _piped(rules) as source:
+            line = command_line(program, self._limits, self._layers, doors=doors, seccomp=source)
+            self._process = subprocess.Popen(
+                line,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=() if source < 0 else (source,),
+                env=_environment(program, self._layers),
+                cwd="/",
+                start_new_session=True,
+                bufsize=0,
+            )
+
+    def seconds(self, *, now: bool = False) -> float:
+        """Return the processor time so far; by the clocks of the processes as of the last look, unless `now`."""
+        if self._timed is not None:
+            return self._timed.seconds()
+        return self._clocks.seconds(now=now)
+
+    def out_of_memory(self) -> bool:
+        """Tell whether they have been stopped, or are to be stopped, for the memory that they use."""
+        if self._group is not None and MEMORY in self._layers:
+            return self._group.out_of_memory()
+        return self._clocks.memory > self._limits.memory
+
+    def status(self, seconds: float) -> str | None:
+        """Return how the first process ended, None if it does not within some `seconds`."""
+        try:
+            status = self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        number = -status if status < 0 else status - 128
+        try:
+            return f"signal {signal.Signals(number).name}" if number > 0 else f"status {status}"
+        except ValueError:
+            return f"status {status}"
+
+    def close(self) -> None:
+        """Kill them all and leave nothing behind. May be called twice."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            if self._layers.boxes:
+                self._process.kill()
+            else:
+                os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for stream in filter(None, self._streams):
+            stream.close()
+        if self._group is not None:
+            self._group.close()
+            self._group = self._timed = None
+
+
+def _groups(layers: Layers) -> cgroups.Trees:
+    """Return where a box's groups are, of the controllers that are wanted."""
+    where = cgroups.trees()
+    wanted = {"memory": MEMORY in layers, "pids": PROCESSES in layers, "cpuacct": CLOCK in layers}
+    return cgroups.Trees(where.version, {name: each for name, each in where.folders.items() if wanted[name]})
+
+
+def _environment(program: Program, layers: Layers) -> dict[str, str]:
+    own = {"PATH": os.environ.get("PATH", os.defpath)}
+    if ENVIRONMENT not in layers:
+        own = dict(os.environ)
+    return own if layers.boxes else own | {"HOME": "/tmp", "LANG": "C.UTF-8", **program.environment}
+
+
+@contextlib.contextmanager
+def _piped(data: bytes) -> Generator[int]:
+    """Yield a descriptor from which `data` is read once; -1 if there is none.
+
+    Each start has a descriptor of its own: one that has been read would have to be rewound, and two starts share it.
+    """
+    if not data:
+        yield -1
+        return
+    read, write = os.pipe()
+    try:
+        os.write(write, data)
+        os.close(write)
+        yield read
+    finally:
+        os.close(read)
