@@ -163,9 +163,11 @@ class Service:
 
     def __init__(self, process: subprocess.Popen[str], url: str, code: str, folder: Path) -> None:
         self.process, self.url, self.code, self.folder = process, url, code, folder
+        self.people: list[Person] = []
 
     def person(self, **options: Any) -> Person:
-        return Person(self.url, **options)
+        self.people.append(Person(self.url, **options))
+        return self.people[-1]
 
     def organiser(self) -> Person:
         return self.person().join(self.code, "Olga")
@@ -177,8 +179,10 @@ class Service:
 
 
 @contextmanager
-def serving(folder: Path, *arguments: str, port: int = 0, settings: str = "") -> Iterator[Service]:
-    """Run `dubins-traffic serve` in a folder; its key lies beside."""
+def serving(
+    folder: Path, *arguments: str, port: int = 0, settings: str = "", clean: bool = False
+) -> Iterator[Service]:
+    """Run `dubins-traffic serve` in a folder, its key and its log beside it; `clean`: the log must tell of no fault."""
     folder.mkdir(parents=True, exist_ok=True)
     if settings:
         (folder / "service.toml").write_text(settings)
@@ -194,7 +198,7 @@ def serving(folder: Path, *arguments: str, port: int = 0, settings: str = "") ->
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
     assert process.stdout is not None
-    line = process.stdout.readline()
+    line, people = process.stdout.readline(), []
     try:
         assert " at " in line, log.read_text()
         url = line.strip().rpartition(" ")[2]
@@ -203,12 +207,17 @@ def serving(folder: Path, *arguments: str, port: int = 0, settings: str = "") ->
             code = process.stdout.readline().strip().rpartition("=")[2]
             (folder / "joined").touch()
         wait_until(lambda: answers(url), 60)
-        yield Service(process, url, code, folder)
+        service = Service(process, url, code, folder)
+        people = service.people
+        yield service
     finally:
+        for person in people:
+            person.http.close()
         if process.poll() is None:
             process.terminate()
             process.wait(timeout=60)
         process.stdout.close()
+        assert "Traceback" not in log.read_text() or not clean, log.read_text()[-5000:]
 
 
 def answers(url: str) -> bool:

@@ -15,7 +15,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("service")
     (folder / "short.toml").write_text(competition_text())
     with serving(
-        folder / "here", "--competition", str(folder / "short.toml"), "--trust-submissions"
+        folder / "here", "--competition", str(folder / "short.toml"), "--trust-submissions", clean=True
     ) as running:
         yield running
 
