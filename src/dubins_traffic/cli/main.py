@@ -29,6 +29,7 @@ from dubins_traffic.cli import (
     serve,
     session,
     spec,
+    submit,
     synth,
     template,
     verify,
@@ -91,6 +92,10 @@ transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm
 app.add_typer(gazebo.app, name="gazebo")
 for name, transport in transports.items():
     app.add_typer(transport, name=name)
+app.command("submit", epilog=submit.EXAMPLES)(submit.submit)
+app.command("status", epilog=submit.STATUS_EXAMPLES)(submit.status)
+app.command("logs", epilog=submit.LOGS_EXAMPLES)(submit.logs)
+app.command("cancel", epilog=submit.CANCEL_EXAMPLES)(submit.cancel)
 app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
 app.command("worker", epilog=worker.EXAMPLES)(worker.worker)
 app.command("warm", epilog=warm.EXAMPLES)(warm.warm)

@@ -6,8 +6,10 @@ import json
 import re
 import shutil
 import tempfile
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, cast
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -104,14 +106,14 @@ def _written(draft: Path, given: Mapping[str, bytes]) -> Loaded:
 
 def _named_files(draft: Path) -> list[str]:
     """Return the names of configurations that look like paths: such files are read only if they were given."""
-    import tomllib
-
     try:
-        document = tomllib.loads((draft / FILE).read_text(encoding="utf-8"))
-        entries = document.get("configurations", [])
-        named = [entry.get("file", "") if isinstance(entry, dict) else entry for entry in entries]
+        document: Any = tomllib.loads((draft / FILE).read_text(encoding="utf-8"))
+        entries: list[Any] = list(document.get("configurations", []))
     except (OSError, ValueError, TypeError):
         return []  # load_competition says what is wrong
+    named: list[Any] = [
+        cast("Any", entry).get("file", "") if isinstance(entry, dict) else entry for entry in entries
+    ]
     return [name for name in named if isinstance(name, str) and ("/" in name or "\\" in name)]
 
 

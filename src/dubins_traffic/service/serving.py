@@ -58,8 +58,8 @@ def listen(place: Place) -> socket.socket:
 
 def address_of(opened: socket.socket) -> str:
     """Return the address of what a socket listens to."""
-    host, port = opened.getsockname()[:2]
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    name, port = opened.getsockname()[:2]
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(str(name), str(name))
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 

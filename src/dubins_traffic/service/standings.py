@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -126,7 +126,7 @@ def shown_table(phase: Loaded, standing: Standing | None) -> list[dict[str, Any]
 
 def _rounded(value: Any, digits: int) -> Any:
     if isinstance(value, dict):
-        return {name: _rounded(own, digits) for name, own in value.items()}
+        return {name: _rounded(own, digits) for name, own in cast("dict[str, Any]", value).items()}
     if isinstance(value, list):
-        return [_rounded(own, digits) for own in value]
+        return [_rounded(own, digits) for own in cast("list[Any]", value)]
     return round(value, digits) if isinstance(value, float) else value

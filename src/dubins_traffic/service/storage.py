@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from obstore.exceptions import BaseError, NotFoundError
+from obstore.exceptions import BaseError
 from obstore.store import LocalStore, from_url
 
 from dubins_traffic.errors import DubinsTrafficError
@@ -59,7 +59,7 @@ class Storage:
         """
         try:
             data = bytes(self._store.get(_key(kind, digest)).bytes())
-        except (NotFoundError, FileNotFoundError) as error:
+        except FileNotFoundError as error:
             raise StorageError(f"{kind}: {digest} is not in the store") from error
         except (BaseError, OSError) as error:
             raise StorageError(f"the store gives nothing: {_first_line(error)}") from error

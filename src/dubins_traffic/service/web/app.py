@@ -19,7 +19,7 @@ from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
 from litestar.response import Redirect, Template
-from litestar.static_files import create_static_files_router
+from litestar.static_files import create_static_files_router  # pyright: ignore[reportUnknownVariableType]
 from litestar.stores.file import FileStore
 from litestar.template import TemplateConfig
 from sqlalchemy.exc import DBAPIError
@@ -81,7 +81,7 @@ def create_app(office: Office) -> Litestar:
     environment = Environment(
         loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
     )
-    environment.filters["moment"] = moment
+    environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
     return Litestar(
         route_handlers=[
             *(pages.Pages, submitting.Submitting, login.Login, team.Teams, desk.Desk, api.Api, doors.Doors),
@@ -160,7 +160,7 @@ def _told(request: Request[Any, Any, Any], error: Exception) -> Response[Any]:
         )
     if status == 401 and request.method == "GET":
         return Redirect("/login", headers=HEADERS)
-    viewer = request.scope.get("user") or Viewer()
+    viewer = request.scope["user"] if "user" in request.scope else Viewer()
     office: Office = request.app.state["office"]
     return Template(
         "error.html",

@@ -86,8 +86,14 @@ class Login(Controller):
         return _enter(request, account)
 
 
+def keep(request: Asked, account: Account) -> None:
+    """Keep in the session whose it is, and the number of the password with which it was begun."""
+    session: Any = {"account": account.id, "epoch": account.epoch}
+    request.set_session(session)  # pyright: ignore[reportUnknownMemberType]
+
+
 def _enter(request: Asked, account: Account) -> Redirect:
-    """Begin a session, of which only the account and the number of its password are kept."""
+    """Begin a session, and lead on."""
     request.clear_session()
-    request.set_session({"account": account.id, "epoch": account.epoch})
+    keep(request, account)
     return Redirect("/", status_code=303)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from litestar import Controller, MediaType, Response, get
 from litestar.exceptions import NotFoundException
 from litestar.response import Template
@@ -11,7 +13,7 @@ from dubins_traffic.competition import sealing
 from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.tables import Competition, Submission, Trial
+from dubins_traffic.service.tables import Competition, Standing, Submission, Trial
 from dubins_traffic.service.web.said import page
 from dubins_traffic.service.web.viewer import Viewer
 
@@ -71,7 +73,7 @@ class Pages(Controller):
             row = receiving.found_phase(session, slug, name)
             phase, told = office.phase(row), viewing.told_phase(office, row, at)
             sees = viewing.sees_table(row, viewer.account, at)
-            every = standings.history(session, row) if sees else []
+            every: Sequence[Standing] = standings.history(session, row) if sees else ()
             whole = row.is_closed(at) or viewer.organiser
             tables = [
                 (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every

@@ -15,6 +15,7 @@ from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.tables import Account, Team, Token
+from dubins_traffic.service.web import login
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import Form, page
 from dubins_traffic.service.web.viewer import Viewer
@@ -80,7 +81,7 @@ class Teams(Controller):
         with office.database.writing() as session:
             account = _sure(session, viewer, data)
             accounts.set_password(session, account, data.get("new", ""), office.clock())
-            request.set_session({"account": account.id, "epoch": account.epoch})
+            login.keep(request, account)
         return Redirect("/team", status_code=303)
 
     @post("/remove", sync_to_thread=True)
