@@ -58,7 +58,10 @@ def serve(
     with needs("serving competitions", "service"):
         from dubins_traffic.service import logs, serving
         from dubins_traffic.service.office import Office, default_key
+        from dubins_traffic.service.worker import check_boxes
     logs.to_stderr()
+    if workers:
+        check_boxes(trust=trust)
     place = Path(folder)
     office = Office(place, default_key(place) if key_file is None else Path(key_file))
     opened = serving.listen(serving.Place(host, port))

@@ -22,6 +22,7 @@ from dubins_traffic.competition.competition import Competition, Phase
 from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.sandbox import available_layers
 from dubins_traffic.service.connection import AwayError, Connection, RefusalError
 
 log = structlog.get_logger("dubins_traffic.worker")
@@ -57,7 +58,14 @@ class Worker:
         self._stopping.set()
 
     def work(self) -> None:
-        """Work until `stop`; a service that is away is waited for."""
+        """Work until `stop`; a service that is away is waited for.
+
+        Raises
+        ------
+        InputError
+            If this machine can't hold a stranger's program, and the worker does not trust submissions.
+        """
+        check_boxes(trust=self._trust)
         while not self._stopping.is_set():
             try:
                 lease = self._service.post("/worker/lease", {"name": self._name})
@@ -173,6 +181,18 @@ def replay_of(record: Path) -> str:
         "duration_s": scored.duration_s,
     }
     return replay_page(found.instance, found.frames, found.ending, told, (), scored.verdict)
+
+
+def check_boxes(*, trust: bool) -> None:
+    """Refuse to work where this machine can't hold a stranger's program, unless submissions are trusted.
+
+    Raises
+    ------
+    InputError
+        With the layers of the box that are missing.
+    """
+    if not trust:
+        available_layers().require()
 
 
 def default_folder() -> Path:
