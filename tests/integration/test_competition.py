@@ -15,15 +15,16 @@ from pathlib import Path
 
 import pytest
 
+from dubins_traffic import load_record
 from dubins_traffic.competition.competition import Competition, load_competition
 from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evaluation
 from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.ranking import rank
 from dubins_traffic.competition.submission import Submission, check_submission
+from dubins_traffic.competition.templates import write_template
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic import load_record
 from tests.competitions import CONTROLLERS, IDLE, PRACTICE, ROAD, competition
 
 ROOT = Path(__file__).parents[2]
@@ -49,14 +50,14 @@ def command(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) -> None:
-    phase, submission = short(40).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    phase, submission = short(24).phase("practice"), entry("speaks_lines", tmp_path / "store")
     first = evaluate(phase, submission, tmp_path / "one")
     evaluate(phase, submission, tmp_path / "two", workers=2)
     assert (tmp_path / "one" / RESULTS).read_bytes() == (tmp_path / "two" / RESULTS).read_bytes()
     order = list(phase.numbers)
     random.Random(1).shuffle(order)
     assert told(list(judge(phase, order, submission))) == told(first.results)
-    assert len({own.frames for own in first.results}) == 40
+    assert len({own.frames for own in first.results}) == 24
     assert {own.end for own in first.results} == {"duration"}
 
 
@@ -192,10 +193,48 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     assert 3 <= kept < 200
 
 
+def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
+    write_template("python", tmp_path / "python")
+    write_template("cpp", tmp_path / "cpp")
+    subprocess.run(
+        ["make", "-s", "CXXFLAGS=-std=c++17 -Wall -Wextra -Werror"], cwd=tmp_path / "cpp", check=True
+    )
+    phase = short(3).phase("practice")
+    found = [
+        evaluate(phase, check_submission(tmp_path / name, tmp_path / "store"), tmp_path / f"{name}-out")
+        for name in ("python", "cpp")
+    ]
+    first, second = [[own.frames for own in one.results] for one in found]
+    assert first == second
+    assert {(own.end, own.owner, own.log) for one in found for own in one.results} == {
+        ("duration", None, "2 goals")
+    }
+
+
+BASE = """
+import sys
+for name in ("pyarrow", "scipy", "matplotlib", "pandas", "cryptography", "httpx"):
+    sys.modules[name] = None
+from dubins_traffic.cli.main import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_evaluating_needs_no_extra(tmp_path: Path) -> None:
+    (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
+    words = ["evaluate", "entry", "--competition", str(ROOT / "examples" / "competition"), "--json"]
+    done = subprocess.run(
+        [sys.executable, "-c", BASE, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert [own["number"] for own in told["trials"]] == [0, 1, 2, 3]
+    assert told["summary"]["trials"] == 4
+    assert len(list(tmp_path.glob("evaluations/practice-*/results.jsonl"))) == 1
+
+
 @pytest.mark.parametrize("name", ["python", "cpp", "competition"])
 def test_templates_are_whole_and_spoil_nothing(tmp_path: Path, name: str) -> None:
-    from dubins_traffic.competition.templates import write_template
-
     paths = write_template(name, tmp_path / "new")
     assert all(path.read_text() for path in paths)
     with pytest.raises(InputError, match="a new or empty folder"):

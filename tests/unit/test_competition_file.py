@@ -12,6 +12,7 @@ import jsonschema
 import pytest
 from referencing import Registry, Resource
 
+from dubins_traffic.cli.reference import renewed
 from dubins_traffic.competition.competition import Competition, load_competition
 from dubins_traffic.competition.schema import competition_schema, shipped_competition_schema
 from dubins_traffic.competition.templates import template_files
@@ -45,6 +46,15 @@ def test_times_of_toml_are_read_in_utc() -> None:
     assert test.is_open(datetime(2027, 2, 28, 23, 59, 59, tzinfo=UTC))
     assert not test.is_open(test.closes)
     assert test.is_closed(test.closes)
+
+
+def test_the_page_has_the_keys_as_the_code_has_them() -> None:
+    path = EXAMPLE.parents[1] / "docs" / "competitions" / "file.md"
+    page = path.read_text(encoding="utf-8")
+    assert renewed(page) == page, "run `python -m dubins_traffic.cli.reference docs/competitions/file.md`"
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    told = tomllib.loads(text.replace("rush.json", "town"))
+    assert [phase.name for phase in Competition.from_document(told).phases] == ["practice", "test"]
 
 
 def phases(**test: Any) -> dict[str, Any]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EXAMPLES = options.examples(
     "evaluate controller.py --competition spring",
     "evaluate my_entry --competition spring/competition.toml --workers 2 --records",
-    "evaluate entry.zip --competition spring --phase test   # once its seeds have been revealed",
+    "evaluate entry.zip --competition spring --phase test",
 )
 FOLDER = "evaluations"
 
@@ -41,7 +41,8 @@ def evaluate(
         ),
     ],
     phase: Annotated[
-        str, typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known.")
+        str,
+        typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed."),
     ] = "practice",
     output: Annotated[
         str | None,

@@ -1,4 +1,4 @@
-"""The parts of `docs/documents.md` that are read off the code.
+"""The parts of `docs/documents.md` and `docs/competitions/file.md` that are read off the code.
 
 ``python -m dubins_traffic.cli.reference PAGE...`` renews them.
 """
@@ -43,6 +43,13 @@ def _part(name: str) -> str:
             return "\n\n".join(parts)
         case "rules":
             return "\n".join(_table(catalogue.rules()))
+        case "competition":
+            from dubins_traffic.competition.reference import tables
+
+            parts = [
+                f"### {heading}\n\n" + "\n".join(_table(rows, "key")) for heading, rows in tables().items()
+            ]
+            return "\n\n".join(parts)
         case "configurations" | "controllers" | "simulators":
             entries = getattr(catalogue, name)()
             return "\n".join(
@@ -57,9 +64,9 @@ def _more(remarks: Iterable[str], parameters: Sequence[Parameter]) -> str:
     return text + ("\n\n" + "\n".join(_table(parameters)) if parameters else "")
 
 
-def _table(parameters: Iterable[Parameter]) -> list[str]:
+def _table(parameters: Iterable[Parameter], what: str = "parameter") -> list[str]:
     rows = [f"| `{own.name}` | {own.shown} | {own.meaning} |" for own in parameters]
-    return ["| parameter | default | meaning |", "|---|---|---|", *rows]
+    return [f"| {what} | default | meaning |", "|---|---|---|", *rows]
 
 
 if __name__ == "__main__":

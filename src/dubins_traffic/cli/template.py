@@ -10,7 +10,7 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("template python my_entry", "template cpp my_entry && make -C my_entry")
+EXAMPLES = options.examples("template python my_entry", "template cpp my_entry")
 
 
 class Language(StrEnum):

@@ -56,14 +56,14 @@ class Limits(Strict):
     start: Seconds = Field(default=60.0, description="processor time until the first command, s")
     decision: Seconds = Field(default=0.1, description="processor time of a decision that costs nothing, s")
     bank: Annotated[float, Field(ge=0, le=limits.SECONDS)] = Field(
-        default=5.0, description="processor time a trial for decisions that take longer, s"
+        default=10.0, description="processor time a trial for decisions that take longer, s"
     )
     wall: Seconds = Field(
         default=600.0, description="time a trial by the clock on the wall, against those that sleep, s"
     )
     memory: Annotated[int, Field(ge=16, le=1_000_000)] = Field(default=1024, description="memory, MiB")
     processes: Annotated[int, Field(ge=1, le=10_000)] = Field(
-        default=32, description="processes and threads at a time"
+        default=64, description="processes and threads at a time"
     )
     files: Annotated[int, Field(ge=1, le=100_000)] = Field(
         default=64, description="what it may write into its temporary folder, MiB"

@@ -23,13 +23,13 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels import asking, machine, store
 from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
 from dubins_traffic.kernels.machine import Code
+from dubins_traffic.kernels.store import KEPT, TIER
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-TIER = "DUBINS_TRAFFIC_KERNELS"
-"""The environment variable that says how kernels run."""
-TIERS = ("auto", "compiled", "interpreted")
+TIERS = ("auto", "compiled", "interpreted", KEPT)
+"""`kept`: what has been compiled is used, of a folder that need not be one's own, and nothing else is compiled."""
 BESIDE = (
     "kernels are being compiled in the background; until they are there, trials run interpreted, slower and with "
     "the same results"
@@ -207,6 +207,8 @@ class Kernel(Generic[P, R]):
         if found is not None:
             self.is_quick = True
             return Code(kinds, found[0], machine.load(found[1], store.symbol(path)))
+        if os.environ.get(TIER) == KEPT:
+            return None
         waiting = self._patient or waits() or bool(_rehearsing)
         if not waiting:
             asking.say(BESIDE)

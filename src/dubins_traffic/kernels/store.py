@@ -27,6 +27,15 @@ SUFFIX = ".kernel"
 FOLDER = "NUMBA_CACHE_DIR"
 """The environment variable that names another folder for compiled kernels."""
 
+TIER = "DUBINS_TRAFFIC_KERNELS"
+"""The environment variable that says how kernels run."""
+
+KEPT = "kept"
+"""Its value where kernels are read from the cache, and none is compiled."""
+
+READABLE = 0o644
+"""The mode of the files: a controller in a box (`dubins_traffic.sandbox`) is another user, and reads them."""
+
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -41,6 +50,8 @@ def cache_folder() -> Path:
 
         base = user_cache_path("dubins-traffic") / "kernels"
     folder = base / versions_hash()
+    if os.environ.get(TIER) == KEPT:
+        return folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -116,6 +127,7 @@ def write_whole(path: Path, data: bytes) -> None:
     handle, written = tempfile.mkstemp(dir=path.parent, prefix=f"{path.stem[:64]}.", suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:
+            os.fchmod(handle, READABLE)
             file.write(data)
         Path(written).replace(path)
     except BaseException:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import pickle
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -65,14 +67,20 @@ class BoxedController:
         self.end, self.log_tail, self._reports = None, "", ()
         try:
             self._box = Box(self._program, self._limits, self._layers)
-            ready = self._program.says_ready
-            line = self._box.ask(_line({"problem": problem_to_document(problem)}), answered=ready)
-            if ready and message_in(line) != {"started": True}:
-                raise AnswerError(End.PEER_GARBAGE, "it did not say that it has started")
-            if ready:
-                self._box.decide()
+            if self._program.shim:
+                self._start_shim(self._box, problem)
+            else:
+                self._box.ask(_line({"problem": problem_to_document(problem)}), answered=False)
         except (BoxOverError, AnswerError) as error:
             raise self._over(error) from None
+
+    @staticmethod
+    def _start_shim(box: Box, problem: Problem) -> None:
+        """Hand our shim the problem, pickled: to read the document of one it would have to load what checks it."""
+        pickled = base64.b64encode(pickle.dumps(problem)).decode()
+        if message_in(box.ask(_line({"pickled": pickled}))) != {"started": True}:
+            raise AnswerError(End.PEER_GARBAGE, "it did not say that it has started")
+        box.decide()
 
     def act(self, observation: Observation) -> Command:
         """Return the command that answers a frame."""
@@ -98,7 +106,7 @@ class BoxedController:
         if box is None:
             return
         try:
-            if box.over is None and self._program.says_ready:
+            if box.over is None and self._program.shim:
                 message_in(box.ask(_line({"end": {}})))
         except AnswerError as error:
             raise CloseError(error.detail) from None

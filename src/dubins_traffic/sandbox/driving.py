@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import pickle
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,9 +11,10 @@ from dubins_traffic.controllers import blame
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.problem.public_problem import problem_from_document
 from dubins_traffic.protocols import Closes, Controller, Reports
 from dubins_traffic.transports.observed import observation_from_document
+from dubins_traffic.trial.endings import checked_command
+from dubins_traffic.trial.seat import checked_reports
 
 
 class Driving:
@@ -29,8 +32,8 @@ class Driving:
         try:
             if "frame" in message:
                 return self._act(message["frame"])
-            if "problem" in message:
-                return self._start(message["problem"])
+            if "pickled" in message:
+                return self._start(message["pickled"])
             return self._close()
         except ControllerError as error:
             return {"fault": error.detail}
@@ -42,16 +45,14 @@ class Driving:
             blame.show(error)
             return {"fault": blame.error_text(error, None if self.done else self._tick)}
 
-    def _start(self, document: Mapping[str, Any]) -> dict[str, Any]:
-        self._problem = problem_from_document(document)
+    def _start(self, pickled: str) -> dict[str, Any]:
+        self._problem = pickle.loads(base64.b64decode(pickled))
+        assert isinstance(self._problem, Problem)
         self._controller = load(self._spec)
         self._controller.start(self._problem)
         return {"started": True}
 
     def _act(self, document: Mapping[str, Any]) -> dict[str, Any]:
-        from dubins_traffic.trial.endings import checked_command
-        from dubins_traffic.trial.seat import checked_reports
-
         assert self._problem is not None
         assert self._controller is not None
         seen = observation_from_document(document, self._problem)

@@ -51,13 +51,13 @@ class Shown:
 class Program:
     """What runs in a box: its command line as the box sees it, what it sees, and its environment.
 
-    `says_ready`: whether it says when it is ready to drive, as our shim does.
+    `shim`: whether it is ours, which is handed the problem pickled, and says when it is ready to drive.
     """
 
     command: tuple[str, ...]
     shown: tuple[Shown, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict[str, str])
-    says_ready: bool = False
+    shim: bool = False
 
 
 def command_line(

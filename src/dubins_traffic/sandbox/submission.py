@@ -16,6 +16,7 @@ from dubins_traffic import outside
 from dubins_traffic.controllers import registry
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file
+from dubins_traffic.kernels import store
 from dubins_traffic.sandbox.launch import Program, Shown
 
 PROGRAM: Final = "program:"
@@ -31,6 +32,8 @@ PYTHON: Final = "/python"
 """Where a box sees an interpreter that is not the system's."""
 SHIM: Final = f"{OWN}/dubins_traffic/sandbox/shim.py"
 EXPECTED: Final = "a controller, program:PATH, or a folder with controller.toml"
+KERNELS: Final = "/kernels"
+"""Where a box sees the compiled kernels of this machine."""
 ONE_THREAD: Final = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -125,7 +128,10 @@ def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     interpreter, seen, own = _interpreter()
     found = [word for path in (*own, *paths) for word in ("--path", path)]
     command = (interpreter, "-I", "-S", "-B", SHIM, *found, spec)
-    return Program(command, (*seen, *shown), ONE_THREAD, says_ready=True)
+    kernels = store.cache_folder().parent
+    library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if interpreter.startswith(PYTHON) else {}
+    environment = {**ONE_THREAD, **library, store.FOLDER: KERNELS, store.TIER: store.KEPT}
+    return Program(command, (*seen, Shown(str(kernels), KERNELS), *shown), environment, shim=True)
 
 
 @cache
