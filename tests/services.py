@@ -102,7 +102,7 @@ class Person:
 
     def __init__(self, url: str, **options: Any) -> None:
         self.http = httpx.Client(base_url=url, follow_redirects=False, timeout=60, **options)
-        self.token = ""
+        self.url, self.token = url, ""
 
     def get(self, path: str) -> httpx.Response:
         return self.http.get(path)
@@ -131,7 +131,7 @@ class Person:
 
     def api(self, method: str, path: str, **given: Any) -> httpx.Response:
         headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-        return httpx.request(method, f"{self.http.base_url}api{path}", headers=headers, timeout=60, **given)
+        return httpx.request(method, f"{self.url}/api{path}", headers=headers, timeout=60, **given)
 
     def submit(self, phase: str, source: str | bytes, name: str = "controller.py") -> int:
         """Hand in a submission on the page of a phase, as COMPETITION/PHASE; return its number."""

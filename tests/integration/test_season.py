@@ -31,7 +31,6 @@ class Controller:
             lambda: open("/etc/shadow").read(),
             lambda: os.environ["DUBINS_TRAFFIC_TOKEN"],
             lambda: socket.create_connection(("127.0.0.1", 8000), timeout=1),
-            lambda: os.kill(os.getppid(), 9),
         ):
             try:
                 attempt()
@@ -149,6 +148,6 @@ def again(folder: Path, export: bytes, number: int) -> None:
     )
     assert ran.returncode == 0, ran.stderr
     expected = json.loads((folder / f"test/results-{number}.json").read_text())
-    found = [{**own["row"], "frames": own["frames"]} for own in json.loads(ran.stdout)["results"]]
+    found = [{**own["row"], "frames": own["frames"]} for own in json.loads(ran.stdout)["trials"]]
     assert [own["frames"] for own in found] == [own["frames"] for own in expected]
     assert found == expected

@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from litestar import Controller, Response, get, post
 from litestar.datastructures import UploadFile
-from litestar.enums import RequestEncodingType
-from litestar.params import Body, Parameter
+from litestar.params import MultipartBody, PathParameter
 from sqlalchemy import select
 
 from dubins_traffic.service import receiving, standings, viewing
@@ -16,10 +15,10 @@ from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Competition
 from dubins_traffic.service.web import viewer as who
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
-Name = Annotated[str, Parameter(pattern="^[a-z0-9-]{1,60}$")]
-Number = Annotated[int, Parameter(ge=1, le=2**31 - 1)]
+Name = Annotated[str, PathParameter(pattern="^[a-z0-9-]{1,60}$")]
+Number = Annotated[int, PathParameter(ge=1, le=2**31 - 1)]
 
 
 @dataclass
@@ -36,32 +35,32 @@ class Api(Controller):
     tags = ["participants"]  # noqa: RUF012
 
     @get("/status", sync_to_thread=True)
-    def status(self, office: Office) -> dict[str, Any]:
+    def status(self, office: OfficeHere) -> dict[str, Any]:
         """Return how long the queue is, and how many workers there are."""
         with office.database.reading() as session:
             return viewing.told_status(office, session)
 
     @get("/competitions", sync_to_thread=True)
-    def competitions(self, office: Office) -> list[dict[str, Any]]:
+    def competitions(self, office: OfficeHere) -> list[dict[str, Any]]:
         """Return all competitions."""
         with office.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id)).all()
             return [viewing.told_competition(office, row) for row in rows]
 
     @get("/competitions/{slug:str}", sync_to_thread=True)
-    def competition(self, office: Office, slug: Name) -> dict[str, Any]:
+    def competition(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
         """Return a competition and its phases."""
         with office.database.reading() as session:
             return viewing.told_competition(office, _found(session, slug))
 
     @get("/competitions/{slug:str}/file", sync_to_thread=True)
-    def file(self, office: Office, slug: Name) -> dict[str, Any]:
+    def file(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
         """Return the competition file with its configurations written in, so that it can be evaluated at home."""
         with office.database.reading() as session:
             return dict(office.competition(_found(session, slug)).document)
 
     @get("/competitions/{slug:str}/phases/{name:str}/table", sync_to_thread=True)
-    def table(self, office: Office, viewer: Viewer, slug: Name, name: Name) -> list[dict[str, Any]]:
+    def table(self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
         """Return the table of a phase, as far as it may be seen."""
         at = office.clock()
         with office.database.reading() as session:
@@ -74,7 +73,7 @@ class Api(Controller):
             return standings.shown_table(office.phase(row), latest)
 
     @get("/account", sync_to_thread=True, guards=[who.person])
-    def account(self, viewer: Viewer) -> dict[str, Any]:
+    def account(self, viewer: ViewerHere) -> dict[str, Any]:
         """Return whose token this is."""
         return {
             "name": viewer.person.name,
@@ -83,7 +82,9 @@ class Api(Controller):
         }
 
     @get("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
-    def submissions(self, office: Office, viewer: Viewer, slug: Name, name: Name) -> list[dict[str, Any]]:
+    def submissions(
+        self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name
+    ) -> list[dict[str, Any]]:
         """Return the submissions of the own team to a phase, newest first."""
         with office.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
@@ -96,11 +97,11 @@ class Api(Controller):
     @post("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
     def submit(
         self,
-        office: Office,
-        viewer: Viewer,
+        office: OfficeHere,
+        viewer: ViewerHere,
         slug: Name,
         name: Name,
-        data: Annotated[Handed, Body(media_type=RequestEncodingType.MULTI_PART)],
+        data: MultipartBody[Handed],
     ) -> Response[dict[str, Any]]:
         """Hand in a submission; the same bytes again are the same submission, with status 200."""
         sent = data.file.file.read()
@@ -108,24 +109,24 @@ class Api(Controller):
         return Response(_told(office, viewer, number), status_code=201 if new else 200)
 
     @get("/submissions/{number:int}", sync_to_thread=True, guards=[who.person])
-    def submission(self, office: Office, viewer: Viewer, number: Number) -> dict[str, Any]:
+    def submission(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return what may be seen of a submission."""
         return _told(office, viewer, number)
 
     @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[who.person], status_code=200)
-    def cancel(self, office: Office, viewer: Viewer, number: Number) -> dict[str, Any]:
+    def cancel(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Cancel a submission."""
         receiving.cancel(office, viewer.person, number)
         return _told(office, viewer, number)
 
     @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[who.person], status_code=200)
-    def name(self, office: Office, viewer: Viewer, number: Number) -> dict[str, Any]:
+    def name(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Let a submission be the one of its team that counts."""
         receiving.name_it(office, viewer.person, number)
         return _told(office, viewer, number)
 
     @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[who.person])
-    def logs(self, office: Office, viewer: Viewer, number: Number) -> dict[str, Any]:
+    def logs(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
         told = _told(office, viewer, number)
         if "trials" in told:

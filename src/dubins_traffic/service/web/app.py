@@ -9,7 +9,6 @@ import structlog
 from jinja2 import Environment, PackageLoader, select_autoescape
 from litestar import Litestar, MediaType, Request, Response
 from litestar.config.csrf import CSRFConfig
-from litestar.contrib.jinja import JinjaTemplateEngine
 from litestar.di import Provide
 from litestar.exceptions import HTTPException
 from litestar.middleware import DefineMiddleware
@@ -18,6 +17,7 @@ from litestar.middleware.session.server_side import ServerSideSessionConfig
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
+from litestar.plugins.jinja import JinjaTemplateEngine
 from litestar.response import Redirect, Template
 from litestar.static_files import create_static_files_router  # pyright: ignore[reportUnknownVariableType]
 from litestar.stores.file import FileStore
@@ -33,7 +33,7 @@ from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, desk, doors, login, metrics, pages, submitting, team
 from dubins_traffic.service.web.said import moment
-from dubins_traffic.service.web.viewer import Recognition, Viewer
+from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
 
 log = structlog.get_logger("dubins_traffic.service")
 POLICY = (
@@ -46,7 +46,6 @@ HEADERS = {
     "referrer-policy": "same-origin",
     "cross-origin-opener-policy": "same-origin",
 }
-PROGRAMS = ("/api/", "/worker/", "/metrics")
 STATUS = {
     WrongEntryError: 400,
     UnknownError: 404,

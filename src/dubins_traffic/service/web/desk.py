@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 from litestar import Controller, Response, get, post
 from litestar.datastructures import UploadFile
-from litestar.enums import RequestEncodingType
-from litestar.params import Body
+from litestar.params import FromPath, MultipartBody, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 
@@ -19,9 +18,9 @@ from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import Form, page
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
-Given = Annotated[Form, Body(media_type=RequestEncodingType.URL_ENCODED)]
+Given = URLEncodedBody[Form]
 
 
 @dataclass
@@ -40,16 +39,16 @@ class Desk(Controller):
     guards = [who.organiser]  # noqa: RUF012
 
     @get("/", sync_to_thread=True)
-    def desk(self, office: Office, viewer: Viewer) -> Template:
+    def desk(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show the desk."""
         return _shown(office, viewer)
 
     @post("/create", sync_to_thread=True)
     def create(
         self,
-        office: Office,
-        viewer: Viewer,
-        data: Annotated[NewCompetition, Body(media_type=RequestEncodingType.MULTI_PART)],
+        office: OfficeHere,
+        viewer: ViewerHere,
+        data: MultipartBody[NewCompetition],
     ) -> Redirect:
         """Make a competition from its files."""
         given = {item.filename: item.file.read() for item in data.files if item.filename}
@@ -59,7 +58,7 @@ class Desk(Controller):
         return Redirect(f"/desk/c/{made.slug}", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
-    def invite(self, office: Office, viewer: Viewer, data: Given) -> Template:
+    def invite(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
         """Show a new invitation."""
         role = data.get("role", accounts.PARTICIPANT)
         if role not in accounts.ROLES:
@@ -70,7 +69,7 @@ class Desk(Controller):
         return _shown(office, viewer, code=code)
 
     @post("/worker", sync_to_thread=True, status_code=200)
-    def worker(self, office: Office, viewer: Viewer, data: Given) -> Template:
+    def worker(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
         """Show the token of a new worker, this once."""
         with office.database.writing() as session:
             token = accounts.new_token(session, data.get("name", ""), None, office.clock())
@@ -78,7 +77,7 @@ class Desk(Controller):
         return _shown(office, viewer, token=token)
 
     @post("/accounts/{number:int}/reset", sync_to_thread=True, status_code=200)
-    def reset(self, office: Office, viewer: Viewer, number: int) -> Template:
+    def reset(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Show a code by which a person can choose another password."""
         with office.database.writing() as session:
             account = _account(session, number)
@@ -87,7 +86,7 @@ class Desk(Controller):
         return _shown(office, viewer, reset=code)
 
     @post("/accounts/{number:int}/remove", sync_to_thread=True)
-    def remove(self, office: Office, viewer: Viewer, number: int) -> Redirect:
+    def remove(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Remove an account."""
         with office.database.writing() as session:
             accounts.remove(session, _account(session, number), office.clock())
@@ -95,7 +94,7 @@ class Desk(Controller):
         return Redirect("/desk", status_code=303)
 
     @get("/c/{slug:str}", sync_to_thread=True)
-    def competition(self, office: Office, viewer: Viewer, slug: str) -> Template:
+    def competition(self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show the phases of a competition and all its submissions."""
         with office.database.reading() as session:
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
@@ -110,7 +109,14 @@ class Desk(Controller):
         return page(office, viewer, "organise", f"Organise {told['title']}", competition=told)
 
     @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
-    def act(self, office: Office, viewer: Viewer, slug: str, name: str, act: str) -> Redirect:
+    def act(
+        self,
+        office: OfficeHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        act: FromPath[str],
+    ) -> Redirect:
         """Open, close or reveal a phase."""
         acts = {"open": organising.open_phase, "close": organising.close_phase, "reveal": organising.reveal}
         if act not in acts:
@@ -121,7 +127,7 @@ class Desk(Controller):
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @get("/c/{slug:str}/export.zip", sync_to_thread=True)
-    def export(self, office: Office, slug: str) -> Response[bytes]:
+    def export(self, office: OfficeHere, slug: FromPath[str]) -> Response[bytes]:
         """Return all that is needed to run the competition again."""
         with office.database.reading() as session:
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
@@ -132,7 +138,9 @@ class Desk(Controller):
         return Response(data, media_type="application/zip", headers=headers)
 
     @post("/s/{number:int}/{act:str}", sync_to_thread=True)
-    def submission(self, office: Office, viewer: Viewer, number: int, act: str, data: Given) -> Redirect:
+    def submission(
+        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], act: FromPath[str], data: Given
+    ) -> Redirect:
         """Judge a submission again, or disqualify it."""
         acts = {"rejudge": organising.judge_again, "disqualify": organising.disqualify}
         if act not in acts:
@@ -146,7 +154,7 @@ class Desk(Controller):
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @get("/log", sync_to_thread=True)
-    def log(self, office: Office, viewer: Viewer) -> Template:
+    def log(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show what organisers did."""
         with office.database.reading() as session:
             acts = session.scalars(select(Act).order_by(Act.id.desc()).limit(500)).all()

@@ -8,7 +8,7 @@ import msgspec
 from litestar import Controller, Request, Response, get, post, put
 from litestar.exceptions import ClientException, NotFoundException
 from litestar.openapi.spec import Example
-from litestar.params import Parameter
+from litestar.params import FromPath, FromQuery, JSONBody, PathParameter
 from litestar.status_codes import HTTP_200_OK, HTTP_204_NO_CONTENT
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -17,8 +17,9 @@ from dubins_traffic.service import housekeeping, queue, submissions
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Chunk, Submission, Worker
 from dubins_traffic.service.web import viewer
+from dubins_traffic.service.web.viewer import OfficeHere
 
-Digest = Annotated[str, Parameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
+Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
 Text = Annotated[str, msgspec.Meta(max_length=60)]
 LongText = Annotated[str, msgspec.Meta(max_length=100_000)]
 Whole = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
@@ -88,7 +89,7 @@ class Doors(Controller):
     include_in_schema = True
 
     @post("/lease", sync_to_thread=True, status_code=HTTP_200_OK)
-    def lease(self, office: Office, data: AskedFor) -> Response[Leased | None]:
+    def lease(self, office: OfficeHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
         """Lease the next chunk; nothing if none waits."""
         found = office.database.patiently(lambda session: _lease(office, session, data.name))
         if found is None:
@@ -96,7 +97,7 @@ class Doors(Controller):
         return Response(found)
 
     @get("/submissions/{digest:str}", sync_to_thread=True)
-    def submission(self, office: Office, digest: Digest) -> Response[bytes]:
+    def submission(self, office: OfficeHere, digest: Digest) -> Response[bytes]:
         """Return what a team has sent, by its SHA-256."""
         with office.database.reading() as session:
             if (
@@ -107,7 +108,7 @@ class Doors(Controller):
         return Response(office.storage.get(digest, "submissions"), media_type="application/octet-stream")
 
     @post("/chunks/{number:int}/heartbeat", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
-    def heartbeat(self, office: Office, number: int, data: Held) -> None:
+    def heartbeat(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Held]) -> None:
         """Renew a lease."""
 
         def renew(session: Session) -> None:
@@ -119,7 +120,11 @@ class Doors(Controller):
 
     @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK)
     async def replay(
-        self, office: Office, number: int, token: int, request: Request[Any, Any, Any]
+        self,
+        office: OfficeHere,
+        number: FromPath[int],
+        token: FromQuery[int],
+        request: Request[Any, Any, Any],
     ) -> dict[str, str]:
         """Keep the page that replays a trial, packed by gzip, and return its SHA-256."""
         with office.database.reading() as session:
@@ -130,12 +135,12 @@ class Doors(Controller):
         return {"digest": office.storage.put(data, "replays")}
 
     @post("/chunks/{number:int}/done", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
-    def done(self, office: Office, number: int, data: Report) -> None:
+    def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
         """End a lease with its results; they and what follows from them are kept together, or not at all."""
         office.database.patiently(lambda session: _done(office, session, number, data))
 
     @post("/chunks/{number:int}/release", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
-    def release(self, office: Office, number: int, data: Released) -> None:
+    def release(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Released]) -> None:
         """End a lease without a result: the chunk waits again."""
 
         def give_back(session: Session) -> None:

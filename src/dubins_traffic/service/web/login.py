@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 from litestar import Controller, Request, get, post
-from litestar.enums import RequestEncodingType
-from litestar.params import Body
+from litestar.params import FromQuery, URLEncodedBody
 from litestar.response import Redirect, Template
 
 from dubins_traffic.service import accounts
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Account
 from dubins_traffic.service.web.said import Form, page
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, ViewerHere
 
-Given = Annotated[Form, Body(media_type=RequestEncodingType.URL_ENCODED)]
+Given = URLEncodedBody[Form]
 Asked = Request[Any, Any, Any]
 
 
@@ -26,12 +24,14 @@ class Login(Controller):
     include_in_schema = False
 
     @get("/login", sync_to_thread=True)
-    def login_page(self, office: Office, viewer: Viewer) -> Template:
+    def login_page(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show the form to log in."""
         return page(office, viewer, "login", "Log in", wrong="", name="")
 
     @post("/login", sync_to_thread=True, status_code=200)
-    def login(self, request: Asked, office: Office, viewer: Viewer, data: Given) -> Template | Redirect:
+    def login(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
         """Log in."""
         with office.database.reading() as session:
             account = accounts.verified(session, data.get("name", ""), data.get("password", ""))
@@ -47,12 +47,14 @@ class Login(Controller):
         return Redirect("/")
 
     @get("/join", sync_to_thread=True)
-    def join_page(self, office: Office, viewer: Viewer, code: str = "") -> Template:
+    def join_page(self, office: OfficeHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
         """Show the form to make an account."""
         return page(office, viewer, "join", "Join", wrong="", given={"code": code})
 
     @post("/join", sync_to_thread=True, status_code=200)
-    def join(self, request: Asked, office: Office, viewer: Viewer, data: Given) -> Template | Redirect:
+    def join(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
         """Make an account by an invitation, and log in."""
         try:
             with office.database.writing() as session:
@@ -69,12 +71,14 @@ class Login(Controller):
         return _enter(request, account)
 
     @get("/reset", sync_to_thread=True)
-    def reset_page(self, office: Office, viewer: Viewer, code: str = "") -> Template:
+    def reset_page(self, office: OfficeHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
         """Show the form for a new password."""
         return page(office, viewer, "reset", "New password", wrong="", code=code)
 
     @post("/reset", sync_to_thread=True, status_code=200)
-    def reset(self, request: Asked, office: Office, viewer: Viewer, data: Given) -> Template | Redirect:
+    def reset(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
         """Set a new password by a code, and log in."""
         try:
             with office.database.writing() as session:

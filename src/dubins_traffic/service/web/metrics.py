@@ -8,13 +8,12 @@ from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from sqlalchemy import func, select
 
 from dubins_traffic.service import viewing
-from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Submission
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, ViewerHere
 
 
 @get("/metrics", sync_to_thread=True, include_in_schema=False)
-def metrics(office: Office, viewer: Viewer) -> Response[bytes]:
+def metrics(office: OfficeHere, viewer: ViewerHere) -> Response[bytes]:
     """Return the numbers in Prometheus' text format."""
     if not (viewer.organiser or viewer.worker):
         raise NotAuthorizedException("numbers are for organisers")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from litestar import Controller, MediaType, Response, get
 from litestar.exceptions import NotFoundException
+from litestar.params import FromPath
 from litestar.response import Template
 from sqlalchemy import select
 
@@ -15,7 +16,7 @@ from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Competition, Standing, Submission, Trial
 from dubins_traffic.service.web.said import page
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
 REPLAY_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -30,7 +31,7 @@ class Pages(Controller):
     include_in_schema = False
 
     @get("/", sync_to_thread=True)
-    def home(self, office: Office, viewer: Viewer) -> Template:
+    def home(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show all competitions."""
         with office.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
@@ -38,7 +39,7 @@ class Pages(Controller):
         return page(office, viewer, "home", "Competitions", competitions=told)
 
     @get("/c/{slug:str}", sync_to_thread=True)
-    def competition(self, office: Office, viewer: Viewer, slug: str) -> Template:
+    def competition(self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show a competition and its phases."""
         with office.database.reading() as session:
             row = competition_of(session, slug)
@@ -48,7 +49,9 @@ class Pages(Controller):
         return page(office, viewer, "competition", told["title"], competition=told)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
-    def phase(self, office: Office, viewer: Viewer, slug: str, name: str) -> Template:
+    def phase(
+        self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Template:
         """Show a phase: rules, limits, the form to submit, the own submissions."""
         at, account = office.clock(), viewer.account
         with office.database.reading() as session:
@@ -66,7 +69,9 @@ class Pages(Controller):
         )
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
-    def table(self, office: Office, viewer: Viewer, slug: str, name: str) -> Template:
+    def table(
+        self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Template:
         """Show the leaderboard of a phase and its history."""
         at = office.clock()
         with office.database.reading() as session:
@@ -85,7 +90,7 @@ class Pages(Controller):
         return page(office, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
 
     @get("/c/{slug:str}/{name:str}/commitment.json", sync_to_thread=True)
-    def commitment(self, office: Office, slug: str, name: str) -> Response[str]:
+    def commitment(self, office: OfficeHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the published commitment to secret seeds."""
         with office.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
@@ -95,7 +100,7 @@ class Pages(Controller):
         return Response(path.read_text(encoding="utf-8"), media_type=MediaType.JSON)
 
     @get("/c/{slug:str}/{name:str}/seeds.txt", sync_to_thread=True)
-    def seeds(self, office: Office, slug: str, name: str) -> Response[str]:
+    def seeds(self, office: OfficeHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the revealed seeds."""
         with office.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
@@ -105,7 +110,9 @@ class Pages(Controller):
         return Response(path.read_text(encoding="utf-8"), media_type=MediaType.TEXT)
 
     @get("/s/{number:int}/trials/{trial:int}", sync_to_thread=True)
-    def trial(self, office: Office, viewer: Viewer, number: int, trial: int) -> Template:
+    def trial(
+        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
+    ) -> Template:
         """Show a trial: its score, its log, its replay."""
         with office.database.reading() as session:
             submission, found = _seen(office, viewer, number, trial, session)
@@ -122,7 +129,9 @@ class Pages(Controller):
         return page(office, viewer, "trial", f"Trial {trial} of submission {number}", **given)
 
     @get("/s/{number:int}/trials/{trial:int}/replay", sync_to_thread=True)
-    def replay(self, office: Office, viewer: Viewer, number: int, trial: int) -> Response[bytes]:
+    def replay(
+        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
+    ) -> Response[bytes]:
         """Return the page that replays a trial, for a frame that may do nothing but draw."""
         with office.database.reading() as session:
             _, found = _seen(office, viewer, number, trial, session)
@@ -133,7 +142,7 @@ class Pages(Controller):
         return Response(data, media_type="text/html; charset=utf-8", headers=headers)
 
     @get("/status", sync_to_thread=True)
-    def status(self, office: Office, viewer: Viewer) -> Template:
+    def status(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show the queue and the workers."""
         with office.database.reading() as session:
             told = viewing.told_status(office, session)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 from litestar import Controller, get, post
 from litestar.datastructures import UploadFile
-from litestar.enums import RequestEncodingType
-from litestar.params import Body
+from litestar.params import FromPath, MultipartBody
 from litestar.response import Redirect, Template
 
 from dubins_traffic.service import receiving, viewing
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import page
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
 
 @dataclass
@@ -34,11 +33,11 @@ class Submitting(Controller):
     @post("/c/{slug:str}/{name:str}/submit", sync_to_thread=True)
     def submit(
         self,
-        office: Office,
-        viewer: Viewer,
-        slug: str,
-        name: str,
-        data: Annotated[Sent, Body(media_type=RequestEncodingType.MULTI_PART)],
+        office: OfficeHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        data: MultipartBody[Sent],
     ) -> Redirect:
         """Take in a submission."""
         sent = data.file.file.read()
@@ -46,23 +45,23 @@ class Submitting(Controller):
         return Redirect(f"/s/{number}", status_code=303)
 
     @get("/s/{number:int}", sync_to_thread=True)
-    def submission(self, office: Office, viewer: Viewer, number: int) -> Template:
+    def submission(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Show a submission."""
         return page(office, viewer, "submission", f"Submission {number}", **_told(office, viewer, number))
 
     @get("/s/{number:int}/live", sync_to_thread=True)
-    def live(self, office: Office, viewer: Viewer, number: int) -> Template:
+    def live(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Return the part of the page of a submission that changes."""
         return page(office, viewer, "live", "", **_told(office, viewer, number))
 
     @post("/s/{number:int}/cancel", sync_to_thread=True)
-    def cancel(self, office: Office, viewer: Viewer, number: int) -> Redirect:
+    def cancel(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Cancel a submission."""
         receiving.cancel(office, viewer.person, number)
         return Redirect(f"/s/{number}", status_code=303)
 
     @post("/s/{number:int}/name", sync_to_thread=True)
-    def name(self, office: Office, viewer: Viewer, number: int) -> Redirect:
+    def name(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Let a submission be the one that counts."""
         receiving.name_it(office, viewer.person, number)
         return Redirect(f"/s/{number}", status_code=303)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 from litestar import Controller, Request, get, post
-from litestar.enums import RequestEncodingType
-from litestar.params import Body
+from litestar.params import FromPath, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy.orm import Session
 
@@ -18,9 +17,9 @@ from dubins_traffic.service.tables import Account, Team, Token
 from dubins_traffic.service.web import login
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import Form, page
-from dubins_traffic.service.web.viewer import Viewer
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
-Given = Annotated[Form, Body(media_type=RequestEncodingType.URL_ENCODED)]
+Given = URLEncodedBody[Form]
 
 
 class Teams(Controller):
@@ -31,12 +30,12 @@ class Teams(Controller):
     guards = [who.person]  # noqa: RUF012
 
     @get("/", sync_to_thread=True)
-    def team(self, office: Office, viewer: Viewer) -> Template:
+    def team(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show the team, and the own account."""
         return _shown(office, viewer)
 
     @post("/found", sync_to_thread=True)
-    def found(self, office: Office, viewer: Viewer, data: Given) -> Redirect:
+    def found(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Redirect:
         """Found a team."""
         with office.database.writing() as session:
             account = session.get_one(Account, viewer.person.id)
@@ -46,7 +45,7 @@ class Teams(Controller):
         return Redirect("/team", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
-    def invite(self, office: Office, viewer: Viewer) -> Template:
+    def invite(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show a new code by which one person can join the team."""
         if viewer.team is None:
             raise RefusedError("you are in no team")
@@ -56,7 +55,7 @@ class Teams(Controller):
         return _shown(office, viewer, code=code)
 
     @post("/tokens", sync_to_thread=True, status_code=200)
-    def token(self, office: Office, viewer: Viewer, data: Given) -> Template:
+    def token(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
         """Show a new token of the API, this once."""
         with office.database.writing() as session:
             account = session.get_one(Account, viewer.person.id)
@@ -64,7 +63,7 @@ class Teams(Controller):
         return _shown(office, viewer, token=token)
 
     @post("/tokens/{number:int}/revoke", sync_to_thread=True)
-    def revoke(self, office: Office, viewer: Viewer, number: int) -> Redirect:
+    def revoke(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Revoke a token."""
         with office.database.writing() as session:
             token = session.get(Token, number) if number < 1 << 31 else None
@@ -75,7 +74,7 @@ class Teams(Controller):
 
     @post("/password", sync_to_thread=True)
     def password(
-        self, request: Request[Any, Any, Any], office: Office, viewer: Viewer, data: Given
+        self, request: Request[Any, Any, Any], office: OfficeHere, viewer: ViewerHere, data: Given
     ) -> Redirect:
         """Set another password."""
         with office.database.writing() as session:
@@ -86,7 +85,7 @@ class Teams(Controller):
 
     @post("/remove", sync_to_thread=True)
     def remove(
-        self, request: Request[Any, Any, Any], office: Office, viewer: Viewer, data: Given
+        self, request: Request[Any, Any, Any], office: OfficeHere, viewer: ViewerHere, data: Given
     ) -> Redirect:
         """Remove the own account."""
         with office.database.writing() as session:

@@ -7,6 +7,7 @@ from typing import Any
 
 import anyio.to_thread
 from litestar.connection import ASGIConnection
+from litestar.di import NamedDependency
 from litestar.exceptions import NotAuthorizedException, PermissionDeniedException
 from litestar.handlers import BaseRouteHandler
 from litestar.middleware import AbstractAuthenticationMiddleware, AuthenticationResult
@@ -15,8 +16,12 @@ from dubins_traffic.service import accounts
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Account, Team
 
+OfficeHere = NamedDependency[Office]
+"""The office, as handlers are given it."""
 Asked = ASGIConnection[Any, Any, Any, Any]
 BEARER = "bearer "
+PROGRAMS = ("/api/", "/worker/", "/metrics")
+"""Beginnings of the paths that programs ask for, by token."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +45,17 @@ class Viewer:
         return self.account
 
 
+ViewerHere = NamedDependency[Viewer]
+"""Who asks, as handlers are given it."""
+
+
 class Recognition(AbstractAuthenticationMiddleware):
     """Finds out who asks: by the session on pages, by the token alone where programs ask."""
 
     async def authenticate_request(self, connection: Asked) -> AuthenticationResult:
         """Return the viewer."""
         office: Office = connection.app.state["office"]
-        if connection.url.path.startswith(("/api/", "/worker/")):
+        if connection.url.path.startswith(PROGRAMS):
             given = connection.headers.get("authorization", "")
             token = given[len(BEARER) :].strip() if given.lower().startswith(BEARER) else ""
             viewer = await anyio.to_thread.run_sync(_by_token, office, token) if token else Viewer()
