@@ -187,7 +187,7 @@ def test_a_lost_password_is_reset_by_the_organiser(world: World) -> None:
     organiser = world.people[ORGANISER]
     person = world.service.person().join(organiser.invite(), "Dan", "Dogs")
     number = re.search(
-        r'accounts/(\d+)/reset"[^>]*>\s*<input[^>]*>\s*<button aria-label="New password for Dan"',
+        r'accounts/(\d+)/reset"[^>]*>\s*<input[^>]*>\s*<button aria-label="Lost password of Dan"',
         organiser.get("/desk").text,
     )
     assert number is not None
