@@ -36,7 +36,7 @@ from dubins_traffic.controllers.lanes import Lanes as Controller
 """
 
 
-def competition_text(trials: int = 2, closes: str = "2037-01-01T00:00:00Z", duration: float = 2.0) -> str:
+def competition_text(trials: int = 2, closes: str = "2037-01-01T00:00:00Z", duration: int = 2) -> str:
     """Return a competition file of three phases whose trials are short."""
     document = json.dumps({**json.loads(short_configuration(duration))})
     return f"""
@@ -68,13 +68,13 @@ quota = {{a_day = 3, total = 10}}
 """
 
 
-def short_configuration(duration: float) -> str:
+def short_configuration(duration: int) -> str:
     """Return the shipped configuration `demo` with another duration, as JSON."""
     from importlib.resources import files
 
     shipped = files("dubins_traffic.problem") / "configurations" / "demo.json"
     document = json.loads(shipped.read_text(encoding="utf-8"))
-    document["duration"] = duration
+    document["duration_bounds"] = [duration, duration]
     return json.dumps(document)
 
 

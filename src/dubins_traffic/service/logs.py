@@ -2,10 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import logging
 import sys
+from typing import TextIO
 
 import structlog
+
+
+class Tolerant(io.TextIOBase):
+    """A stream on which a line that can't be written, as on a full disk, is lost: no request fails for its log.
+
+    Parameters
+    ----------
+    stream : TextIO
+        Where lines go.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write what can be written."""
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Let it go on, if it can."""
+        with contextlib.suppress(OSError):
+            self._stream.flush()
 
 
 def to_stderr() -> None:
@@ -19,5 +46,5 @@ def to_stderr() -> None:
             shown,
         ],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        logger_factory=structlog.PrintLoggerFactory(Tolerant(sys.stderr)),
     )

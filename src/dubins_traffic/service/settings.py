@@ -38,7 +38,7 @@ class Settings(Strict):
         default=["127.0.0.1"], description="addresses of proxies whose X-Forwarded-* are believed"
     )
     lease: Positive = Field(default=60.0, description="how long a worker may be silent, s")
-    largest_upload: Annotated[int, Field(ge=1)] = Field(default=20, description="MiB of a submission")
+    largest_upload: Annotated[int, Field(ge=1)] = Field(default=16, description="MiB of a submission")
     largest_replay: Annotated[int, Field(ge=1)] = Field(default=32, description="MiB of a replay, packed")
     logins: Annotated[int, Field(ge=1)] = Field(
         default=20, description="attempts to log in, a minute and address"
