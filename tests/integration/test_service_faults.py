@@ -35,9 +35,9 @@ from tests.services import (
     wait_until,
 )
 
-FAULTS = int(os.environ.get("DUBINS_TRAFFIC_FAULTS", "4"))
+FAULTS = int(os.environ.get("DUBINS_TRAFFIC_FAULTS", "3"))
 NUMBERS = itertools.count()
-TRIALS = 12
+TRIALS = 4
 SETTINGS = "lease = 2.0\nlogins = 10000\n"
 
 
