@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -21,11 +23,13 @@ from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evalua
 from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.ranking import rank
+from dubins_traffic.competition.sealing import seal
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.competition.templates import write_template
+from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import run_trial
-from tests.competitions import CONTROLLERS, IDLE, PRACTICE, ROAD, competition
+from tests.competitions import CONTROLLERS, IDLE, KEY, PRACTICE, ROAD, TEST, competition
 
 ROOT = Path(__file__).parents[2]
 SHORT = {**ROAD, "duration": 6}
@@ -114,6 +118,56 @@ def test_entries_that_do_not_drive_rank_last(tmp_path: Path) -> None:
     assert owners["stands"] == {None}
 
 
+def test_what_is_finished_is_kept_on_a_full_disk(tmp_path: Path) -> None:
+    phase, submission = short(3).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    whole = evaluate(phase, submission, tmp_path / "one")
+    size = (tmp_path / "one" / RESULTS).stat().st_size
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size - 100, hard))
+    try:
+        with pytest.raises(InputError, match="what is finished is kept"):
+            evaluate(phase, submission, tmp_path / "two")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [own.number for own in load_evaluation(tmp_path / "two").results] == [0, 1]
+    assert evaluate(phase, submission, tmp_path / "two") == whole
+
+
+def test_a_trial_that_can_not_be_drawn_is_no_fault_of_the_submission(tmp_path: Path) -> None:
+    full = {**SHORT, "e-agents": [{"type": "lawful", "name": "car", "count": 90}]}
+    found = competition(
+        tmp_path,
+        configurations=[{"name": "road", "document": full}],
+        phases={"practice": {**PRACTICE, "trials": 1}, "test": {**TEST, "trials": 1}},
+    )
+    (own,) = judge(found.phase("practice"), [0], entry("speaks_lines", tmp_path / "store"))
+    assert (own.end, own.owner, own.counts, own.frames) == ("failed", "platform", False, None)
+    assert "can't be drawn" in own.row["reason"]
+    with pytest.raises(InputError, match="practice: road"):
+        found.phase("practice").check_draws()
+    with pytest.raises(InputError):
+        seal(found.phase("test"), KEY)
+
+
+def test_other_seeds_of_a_test_phase_show_the_same(tmp_path: Path) -> None:
+    seen: list[str] = []
+    frames: list[str | None] = []
+    for name in ("one", "two"):
+        phase = competition(
+            tmp_path / name,
+            configurations=[{"name": "road", "document": SHORT}],
+            phases={"test": {**TEST, "trials": 2}},
+        ).phase("test")
+        seal(phase, KEY)
+        seeds = dict(enumerate(phase.seeds(KEY)))
+        found = list(judge(phase, phase.numbers, entry("speaks_lines", tmp_path / "store"), seeds=seeds))
+        frames += [own.frames for own in found]
+        within = datetime(2026, 1, 15, tzinfo=UTC)
+        seen.append(json.dumps(visible(phase, SubmissionState("done"), found, now=within)))
+    assert len(set(frames)) == 4
+    assert seen[0] == seen[1]
+
+
 def test_a_season_on_the_command_line(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
     file = tmp_path / "spring" / "competition.toml"
@@ -159,8 +213,9 @@ def test_a_season_on_the_command_line(tmp_path: Path) -> None:
             "--json",
         )
     )
-    assert places[0]["place"] == 1
-    assert {own["entry"] for own in places} == {"ours", "second"}
+    assert places["places"][0]["place"] == 1
+    assert {own["entry"] for own in places["places"]} == {"ours", "second"}
+    assert [(own["first"], own["second"]) for own in places["differences"]] == [("ours", "second")]
     assert "counted_rounds of 2 trials" in ours(
         "competition", "rank", "spring", "--phase", "test", "results/ours"
     )

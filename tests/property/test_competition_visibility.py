@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import get_args
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.competition.competition import Phase
@@ -50,6 +50,7 @@ def state_of(name: State, reason: str) -> SubmissionState:
     return SubmissionState(name, reason, None, "2026-01-10T00:00:00+00:00", 3)
 
 
+@settings(deadline=None)
 @given(states, trials, trials, st.text(max_size=30), st.text(max_size=30))
 def test_other_seeds_change_no_byte_of_a_secret_phase(
     name: State, first: list[Judged], second: list[Judged], one_reason: str, other_reason: str
@@ -61,6 +62,7 @@ def test_other_seeds_change_no_byte_of_a_secret_phase(
     assert seen == json.dumps(visible(phase, state_of(name, other_reason), second, now=WITHIN))
 
 
+@settings(deadline=None)
 @given(trials, trials)
 def test_how_a_submission_ended_is_not_seen_of_a_secret_phase(
     first: list[Judged], second: list[Judged]
@@ -82,6 +84,7 @@ def test_queued_and_running_look_alike_and_faults_of_ours_are_told() -> None:
     assert "seed" not in json.dumps(told)
 
 
+@settings(deadline=None)
 @given(trials)
 def test_aggregates_are_rounded_and_told_of_enough_finished_trials_alone(found: list[Judged]) -> None:
     phase = FOUND.phase("validation")

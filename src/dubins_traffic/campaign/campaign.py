@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
@@ -20,10 +19,10 @@ from dubins_traffic.campaign.rows import RESULT, WALL
 from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import is_file, read_text
+from dubins_traffic.files import is_file
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.faults import parse
-from dubins_traffic.problem.files import plain
+from dubins_traffic.problem.files import plain, read_toml
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Column
@@ -133,8 +132,15 @@ class Campaign:
         return Chunk(number, cell.settled, cell.seed, place, trial, 1, deadline, self.metrics)
 
 
-def load_campaign(path: str | os.PathLike[str]) -> Campaign:
+def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -> Campaign:
     """Return the campaign in the TOML file at `path`.
+
+    Parameters
+    ----------
+    path : path
+        A campaign file.
+    sandbox : str, optional
+        What each controller may use in a box (`controllers.registry.sandboxed`); by default as the file names them.
 
     Raises
     ------
@@ -142,12 +148,13 @@ def load_campaign(path: str | os.PathLike[str]) -> Campaign:
         If there is no such file or something in it is wrong.
     """
     name = os.fspath(path)
-    try:
-        document = tomllib.loads(read_text(name))
-    except RecursionError:
-        raise InputError("nested too deep", file=name, expected="a campaign file, TOML") from None
-    except ValueError as error:
-        raise InputError(f"not TOML ({error})", file=name, expected="a campaign file, TOML") from None
+    document = read_toml(name, "a campaign file, TOML")
+    specs: Any = document.get("controllers")
+    if sandbox is not None and isinstance(specs, list):
+        named = cast("list[Any]", specs)
+        document["controllers"] = [
+            controllers.sandboxed(spec, sandbox) if isinstance(spec, str) else spec for spec in named
+        ]
     return Campaign.from_document(document, name, Path(name).parent)
 
 

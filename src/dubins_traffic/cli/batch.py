@@ -53,6 +53,9 @@ def batch(
     overwrite: options.Overwrite = False,
     append: options.Append = False,
     shield: options.Shield = False,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
@@ -61,7 +64,7 @@ def batch(
     Ctrl-C keeps the scores of all finished trials.
     """
     from dubins_traffic.cli.tables import show
-    from dubins_traffic.controllers.registry import shielded
+    from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.engine.batch import in_order, run_each
     from dubins_traffic.problem.configuration import load_config
     from dubins_traffic.record.sink import FAULTS
@@ -71,7 +74,7 @@ def batch(
     done: list[Outcome] = []
     each = run_each(
         drawn,
-        shielded(controller) if shield else controller,
+        dressed(controller, shield=shield, sandbox=options.boxes(sandbox, limits, trust)),
         trials=trials,
         seed=seed,
         batch=together,

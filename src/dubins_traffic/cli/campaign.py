@@ -66,8 +66,12 @@ def run(
             show_default="none, or as before",
         ),
     ] = None,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
 ) -> None:
     """Run a campaign, or what is left of it. Whatever ends it, finished trials are kept."""
+    from dubins_traffic.campaign.campaign import load_campaign
     from dubins_traffic.campaign.folder import kept
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cli.progress import progress
@@ -82,7 +86,13 @@ def run(
     try:
         with progress() as show:
             ran = run_campaign(
-                file, folder, workers=workers, ray=ray, resume=resume, records=records, progress=tell
+                load_campaign(file, sandbox=options.boxes(sandbox, limits, trust)),
+                folder,
+                workers=workers,
+                ray=ray,
+                resume=resume,
+                records=records,
+                progress=tell,
             )
     except (KeyboardInterrupt, ClusterLostError) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
     from dubins_traffic.checkup.checkup import Checkup
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 EXAMPLES = options.examples(
     "check-controller lanes",
     "check-controller my_controller.py:MyController --json",
+    "check-controller theirs.py:Driver --sandbox",
     "check-controller ./my_controller --over lcm",
     'check-controller "rosrun my_package my_node" --over ros1',
 )
@@ -45,6 +47,9 @@ def check_controller(
             "--over", help="C is a program that drives over this, in lockstep.", show_default="none"
         ),
     ] = None,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
     json: options.Json = False,
 ) -> None:
     """Run a controller through a short course, twice, and say what a competition would say of it.
@@ -53,8 +58,12 @@ def check_controller(
     end cleanly?
     """
     from dubins_traffic.checkup.checkup import check_controller as check
+    from dubins_traffic.controllers.registry import dressed
 
-    found = check(controller, None if over is None else over.value)
+    boxes = options.boxes(sandbox, limits, trust)
+    if boxes is not None and over is not None:
+        raise InputError("drives over a transport", file="--sandbox", value=over.value, expected="no --over")
+    found = check(dressed(controller, sandbox=boxes), None if over is None else over.value)
     if json:
         print(json_text.dumps(found.to_json(), indent=2))
     else:

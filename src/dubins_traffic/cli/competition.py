@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import shown
 
 if TYPE_CHECKING:
     from dubins_traffic.competition.competition import Phase
@@ -61,13 +62,15 @@ def new(
 
 @competition.command("check", epilog=CHECK_EXAMPLES)
 def check(file: File) -> None:
-    """Check a competition file, and say what its phases are."""
+    """Check a competition file, draw a trial of each configuration, and say what its phases are."""
     from dubins_traffic.competition.competition import load_competition
 
     found = load_competition(file)
-    print(f"{found.title}: {found.ranking.metric}, ties by {found.ranking.ties}")
     for phase in found.phases:
-        print(f"  {phase.name}: {_told(phase)}")
+        phase.check_draws()
+    print(f"{shown(found.title)}: {found.ranking.metric}, ties by {found.ranking.ties}")
+    for phase in found.phases:
+        print(f"  {phase.name}: {_phase_line(phase)}")
 
 
 @competition.command("seal", epilog=SEAL_EXAMPLES)
@@ -162,11 +165,13 @@ def rank(
     """Rank entries by their results in the same trials, with intervals, and say which places are ties."""
     from dubins_traffic.competition.evaluating import load_entries
     from dubins_traffic.competition.ranking import rank as ranked
+    from dubins_traffic.competition.ranking import ranking_document
 
     own = _phase(file, phase)
-    places = ranked(load_entries(entries, own), own)
+    found = load_entries(entries, own)
+    places = ranked(found, own)
     if json:
-        print(json_text.dumps([place.to_json() for place in places], indent=2))
+        print(json_text.dumps(ranking_document(found, own), indent=2))
     else:
         _show(places, own)
 
@@ -186,7 +191,7 @@ def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
     return checked_key(text.encode())
 
 
-def _told(phase: Phase) -> str:
+def _phase_line(phase: Phase) -> str:
     """Return a phase in a line."""
     names = ", ".join(own.name for own in phase.configurations)
     parts = [f"{len(phase.numbers)} trials of {names}", f"shows {phase.shows}"]

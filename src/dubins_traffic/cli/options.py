@@ -66,6 +66,26 @@ Shield = Annotated[
         "--shield", help="Change the ego's commands as little as needed for it to keep rules 1 to 3."
     ),
 ]
+Sandbox = Annotated[
+    bool,
+    typer.Option(
+        "--sandbox",
+        help="The controller drives in a box (docs/sandbox.md), and nothing of it is loaded here.",
+    ),
+]
+Limits = Annotated[
+    str,
+    typer.Option(
+        "--limits",
+        metavar="LIMITS",
+        help="What it may use there, as memory=512M,decision_seconds=0.1; implies --sandbox.",
+        show_default="as `sandbox check` shows",
+    ),
+]
+Trust = Annotated[
+    bool,
+    typer.Option("--trust-submissions", help="Also where this machine can't enforce all limits."),
+]
 Metrics = Annotated[
     list[str] | None,
     typer.Option(
@@ -118,6 +138,24 @@ Source = Annotated[
     ),
 ]
 Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
+
+
+def boxes(sandbox: bool, limits: str, trust: bool) -> str | None:
+    """Return what ends the names of controllers that drive in boxes (`controllers.registry.sandboxed`), None for none.
+
+    Raises
+    ------
+    InputError
+        If there are no such limits, or it is to trust what is not in a box.
+    """
+    if not sandbox and not limits:
+        if trust:
+            raise InputError("nothing to trust", file="--trust-submissions", expected="--sandbox beside it")
+        return None
+    from dubins_traffic.sandbox.limits import Limits
+
+    Limits.from_text(limits)
+    return ",".join(filter(None, (limits, "trust" if trust else "")))
 
 
 def trial_data(data: str | None, data_over: str | None) -> str | None:

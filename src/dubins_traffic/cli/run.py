@@ -20,6 +20,7 @@ EXAMPLES = options.examples(
     "run out/trial-0003.mcap --controller simple --json",
     "run town --controller lanes --shield",
     "run demo --simulator gazebo --records out",
+    "run demo --controller theirs.py:Driver --sandbox --limits memory=512M",
 )
 
 
@@ -81,6 +82,9 @@ def run(
         bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
     ] = False,
     shield: options.Shield = False,
+    sandbox: options.Sandbox = False,
+    limits: options.Limits = "",
+    trust: options.Trust = False,
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:
@@ -107,6 +111,7 @@ def run(
         simulator=simulator,
         show=gui,
         shield=shield,
+        sandbox=options.boxes(sandbox, limits, trust),
         metrics=metric or (),
     )
     results: list[Result] = []

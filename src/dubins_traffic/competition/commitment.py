@@ -9,18 +9,60 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
-
-if TYPE_CHECKING:
-    from dubins_traffic.competition.competition import Phase
+from dubins_traffic.problem.instance import Instance
 
 HEADING = "dubins-traffic seeds 1"
 _SALT = re.compile(r"[0-9a-f]{64}")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _SEED = re.compile(r"0|[1-9][0-9]{0,19}")
+
+
+class Seeded(Protocol):
+    """A phase, as far as its seeds go (`competition.Phase`)."""
+
+    @property
+    def name(self) -> str:
+        """Such as ``test``."""
+        ...
+
+    @property
+    def rules(self) -> str:
+        """SHA-256 of all that decides a trial and its rank, but for the seeds."""
+        ...
+
+    @property
+    def numbers(self) -> range:
+        """The numbers of its trials."""
+        ...
+
+    @property
+    def folder(self) -> Path | None:
+        """Where sealed and revealed seeds lie."""
+        ...
+
+    @property
+    def secret(self) -> bool:
+        """Whether its seeds are secret until it has closed."""
+        ...
+
+    @property
+    def closes(self) -> datetime | None:
+        """When it is over."""
+        ...
+
+    def instance(self, number: int, seed: int) -> Instance:
+        """Return what a trial is drawn to be from its seed; InputError if it can't be drawn."""
+        ...
+
+    def is_closed(self, now: datetime | None = None) -> bool:
+        """Tell whether it is over."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +127,7 @@ def read_seeds(text: str, file: str | None = None) -> Seeds:
     return Seeds(found["phase"], found["rules"], found["salt"], tuple(map(int, lines[4:-1])))
 
 
-def check_belong(seeds: Seeds, phase: Phase, file: str | None = None) -> None:
+def check_belong(seeds: Seeds, phase: Seeded, file: str | None = None) -> None:
     """Refuse seeds that are of another phase, or of one whose rules were others.
 
     Raises

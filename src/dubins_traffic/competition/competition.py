@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, time
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from dubins_traffic.campaign.campaign import check_names, configuration_of, inlined
+from dubins_traffic.competition.sealing import secret_seeds
 from dubins_traffic.competition.settings import (
     MOST_TRIALS,
     SECRET,
@@ -23,11 +23,10 @@ from dubins_traffic.competition.settings import (
     Ranking,
 )
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import read_text
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.faults import parse
-from dubins_traffic.problem.files import plain
+from dubins_traffic.problem.files import plain, read_toml
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.scoring.icra2016 import weight_of
 
@@ -140,8 +139,6 @@ class Phase:
         """
         if not self.secret:
             return (cast("int", self.model.seed),) * len(self.numbers)
-        from dubins_traffic.competition.sealing import secret_seeds
-
         return secret_seeds(self, key)
 
     def place(self, number: int) -> tuple[Named, int]:
@@ -154,6 +151,15 @@ class Phase:
                 expected=f"a number below {len(self.numbers)}",
             )
         return self.configurations[number // self.model.trials], number % self.model.trials
+
+    def check_draws(self) -> None:
+        """Draw the first trial of each configuration; InputError if one can't be drawn."""
+        for number in self.numbers[:: self.model.trials]:
+            try:
+                self.instance(number, 0 if self.secret else self.seeds()[number])
+            except InputError as error:
+                named, _ = self.place(number)
+                raise error.within(field=f"phases.{self.name}: {named.name}") from None
 
     def instance(self, number: int, seed: int) -> Instance:
         """Return what trial `number` is drawn to be from its seed."""
@@ -265,14 +271,8 @@ def load_competition(path: str | os.PathLike[str]) -> Competition:
         If there is no such file or something in it is wrong.
     """
     place = Path(path) / FILE if Path(path).is_dir() else Path(path)
-    name = os.fspath(place)
-    try:
-        document = tomllib.loads(read_text(name))
-    except RecursionError:
-        raise InputError("nested too deep", file=name, expected="a competition file, TOML") from None
-    except ValueError as error:
-        raise InputError(f"not TOML ({error})", file=name, expected="a competition file, TOML") from None
-    return Competition.from_document(document, name, place.parent)
+    document = read_toml(place, "a competition file, TOML")
+    return Competition.from_document(document, str(place), place.parent)
 
 
 FILE = "competition.toml"

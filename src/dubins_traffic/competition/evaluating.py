@@ -5,9 +5,12 @@ The folder of an evaluation holds ``results.jsonl``: a first line that says what
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import multiprocessing
-from collections.abc import Callable, Generator, Iterator, Sequence
+import os
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -88,11 +91,10 @@ def evaluate(
         work = _Work(phase, submission, seeds, trust, folder / "records" if records else None)
         if progress is not None:
             progress(len(found), len(phase.numbers))
-        with (folder / RESULTS).open("a", encoding="utf-8") as file:
-            for own in _run(work, left, workers):
+        with contextlib.closing(_run(work, left, workers)) as results:
+            for own in results:
                 found[own.number] = own
-                file.write(_line(own.to_json()))
-                file.flush()
+                _append(folder / RESULTS, _line(own.to_json()))
                 if progress is not None:
                     progress(len(found), len(phase.numbers))
         done = Evaluation(phase.name, phase.rules, submission.digest, tuple(found[k] for k in sorted(found)))
@@ -183,7 +185,7 @@ class _Work:
         return found
 
 
-def _run(work: _Work, numbers: Sequence[int], workers: int) -> Iterator[Judged]:
+def _run(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]:
     if workers == 1 or len(numbers) < 2:
         yield from map(work.judged, numbers)
         return
@@ -246,6 +248,18 @@ def _write(found: Evaluation, folder: Path) -> None:
     """Write the results in the order of their numbers: the same bytes whatever the order in which they came."""
     text = _line(found.head) + "".join(_line(own.to_json()) for own in found.results)
     replace_file(folder / RESULTS, lambda neighbour: neighbour.write_text(text, encoding="utf-8"))
+
+
+def _append(path: Path, line: str) -> None:
+    """Write a line to the end of a file; InputError if it is not held whole, and the next to read leaves it out."""
+    try:
+        with path.open("ab", buffering=0) as file:
+            if file.write(line.encode()) != len(line.encode()):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    except OSError as error:
+        raise InputError(
+            f"can't be written ({error.strerror}); what is finished is kept", file=str(path)
+        ) from None
 
 
 def _line(document: dict[str, Any]) -> str:

@@ -139,15 +139,13 @@ def _judged(
     phase.place(number)
     try:
         instance = phase.instance(number, seed)
-        seat = boxed(submission, phase.limits, trust=trust)
+    except InputError as error:
+        return _failed(number, f"it can't be drawn: {error}")
+    seat = boxed(submission, phase.limits, trust=trust)
+    name = submission.digest[:12]
+    try:
         result = run_trial(
-            instance,
-            seat,
-            record=path,
-            overwrite=True,
-            sinks=(digest,),
-            sketch=False,
-            name=submission.digest[:12],
+            instance, seat, record=path, overwrite=True, sinks=(digest,), sketch=False, name=name
         )
     except (InputError, MissingExtraError):
         raise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 from typing import Any, Final, TypeAlias
 
@@ -125,7 +126,7 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
                 places[-1].place if equal else k + 1,
                 own.name,
                 count,
-                estimate(own.values, median=False),
+                _estimated(own.values.tobytes()),
                 share(own.satisfied, count),
                 share(own.clean, count),
                 tuple(sorted(beside)),
@@ -138,6 +139,26 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
 def differences(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Difference]:
     """Return by how much each entry exceeds each other one, trial by trial; the errors are those of `rank`."""
     return _differences([_entry(name, results, phase) for name, results in entries.items()], phase)
+
+
+def ranking_document(entries: Mapping[str, Sequence[Result]], phase: Phase) -> dict[str, Any]:
+    """Return places and paired differences as a JSON object; the errors are those of `rank`."""
+    return {
+        "phase": phase.name,
+        "metric": phase.ranking.metric,
+        "places": [place.to_json() for place in rank(entries, phase)],
+        "differences": [
+            {
+                "first": own.first,
+                "second": own.second,
+                "mean": own.estimate.mean,
+                "interval": _ends(own.estimate.mean_interval),
+                "first_larger": own.larger,
+                "first_smaller": own.smaller,
+            }
+            for own in differences(entries, phase)
+        ],
+    }
 
 
 def missing(results: Sequence[Result], phase: Phase) -> list[int]:
@@ -196,8 +217,14 @@ def _differences(found: Sequence[_Entry], phase: Phase) -> list[Difference]:
     for one, other in combinations(found, 2):
         apart = one.values - other.values
         larger, smaller = int((apart > 0).sum()), int((apart < 0).sum())
-        made.append(Difference(one.name, other.name, column, estimate(apart, median=False), larger, smaller))
+        made.append(Difference(one.name, other.name, column, _estimated(apart.tobytes()), larger, smaller))
     return made
+
+
+@lru_cache(maxsize=1 << 14)
+def _estimated(values: bytes) -> Estimate:
+    """Return the estimate for values: most pairs are as they were when a table is made anew."""
+    return estimate(np.frombuffer(values), median=False)
 
 
 def _row(result: Result) -> Mapping[str, Any]:

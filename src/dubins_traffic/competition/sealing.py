@@ -8,6 +8,7 @@ is published when the phase opens, and ``published/PHASE.seeds.txt`` what is rev
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import secrets
@@ -18,8 +19,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dubins_traffic.competition.commitment import Seeds, check_belong, read_seeds
-from dubins_traffic.competition.competition import Phase
+from dubins_traffic.competition.commitment import Seeded, Seeds, check_belong, read_seeds
 from dubins_traffic.competition.keys import checked_key
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.files import is_file, read_text, replace_file
@@ -28,6 +28,8 @@ from dubins_traffic.problem.files import dumps, parse_json
 
 COST = 1 << 15
 """N of scrypt: 32 MiB and some tenths of a second for each guess (r = 8, p = 1)."""
+MOST_DRAWS = 20
+"""So many seeds are tried for a trial that can't always be drawn, such as one of many cars on few roads."""
 _BLOCK, _LANES = 8, 1
 _MEMORY = 1 << 26
 
@@ -58,33 +60,50 @@ class Published(Strict):
     published: str
 
 
-def sealed_path(phase: Phase) -> Path:
+def sealed_path(phase: Seeded) -> Path:
     """Return where the encrypted seeds of a phase lie."""
     return _folder(phase) / "sealed" / f"{phase.name}.json"
 
 
-def commitment_path(phase: Phase) -> Path:
+def commitment_path(phase: Seeded) -> Path:
     """Return where the published commitment of a phase lies."""
     return _folder(phase) / "published" / f"{phase.name}.commitment.json"
 
 
-def revealed_path(phase: Phase) -> Path:
+def revealed_path(phase: Seeded) -> Path:
     """Return where the revealed seeds of a phase lie."""
     return _folder(phase) / "published" / f"{phase.name}.seeds.txt"
 
 
-def draw_seeds(phase: Phase) -> Seeds:
-    """Return new seeds for a phase, from the system's source of secrets."""
-    seeds = tuple(secrets.randbits(64) for _ in phase.numbers)
+def draw_seeds(phase: Seeded) -> Seeds:
+    """Return new seeds for a phase, from the system's source of secrets, from which all its trials can be drawn.
+
+    Raises
+    ------
+    InputError
+        If a trial can't be drawn from any of `MOST_DRAWS` seeds.
+    """
+    seeds = tuple(_drawable(phase, number) for number in phase.numbers)
     return Seeds(phase.name, phase.rules, secrets.token_hex(32), seeds)
 
 
-def seal(phase: Phase, key: bytes, seeds: Seeds | None = None, *, overwrite: bool = False) -> str:
+def _drawable(phase: Seeded, number: int) -> int:
+    for _ in range(MOST_DRAWS - 1):
+        seed = secrets.randbits(64)
+        with contextlib.suppress(InputError):
+            phase.instance(number, seed)
+            return seed
+    seed = secrets.randbits(64)
+    phase.instance(number, seed)
+    return seed
+
+
+def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bool = False) -> str:
     """Draw the secret seeds of a phase and write them, encrypted; return their commitment.
 
     Parameters
     ----------
-    phase : Phase
+    phase : Seeded
         Of a competition that has a folder.
     key : bytes
         Passphrase, or contents of a key file.
@@ -116,7 +135,7 @@ def seal(phase: Phase, key: bytes, seeds: Seeds | None = None, *, overwrite: boo
     return seeds.commitment
 
 
-def unsealed(phase: Phase, key: bytes) -> Seeds:
+def unsealed(phase: Seeded, key: bytes) -> Seeds:
     """Return the secret seeds of a phase.
 
     Raises
@@ -146,7 +165,7 @@ def unsealed(phase: Phase, key: bytes) -> Seeds:
     return seeds
 
 
-def publish(phase: Phase, title: str, now: datetime | None = None) -> Published:
+def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published:
     """Write the commitment of a phase for everybody to see, and return it; a second time it is the same.
 
     Raises
@@ -179,7 +198,7 @@ def publish(phase: Phase, title: str, now: datetime | None = None) -> Published:
     return made
 
 
-def reveal(phase: Phase, key: bytes, now: datetime | None = None) -> Path:
+def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
     """Write the seeds of a phase that has closed for everybody to see; return where.
 
     Raises
@@ -203,7 +222,7 @@ def reveal(phase: Phase, key: bytes, now: datetime | None = None) -> Path:
     return revealed_path(phase)
 
 
-def check_revealed(seeds: Seeds, phase: Phase, commitment: str) -> None:
+def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
     """Refuse seeds that are not those of a phase that were committed to.
 
     Raises
@@ -221,7 +240,7 @@ def check_revealed(seeds: Seeds, phase: Phase, commitment: str) -> None:
         )
 
 
-def secret_seeds(phase: Phase, key: bytes | None) -> tuple[int, ...]:
+def secret_seeds(phase: Seeded, key: bytes | None) -> tuple[int, ...]:
     """Return the seeds of a phase that has secret ones: the revealed ones, else those that `key` decrypts.
 
     Raises
@@ -250,7 +269,7 @@ def read_published(path: Path) -> Published:
     return parse(Published, parse_json(read_text(path), str(path)), file=str(path))
 
 
-def _sealed(phase: Phase) -> Sealed:
+def _sealed(phase: Seeded) -> Sealed:
     path = sealed_path(phase)
     _check_secret(phase)
     if not is_file(path):
@@ -267,17 +286,16 @@ def _sealed(phase: Phase) -> Sealed:
     return found
 
 
-def _check_secret(phase: Phase) -> None:
+def _check_secret(phase: Seeded) -> None:
     if not phase.secret:
         raise InputError(
             "its seeds are no secret",
             field=f"phases.{phase.name}.seed",
-            value=phase.model.seed,
             expected='a phase with seed = "secret"',
         )
 
 
-def _folder(phase: Phase) -> Path:
+def _folder(phase: Seeded) -> Path:
     if phase.folder is None:
         raise InputError(
             "a competition without a folder", field=f"phases.{phase.name}", expected="one that is a file"

@@ -101,8 +101,8 @@ def check_submission(
     return _submission(digest, path, manifest)
 
 
-def load_submission(store: str | os.PathLike[str], digest: str) -> Submission:
-    """Return a stored submission.
+def load_submission(store: str | os.PathLike[str], digest: str, bounds: Bounds | None = None) -> Submission:
+    """Return a stored submission; `bounds` are those under which it was checked.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def load_submission(store: str | os.PathLike[str], digest: str) -> Submission:
     path = Path(store) / digest
     if not re.fullmatch(r"[0-9a-f]{64}", digest) or not path.is_dir():
         raise InputError("no such submission", file=os.fspath(store), value=digest)
-    files = folder_files(path, Bounds())
+    files = folder_files(path, bounds or Bounds())
     if content_digest(files) != digest:
         raise InputError("what is stored has been changed", file=str(path))
     return _submission(digest, path, _manifest(files))

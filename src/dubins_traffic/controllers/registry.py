@@ -154,12 +154,10 @@ def sandboxed(spec: str, limits: str = "") -> str:
     return bare + ending
 
 
-def unboxed(spec: str) -> tuple[str, str]:
-    """Return a name without what says that it drives in a box, and that, "" for none."""
-    shield = _SHIELD.search(spec)
-    bare, ending = (spec, "") if shield is None else (spec[: shield.start()], shield[0])
-    boxed = _SANDBOX.search(bare)
-    return (spec, "") if boxed is None else (bare[: boxed.start()] + ending, boxed[0])
+def dressed(spec: str, *, shield: bool = False, sandbox: str | None = None) -> str:
+    """Return the name of a controller in a box unless `sandbox` is None, and under the shield if `shield`."""
+    boxed = spec if sandbox is None else sandboxed(spec, sandbox)
+    return shielded(boxed) if shield else boxed
 
 
 def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -97,6 +98,23 @@ def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
         reason = "nested too deep" if isinstance(error, RecursionError) else "a number has too many digits"
         raise InputError(f"not a document ({reason})", file=file, expected="a smaller document") from None
     return plain(document, file=file)
+
+
+def read_toml(path: str | os.PathLike[str], expected: str) -> dict[str, Any]:
+    """Return what the TOML file at `path` says.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it is no TOML; `expected` says what it should be.
+    """
+    name = os.fspath(path)
+    try:
+        return tomllib.loads(decoded(read_bytes(name), name))
+    except RecursionError:
+        raise InputError("nested too deep", file=name, expected=expected) from None
+    except ValueError as error:
+        raise InputError(f"not TOML ({error})", file=name, expected=expected) from None
 
 
 def plain(document: object, file: str | None = None) -> dict[str, Any]:

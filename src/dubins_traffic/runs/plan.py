@@ -73,6 +73,7 @@ def plan(
     simulator: str | None = None,
     show: bool = False,
     shield: bool = False,
+    sandbox: str | None = None,
     metrics: Sequence[str] = (),
 ) -> Plan:
     """Return what is to be run, checked as far as can be before anything runs.
@@ -108,6 +109,8 @@ def plan(
         Whether the simulator shows the trials in a window of its own, at the pace of the clock.
     shield : bool
         Whether the controller drives under the shield (`controllers.shield`).
+    sandbox : str, optional
+        What it may use in a box (`controllers.registry.sandboxed`); by default it drives in this process.
     metrics : sequence of str
         Further metrics: names, ``module:Class`` or ``path/to/file.py:Class``.
 
@@ -119,7 +122,7 @@ def plan(
     found = load(source, rnd=rnd, seed=seed or 0)
     if controller is None:
         controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
-    controller = controllers.shielded(controller) if shield else controller
+    controller = controllers.dressed(controller, shield=shield, sandbox=sandbox)
     controllers.load(controller)
     scores.columns(metrics)
     _check_deadline(deadline)

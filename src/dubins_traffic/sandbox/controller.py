@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import base64
-import json
 import pickle
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Self
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, Self
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.errors import InputError
@@ -19,6 +18,7 @@ from dubins_traffic.sandbox.layers import Layers
 from dubins_traffic.sandbox.limits import BoxEnd, Limits
 from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.transports.answers import AnswerError, command_in, message_in
+from dubins_traffic.transports.lines import as_line
 from dubins_traffic.transports.observed import observation_to_document
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class BoxedController:
             if self._program.shim:
                 self._start_shim(self._box, problem)
             else:
-                self._box.ask(_line({"problem": problem_to_document(problem)}), answered=False)
+                self._box.ask(as_line({"problem": problem_to_document(problem)}), answered=False)
         except (BoxOverError, AnswerError) as error:
             raise self._over(error) from None
 
@@ -78,7 +78,7 @@ class BoxedController:
     def _start_shim(box: Box, problem: Problem) -> None:
         """Hand our shim the problem, pickled: to read the document of one it would have to load what checks it."""
         pickled = base64.b64encode(pickle.dumps(problem)).decode()
-        if message_in(box.ask(_line({"pickled": pickled}))) != {"started": True}:
+        if message_in(box.ask(as_line({"pickled": pickled}))) != {"started": True}:
             raise AnswerError(End.PEER_GARBAGE, "it did not say that it has started")
         box.decide()
 
@@ -87,7 +87,7 @@ class BoxedController:
         box = self._box
         assert box is not None
         try:
-            line = box.ask(_line({"frame": observation_to_document(observation)}))
+            line = box.ask(as_line({"frame": observation_to_document(observation)}))
             answer = command_in(line, observation.tick)
         except (BoxOverError, AnswerError) as error:
             raise self._over(error) from None
@@ -107,7 +107,7 @@ class BoxedController:
             return
         try:
             if box.over is None and self._program.shim:
-                message_in(box.ask(_line({"end": {}})))
+                message_in(box.ask(as_line({"end": {}})))
         except AnswerError as error:
             raise CloseError(error.detail) from None
         finally:
@@ -176,7 +176,3 @@ def named(path: str, text: str) -> BoxedController:
     parts = [part for part in text.split(",") if part]
     limits = Limits.from_text(",".join(part for part in parts if part != TRUST))
     return boxed_controller(path, limits, trust=TRUST in parts)
-
-
-def _line(message: Mapping[str, Any]) -> bytes:
-    return json.dumps(message, separators=(",", ":")).encode() + b"\n"

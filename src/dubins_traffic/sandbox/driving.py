@@ -27,13 +27,18 @@ class Driving:
         self._tick = 0
         self.done = False
 
-    def answer(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the answer to a message; whatever the controller raises is its fault."""
+    def answer(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Return the answer to a message, if it has one; whatever the controller raises is its fault."""
         try:
             if "frame" in message:
                 return self._act(message["frame"])
             if "pickled" in message:
-                return self._start(message["pickled"])
+                return self._start(pickle.loads(base64.b64decode(message["pickled"])))
+            if "problem" in message:
+                from dubins_traffic.problem.public_problem import problem_from_document
+
+                self._start(problem_from_document(message["problem"]))
+                return None
             return self._close()
         except ControllerError as error:
             return {"fault": error.detail}
@@ -45,11 +50,10 @@ class Driving:
             blame.show(error)
             return {"fault": blame.error_text(error, None if self.done else self._tick)}
 
-    def _start(self, pickled: str) -> dict[str, Any]:
-        self._problem = pickle.loads(base64.b64decode(pickled))
-        assert isinstance(self._problem, Problem)
+    def _start(self, problem: Problem) -> dict[str, Any]:
+        self._problem = problem
         self._controller = load(self._spec)
-        self._controller.start(self._problem)
+        self._controller.start(problem)
         return {"started": True}
 
     def _act(self, document: Mapping[str, Any]) -> dict[str, Any]:

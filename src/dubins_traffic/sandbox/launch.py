@@ -61,7 +61,7 @@ class Program:
 
 
 def command_line(
-    program: Program, limits: Limits, layers: Layers, *, doors: Sequence[str], seccomp: int
+    program: Program, limits: Limits, layers: Layers, *, doors: Sequence[str], seccomp: int, told: bool = True
 ) -> list[str]:
     """Return the command line that begins a box.
 
@@ -77,9 +77,11 @@ def command_line(
         Files of its control group into which the first process writes its number.
     seccomp : int
         Descriptor from which bubblewrap reads the filter of system calls; -1 for none.
+    told : bool
+        Whether the box says on standard error that it stands.
     """
     root = os.getuid() == 0 and layers.boxes
-    inner = ["/bin/sh", "-c", _limits(limits, layers), "box", *program.command]
+    inner = ["/bin/sh", "-c", _limits(limits, layers, told), "box", *program.command]
     if not layers.boxes:
         return _entered(inner, doors, ())
     staged, steps = _staged(program.shown) if root else (program.shown, [])
@@ -174,7 +176,7 @@ def _system() -> list[str]:
     return [*words, "--symlink", "/proc/self/fd", "/dev/fd", "--symlink", "/tmp", "/dev/shm"]
 
 
-def _limits(limits: Limits, layers: Layers) -> str:
+def _limits(limits: Limits, layers: Layers, told: bool) -> str:
     """Return what the shell in the box does before it becomes the program."""
     lines = ["set -e"]
     if RLIMITS in layers:
@@ -184,4 +186,5 @@ def _limits(limits: Limits, layers: Layers) -> str:
         if MEMORY not in layers:
             most["v"] = limits.memory // 1024
         lines += [f"ulimit -{letter} {value}" for letter, value in most.items()]
-    return "\n".join([*lines, f"echo {STANDS} >&2", 'exec "$@"'])
+    lines += [f"echo {STANDS} >&2"] if told else []
+    return "\n".join([*lines, 'exec "$@"'])

@@ -26,11 +26,14 @@ class Processes:
         What it may use.
     layers : Layers
         The layers of the box.
+    prints : bool
+        Whether what is printed goes where this process prints.
 
     Attributes
     ----------
     questions, answers, printed : int
-        Descriptors of the program's standard input, output and error; none of them blocks.
+        Descriptors of the program's standard input, output and error; none of them blocks. `printed` is -1 if what is
+        printed goes elsewhere.
 
     Raises
     ------
@@ -38,7 +41,8 @@ class Processes:
         If they can't be begun; then nothing is left behind.
     """
 
-    def __init__(self, program: Program, limits: Limits, layers: Layers) -> None:
+    def __init__(self, program: Program, limits: Limits, layers: Layers, *, prints: bool = False) -> None:
+        self._errors = None if prints else subprocess.PIPE
         self._limits, self._layers = limits, layers
         where = _groups(layers)
         self._group = cgroups.Group(where, limits) if where else None
@@ -50,7 +54,7 @@ class Processes:
             raise
         self._streams = [self._process.stdin, self._process.stdout, self._process.stderr]
         own = [stream.fileno() for stream in self._streams if stream is not None]
-        self.questions, self.answers, self.printed = own
+        self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
         for each in own:
             os.set_blocking(each, False)
         self._clocks = ProcessClocks(self._process.pid)
@@ -61,12 +65,19 @@ class Processes:
         rules = seccomp.program(counts_children=self._timed is None) if SECCOMP in self._layers else b""
         doors = () if group is None else group.doors
         with _piped(rules) as source:
-            line = command_line(program, self._limits, self._layers, doors=doors, seccomp=source)
+            line = command_line(
+                program,
+                self._limits,
+                self._layers,
+                doors=doors,
+                seccomp=source,
+                told=self._errors is not None,
+            )
             self._process = subprocess.Popen(
                 line,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
+                stderr=self._errors,
                 pass_fds=() if source < 0 else (source,),
                 env=_environment(program, self._layers),
                 cwd="/",

@@ -27,9 +27,10 @@ def main() -> None:
     with os.fdopen(questions, "rb") as lines:
         for line in lines:
             answer = driving.answer(json.loads(line))
-            text = json.dumps(answer, separators=(",", ":"), allow_nan=False)
             sys.stdout.flush()
-            os.write(answers, text.encode() + b"\n")
+            if answer is not None:
+                text = json.dumps(answer, separators=(",", ":"), allow_nan=False)
+                os.write(answers, text.encode() + b"\n")
             if driving.done:
                 break
 

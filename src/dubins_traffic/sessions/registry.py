@@ -214,5 +214,27 @@ TRANSPORTS: dict[str, TransportEntry] = {
             ),
         ),
     ),
+    "stdio": TransportEntry(
+        runs="dubins_traffic.sessions.stdio:run_over_stdio",
+        line="Trials over JSON lines on the standard streams of programs that are begun with them.",
+        about="Run trials whose ego, or some of whose e-agents, are driven by programs that speak lines on their "
+        "standard streams. Ctrl-C keeps all finished trials.",
+        examples=(
+            "stdio run demo --lockstep --program './drive --fast'",
+            "stdio run demo --lockstep --program program:drive --sandbox",
+            "stdio run demo --remote agent0 --controller lanes --lockstep --program ./wander",
+        ),
+        options=(
+            Option(
+                "--program",
+                str,
+                "What is begun for each remote car with each trial: a command line; in a box program:PATH, a folder "
+                "with controller.toml, or a controller.",
+                metavar="COMMAND",
+                shown="required",
+            ),
+            Option("--sandbox", bool, "It runs in a box (docs/sandbox.md).", default=False),
+        ),
+    ),
 }
 """By name, in the order of the help text; a new transport is its own file and an entry here."""

@@ -1,17 +1,17 @@
-"""What a program may say in lines: strictly one answer to one frame."""
+"""What a program may say in lines: two plain numbers and a tick are a command, and nothing else is."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, NoReturn, cast
+from typing import Any, cast
 
 from dubins_traffic.errors import shown
 from dubins_traffic.protocols import End
 
 LONGEST = 1 << 16
 """Bytes of a line above which it is no message."""
-WORDS = 300
+WORDS = 900
 """Characters that are kept of what a program says of itself."""
 MOST_REPORTS = 100
 
@@ -26,36 +26,12 @@ class AnswerError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What answers a frame: speed in m/s, yaw rate in rad/s, and what the controller reports."""
+    """What answers a frame: speed in m/s, yaw rate in rad/s, the tick, and what the controller reports."""
 
     speed: float
     yaw_rate: float
+    tick: int
     reports: tuple[tuple[str, str], ...] = ()
-
-
-def command_in(line: bytes, tick: int) -> Answer:
-    """Return the command that answers frame `tick`.
-
-    Raises
-    ------
-    AnswerError
-        If the line is anything else, or says that the controller has given up or failed.
-    """
-    message = message_in(line)
-    match message:
-        case {"command": [speed, yaw_rate], "tick": answered} if (
-            plain(speed) and plain(yaw_rate) and type(answered) is int
-        ):
-            given = speed, yaw_rate
-        case _:
-            raise _garbage(line)
-    if answered != tick:
-        detail = f"it answered tick {shown(str(answered), 30)} when it was asked for tick {tick}"
-        raise AnswerError(End.PEER_GARBAGE, detail)
-    try:
-        return Answer(float(given[0]), float(given[1]), _reports(message.get("reports", [])))
-    except OverflowError:
-        raise _garbage(line) from None
 
 
 def message_in(line: bytes) -> dict[str, Any]:
@@ -67,11 +43,11 @@ def message_in(line: bytes) -> dict[str, Any]:
         If it is none, or says that the controller has given up or failed.
     """
     try:
-        message: Any = json.loads(line, parse_constant=_no_number)
+        message: Any = json.loads(line)
     except (ValueError, RecursionError):
-        raise _garbage(line) from None
+        raise garbage(line) from None
     if type(message) is not dict:
-        raise _garbage(line)
+        raise garbage(line)
     found = cast("dict[str, Any]", message)
     for key, end in (("bye", End.GAVE_UP), ("fault", End.CONTROLLER_FAULT)):
         if type(found.get(key)) is str:
@@ -79,23 +55,54 @@ def message_in(line: bytes) -> dict[str, Any]:
     return found
 
 
-def plain(value: object) -> bool:
-    """Tell whether a value is a plain number: no truth value, no text."""
-    return type(value) is float or type(value) is int
+def command_of(message: dict[str, Any]) -> Answer | None:
+    """Return the command that a message is, None if it is none.
+
+    A truth value, a text or a whole number beyond all floats is no number. One that is not finite is passed on: it
+    is the controller's fault, and the trial says so.
+    """
+    match message:
+        case {"command": [speed, yaw_rate], "tick": tick} if (
+            _plain(speed) and _plain(yaw_rate) and type(tick) is int
+        ):
+            try:
+                return Answer(float(speed), float(yaw_rate), tick, _reports(message.get("reports", [])))
+            except OverflowError:
+                return None
+        case _:
+            return None
+
+
+def command_in(line: bytes, tick: int) -> Answer:
+    """Return the command that answers frame `tick`.
+
+    Raises
+    ------
+    AnswerError
+        If the line is anything else, or says that the controller has given up or failed.
+    """
+    answer = command_of(message_in(line))
+    if answer is None:
+        raise garbage(line)
+    if answer.tick != tick:
+        detail = f"it answered tick {shown(str(answer.tick), 30)} when it was asked for tick {tick}"
+        raise AnswerError(End.PEER_GARBAGE, detail)
+    return answer
+
+
+def garbage(line: bytes) -> AnswerError:
+    """Return the error that a line is no message."""
+    text = line[:60].decode(errors="replace")
+    return AnswerError(End.PEER_GARBAGE, f"not a message: {text!r}")
 
 
 def words(text: str) -> str:
     """Return what a program says of itself as a line that a record can hold."""
-    return shown(text.encode(errors="replace").decode(), 3 * WORDS)
+    return shown(text.encode(errors="replace").decode(), WORDS)
 
 
-def _no_number(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not JSON")
-
-
-def _garbage(line: bytes) -> AnswerError:
-    text = line[:60].decode(errors="replace")
-    return AnswerError(End.PEER_GARBAGE, f"not a message: {text!r}")
+def _plain(value: object) -> bool:
+    return type(value) is float or type(value) is int
 
 
 def _reports(found: Any) -> tuple[tuple[str, str], ...]:

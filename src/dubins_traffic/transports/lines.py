@@ -19,13 +19,12 @@ from typing import TYPE_CHECKING, Any
 from dubins_traffic.errors import TransportError
 from dubins_traffic.problem.public_problem import problem_to_document
 from dubins_traffic.protocols import End, Ending, Mailbox, View
+from dubins_traffic.transports.answers import LONGEST, AnswerError, command_of, garbage, message_in
 from dubins_traffic.transports.observed import observation_to_document
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-LONGEST = 1 << 16
-"""Bytes of a line above which it is no message."""
 BACKLOG = 1 << 22
 """Bytes that a peer may leave unread before it is dropped."""
 CONNECTIONS = 4096
@@ -90,7 +89,7 @@ class Lines:
 
     def announce(self, instance: Instance) -> None:
         """Send the problem to everyone; who comes later is sent it on joining."""
-        message = _line({"problem": problem_to_document(instance.problem)})
+        message = as_line({"problem": problem_to_document(instance.problem)})
         with self._lock:
             self._problem = message
             for peer in self._driving():
@@ -103,14 +102,14 @@ class Lines:
         with self._lock:
             for peer in self._driving():
                 seen = observation_to_document(view.observe(self._cars[peer.car]))
-                self._put(peer, _line({"frame": seen}))
+                self._put(peer, as_line({"frame": seen}))
 
     def end(self, ending: Ending) -> None:
         """Say that the trial is over."""
         with self._lock:
             self._problem = b""
             for peer in self._driving():
-                self._put(peer, _line({"end": asdict(ending)}))
+                self._put(peer, as_line({"end": asdict(ending)}))
 
     def close(self) -> None:
         """Hang up."""
@@ -196,23 +195,17 @@ class Lines:
 
     def _take(self, peer: _Peer, line: bytes) -> None:
         try:
-            self._obey(peer, json.loads(line))
-        except (ValueError, OverflowError, RecursionError):
-            text = line[:60].decode(errors="replace")
-            self._mailbox.fault(peer.car, End.PEER_GARBAGE, f"not a message: {text!r}")
-
-    def _obey(self, peer: _Peer, message: Any) -> None:
-        """Do what a message says; ValueError or OverflowError if it says nothing that is known."""
-        match message:
-            case {"command": [float() | int() as speed, float() | int() as yaw_rate], "tick": int(tick)}:
-                self._mailbox.command(peer.car, float(speed), float(yaw_rate), tick)
-            case {"join": str(car)} if not peer.car and len(car) <= NAME:
-                self._join(peer, car)
-            case {"bye": str(why)}:
-                words = why[:200].encode(errors="replace").decode()  # half a surrogate pair is no text
-                self._mailbox.fault(peer.car, End.GAVE_UP, words)
-            case _:
-                raise ValueError("unknown message")
+            message = message_in(line)
+            answer = command_of(message)
+            if answer is not None:
+                self._mailbox.command(peer.car, answer.speed, answer.yaw_rate, answer.tick)
+                return
+            car: object = message.get("join")
+            if type(car) is not str or peer.car or len(car) > NAME:
+                raise garbage(line)
+            self._join(peer, car)
+        except AnswerError as error:
+            self._mailbox.fault(peer.car, error.end, error.detail)
 
     def _join(self, peer: _Peer, car: str) -> None:
         with self._lock:
@@ -222,5 +215,6 @@ class Lines:
         self._mailbox.joined(car)
 
 
-def _line(message: Mapping[str, Any]) -> bytes:
+def as_line(message: Mapping[str, Any]) -> bytes:
+    """Return a message as it is sent."""
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"
