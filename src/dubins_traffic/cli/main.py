@@ -25,6 +25,7 @@ from dubins_traffic.cli import (
     plot,
     replay,
     run,
+    sandbox,
     score,
     serve,
     session,
@@ -90,6 +91,7 @@ transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items
 transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
 transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)
 app.add_typer(gazebo.app, name="gazebo")
+app.add_typer(sandbox.app, name="sandbox")
 for name, transport in transports.items():
     app.add_typer(transport, name=name)
 app.command("submit", epilog=submit.EXAMPLES)(submit.submit)

@@ -30,7 +30,7 @@ PACKAGES: Final = "/packages"
 """Where a box sees the packages of this interpreter."""
 PYTHON: Final = "/python"
 """Where a box sees an interpreter that is not the system's."""
-SHIM: Final = f"{OWN}/dubins_traffic/sandbox/shim.py"
+SHIM: Final = "sandbox/shim.py"
 EXPECTED: Final = "a controller, program:PATH, or a folder with controller.toml"
 KERNELS: Final = "/kernels"
 """Where a box sees the compiled kernels of this machine."""
@@ -123,15 +123,23 @@ def _file(name: str, spec: str) -> Path:
     return path.resolve()
 
 
+def script(inside: str, *words: str) -> Program:
+    """Return the program that runs one of this package's files in a box, alone."""
+    interpreter, seen, _ = _interpreter()
+    library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if interpreter.startswith(PYTHON) else {}
+    place = f"{OWN}/dubins_traffic/{inside}"
+    return Program((interpreter, "-I", "-S", "-B", place, *words), seen, library)
+
+
 def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     """Return the program that drives with a controller in Python, by our shim."""
-    interpreter, seen, own = _interpreter()
-    found = [word for path in (*own, *paths) for word in ("--path", path)]
-    command = (interpreter, "-I", "-S", "-B", SHIM, *found, spec)
+    _, _, own = _interpreter()
+    words = [word for path in (*own, *paths) for word in ("--path", path)]
+    base = script(SHIM, *words, spec)
     kernels = store.cache_folder().parent
-    library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if interpreter.startswith(PYTHON) else {}
-    environment = {**ONE_THREAD, **library, store.FOLDER: KERNELS, store.TIER: store.KEPT}
-    return Program(command, (*seen, Shown(str(kernels), KERNELS), *shown), environment, shim=True)
+    environment = {**base.environment, **ONE_THREAD, store.FOLDER: KERNELS, store.TIER: store.KEPT}
+    seen = (*base.shown, Shown(str(kernels), KERNELS), *shown)
+    return Program(base.command, seen, environment, shim=True)
 
 
 @cache

@@ -1,0 +1,14 @@
+"""Attacks on a box: small programs, each with the layers that must stop it.
+
+`dubins-traffic sandbox check` runs them all. With one of its layers taken away an attack gets through, or the tests of
+the suite would not notice that the layer is gone.
+"""
+
+from dubins_traffic.sandbox.attacks.attack import Attack
+from dubins_traffic.sandbox.attacks.bombs import BOMBS
+from dubins_traffic.sandbox.attacks.calls import CALLS
+from dubins_traffic.sandbox.attacks.conduct import CONDUCT
+from dubins_traffic.sandbox.attacks.reach import REACH
+
+ATTACKS: tuple[Attack, ...] = (*REACH, *CALLS, *BOMBS, *CONDUCT)
+"""All of them."""
