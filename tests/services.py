@@ -180,7 +180,12 @@ class Service:
 
 @contextmanager
 def serving(
-    folder: Path, *arguments: str, port: int = 0, settings: str = "", clean: bool = False
+    folder: Path,
+    *arguments: str,
+    port: int = 0,
+    settings: str = "",
+    clean: bool = False,
+    behind: bool = False,
 ) -> Iterator[Service]:
     """Run `dubins-traffic serve` in a folder, its key and its log beside it; `clean`: the log must tell of no fault."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -202,6 +207,8 @@ def serving(
     try:
         assert " at " in line, log.read_text()
         url = line.strip().rpartition(" ")[2]
+        if behind:
+            url = process.stdout.readline().strip().rpartition(" ")[2]
         code = ""
         if not (folder / "joined").exists():
             code = process.stdout.readline().strip().rpartition("=")[2]

@@ -68,6 +68,8 @@ def serve(
     url = serving.address_of(opened)
     joining = serving.prepare(office, [Path(path) for path in competition or ()], url)
     print(f"Serving {folder} at {office.settings.url or url}", flush=True)
+    if office.settings.url:
+        print(f"The proxy finds it at {url}", flush=True)
     if joining is not None:
         print(f"The first organiser joins at {joining}", flush=True)
     serving.serve(office, opened, workers, trust=trust)
