@@ -101,6 +101,7 @@ def create_app(office: Office) -> Litestar:
         exception_handlers=dict.fromkeys((HTTPException, *STATUS), _told),  # pyright: ignore[reportArgumentType]
         after_request=_with_headers,
         request_max_body_size=largest + (1 << 20),
+        logging_config=None,
         openapi_config=_described(settings.name),
         state=_state(office),
     )
