@@ -35,29 +35,29 @@ QUEUED = 100
 """Submissions that one team queues before another hands in its first."""
 
 
-async def read(
-    url: str, cookies: httpx.Cookies, paths: Sequence[str], until: float, pause: float
-) -> list[float]:
+async def read(client: httpx.AsyncClient, paths: Sequence[str], until: float, pause: float) -> list[float]:
     """Read pages as a reader does until a time; return how long each took."""
     took: list[float] = []
-    draws = random.Random(len(paths))
-    async with httpx.AsyncClient(base_url=url, cookies=cookies, timeout=60) as client:
-        await asyncio.sleep(draws.random() * pause)
-        while time.perf_counter() < until:
-            began = time.perf_counter()
-            answer = await client.get(draws.choice(paths))
-            answer.raise_for_status()
-            took.append(time.perf_counter() - began)
-            await asyncio.sleep(pause * (0.5 + draws.random()))
+    await asyncio.sleep(random.random() * pause)
+    while time.perf_counter() < until:
+        began = time.perf_counter()
+        answer = await client.get(random.choice(paths))
+        answer.raise_for_status()
+        took.append(time.perf_counter() - began)
+        await asyncio.sleep(pause * (0.5 + random.random()))
     return took
 
 
 async def all_read(
     url: str, cookies: httpx.Cookies, paths: Sequence[str], seconds: float, pause: float
 ) -> list[float]:
-    """Let all readers read at a time."""
-    until = time.perf_counter() + seconds
-    found = await asyncio.gather(*(read(url, cookies, paths, until, pause) for _ in range(READERS)))
+    """Let all readers read at a time, each by a connection of its own."""
+    limits = httpx.Limits(max_connections=READERS, max_keepalive_connections=READERS)
+    async with httpx.AsyncClient(
+        base_url=url, cookies=cookies, timeout=60, limits=limits, verify=False
+    ) as client:
+        until = time.perf_counter() + seconds
+        found = await asyncio.gather(*(read(client, paths, until, pause) for _ in range(READERS)))
     return list(itertools.chain.from_iterable(found))
 
 
