@@ -53,7 +53,7 @@ class ProcessClocks:
                 continue
             seconds, pages = found
             total, memory, seen = total + seconds, memory + pages * _PAGE, seen + 1
-            waiting += _children(process)
+            waiting += children(process)
         self._seconds = max(self._seconds, total)
         self.memory, self.processes = memory, seen
 
@@ -79,7 +79,8 @@ def _exact(process: int) -> float | None:
         return None
 
 
-def _children(process: int) -> list[int]:
+def children(process: int) -> list[int]:
+    """Return the numbers of the processes that a process has begun and that are there."""
     found: list[int] = []
     try:
         for thread in Path(f"/proc/{process}/task").iterdir():

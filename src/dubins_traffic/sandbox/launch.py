@@ -81,16 +81,27 @@ def command_line(
         Whether the box says on standard error that it stands.
     """
     root = os.getuid() == 0 and layers.boxes
-    inner = ["/bin/sh", "-c", _limits(limits, layers, told), "box", *program.command]
+    inner = ["/bin/sh", "-c", _limits(limits, layers, told), "box"]
     if not layers.boxes:
-        return _entered(inner, doors, ())
-    staged, steps = _staged(program.shown) if root else (program.shown, [])
+        return _entered([*inner, *(outside(program, word) for word in program.command)], doors, ())
+    inner += program.command
+    places, steps = staged(program.shown) if root else (program.shown, [])
     more = ["--seccomp", str(seccomp)] if seccomp >= 0 else []
-    outer = _bubblewrap(program.environment, staged, limits, layers) + more + ["--", *inner]
+    outer = _bubblewrap(program.environment, places, limits, layers) + more + ["--", *inner]
     if not root:
         return _entered(outer, doors, ())
     dropped = [*_setpriv(), *outer]
     return ["unshare", "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
+
+
+def outside(program: Program, word: str) -> str:
+    """Return a word of a command line, or of an environment, as it is where there is no box."""
+    for each in sorted(program.shown, key=lambda own: len(own.place), reverse=True):
+        if word.startswith(each.place):
+            return each.source + word.removeprefix(each.place)
+        if each.place.rpartition("/")[0] == word:
+            return str(Path(each.source).parent)
+    return word
 
 
 def _setpriv() -> list[str]:
@@ -107,7 +118,7 @@ def _entered(command: Sequence[str], doors: Sequence[str], steps: Sequence[str])
     return ["/bin/sh", "-c", "\n".join(lines), "box", *command]
 
 
-def _staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
+def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
     """Return what is shown from places that everybody can read, and the steps that put it there."""
     stage = _stage()
     steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev box {stage}"]

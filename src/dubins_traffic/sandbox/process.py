@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from typing import Final
 
 from dubins_traffic.sandbox import cgroups, seccomp
-from dubins_traffic.sandbox.clocks import ProcessClocks
-from dubins_traffic.sandbox.launch import Program, command_line
+from dubins_traffic.sandbox.clocks import ProcessClocks, children
+from dubins_traffic.sandbox.launch import Program, command_line, outside
 from dubins_traffic.sandbox.layers import CLOCK, ENVIRONMENT, MEMORY, PROCESSES, SECCOMP, Layers
 from dubins_traffic.sandbox.limits import Limits
+
+GRACE: Final = 10.0
+"""Seconds within which processes that have been killed are gone."""
 
 
 class Processes:
@@ -109,19 +114,46 @@ class Processes:
         except ValueError:
             return f"status {status}"
 
+    def _kill(self) -> None:
+        """Kill the first process, and wait until all others have gone with it."""
+        others = _opened(children(self._process.pid)) if self._layers.boxes else []
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for other in others:
+            _see_off(other)
+
     def close(self) -> None:
         """Kill them all and leave nothing behind. May be called twice."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            if self._layers.boxes:
-                self._process.kill()
-            else:
-                os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
+        if self._process.returncode is None:
+            self._kill()
         for stream in filter(None, self._streams):
             stream.close()
         if self._group is not None:
             self._group.close()
             self._group = self._timed = None
+
+
+def _opened(processes: Sequence[int]) -> list[int]:
+    """Return descriptors of processes that are there."""
+    found: list[int] = []
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            found.append(os.pidfd_open(process))
+    return found
+
+
+def _see_off(process: int) -> None:
+    """Kill the process of a descriptor, wait until it has gone, and close the descriptor.
+
+    The first process of a process namespace goes last.
+    """
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        signal.pidfd_send_signal(process, signal.SIGKILL)
+    waiting = select.poll()
+    waiting.register(process, select.POLLIN)
+    waiting.poll(GRACE * 1000.0)
+    os.close(process)
 
 
 def _groups(layers: Layers) -> cgroups.Trees:
@@ -132,10 +164,11 @@ def _groups(layers: Layers) -> cgroups.Trees:
 
 
 def _environment(program: Program, layers: Layers) -> dict[str, str]:
-    own = {"PATH": os.environ.get("PATH", os.defpath)}
-    if ENVIRONMENT not in layers:
-        own = dict(os.environ)
-    return own if layers.boxes else own | {"HOME": "/tmp", "LANG": "C.UTF-8", **program.environment}
+    own = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
+    if layers.boxes:
+        return own
+    more = {name: outside(program, value) for name, value in program.environment.items()}
+    return own | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
 
 
 @contextlib.contextmanager

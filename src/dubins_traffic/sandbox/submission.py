@@ -125,15 +125,15 @@ def _file(name: str, spec: str) -> Path:
 
 def script(inside: str, *words: str) -> Program:
     """Return the program that runs one of this package's files in a box, alone."""
-    interpreter, seen, _ = _interpreter()
-    library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if interpreter.startswith(PYTHON) else {}
+    python, seen, _ = interpreter()
+    library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if python.startswith(PYTHON) else {}
     place = f"{OWN}/dubins_traffic/{inside}"
-    return Program((interpreter, "-I", "-S", "-B", place, *words), seen, library)
+    return Program((python, "-I", "-S", "-B", place, *words), seen, library)
 
 
 def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     """Return the program that drives with a controller in Python, by our shim."""
-    _, _, own = _interpreter()
+    _, _, own = interpreter()
     words = [word for path in (*own, *paths) for word in ("--path", path)]
     base = script(SHIM, *words, spec)
     kernels = store.cache_folder().parent
@@ -143,10 +143,10 @@ def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
 
 
 @cache
-def _interpreter() -> tuple[str, tuple[Shown, ...], tuple[str, ...]]:
+def interpreter() -> tuple[str, tuple[Shown, ...], tuple[str, ...]]:
     """Return this interpreter as a box sees it, what it needs to see for it, and where its packages are."""
     package = Path(__file__).resolve().parents[1]
-    shown = [Shown(str(package), f"{OWN}/{package.name}")]
+    shown = [Shown(str(package), f"{OWN}/dubins_traffic")]
     paths = [OWN]
     for number, folder in enumerate(_packages()):
         if folder.is_relative_to("/usr"):

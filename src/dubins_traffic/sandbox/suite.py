@@ -69,6 +69,8 @@ def strike(attack: Attack, layers: Layers, baits: Baits) -> Strike:
     limits = replace(LIMITS, **dict(attack.limits))
     box = Box(script(PRELUDE), limits, layers)
     try:
+        if message_in(box.ask(as_line({"hello": 1}))) != {"ready": "yes"}:
+            raise box.fault(End.BOX_FAILED, "the box does not run what it shall")
         stopped, words = (_said if attack.end else _reached)(box, attack, baits)
     finally:
         box.close()

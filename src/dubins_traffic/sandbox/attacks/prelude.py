@@ -52,6 +52,8 @@ def spin(seconds: float) -> None:
 
 def main() -> None:
     """Take one attack and say what came of it."""
+    sys.stdin.buffer.readline()
+    say({"ready": "yes"})
     asked = json.loads(sys.stdin.buffer.readline())
     names: dict[str, Any] = {**globals(), "bait": asked["bait"], "got": None}
     try:

@@ -58,7 +58,8 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
     Attack("finds a descriptor that it has inherited", (ENVIRONMENT,), """
 own = {0, 1, 2, answers}
 for name in os.listdir('/proc/self/fd'):
-    if int(name) not in own and bait['file'] in os.readlink('/proc/self/fd/' + name): got = name
+    place = f'/proc/self/fd/{name}'
+    if int(name) not in own and os.path.exists(place) and bait['file'] in os.readlink(place): got = name
 """, alone=False),
     Attack("leaves a daemon behind", (PIDS,), """
 if os.fork() == 0:

@@ -1,0 +1,158 @@
+"""Attacks on boxes: all stopped, as root and as an ordinary user, and not all once a layer is taken away."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from dubins_traffic.cli.main import main
+from dubins_traffic.errors import InputError
+from dubins_traffic.sandbox import Layers, available_layers, boxed_controller
+from dubins_traffic.sandbox.attacks import ATTACKS, Attack
+from dubins_traffic.sandbox.attacks.baits import Baits
+from dubins_traffic.sandbox.launch import staged
+from dubins_traffic.sandbox.layers import BOX, CLOCK, FILES, MEMORY, NAMES, PROCESSES, SECCOMP
+from dubins_traffic.sandbox.submission import interpreter
+from dubins_traffic.sandbox.suite import strike, strikes
+from tests.boxes import MISSING, needs_boxes
+
+USER = 65533
+as_root = pytest.mark.skipif(os.getuid() != 0, reason="only root becomes another user")
+
+
+@needs_boxes
+def test_all_attacks_are_stopped() -> None:
+    assert len(ATTACKS) >= 60
+    assert len({attack.name for attack in ATTACKS}) == len(ATTACKS)
+    through = [
+        f"{found.attack.name}: {found.words}" for found in strikes(available_layers()) if not found.stopped
+    ]
+    assert through == []
+
+
+@needs_boxes
+@as_root
+def test_all_attacks_are_stopped_as_an_ordinary_user() -> None:
+    done = as_user(USER, ["-m", "dubins_traffic.cli", "sandbox", "check", "--json"])
+    assert done.stdout, done.stderr
+    found = json.loads(done.stdout)
+    assert found["user"] == USER
+    assert found["missing"] == []
+    assert "cgroup" not in found["limits"]["memory"]
+    assert [each for each in found["attacks"] if not each["stopped"]] == []
+    assert len(found["attacks"]) == len(ATTACKS)
+    assert done.returncode == 0, done.stderr
+
+
+@needs_boxes
+@pytest.mark.parametrize("attack", [each for each in ATTACKS if each.alone], ids=lambda own: own.name)
+def test_an_attack_gets_through_once_its_layers_are_taken_away(attack: Attack) -> None:
+    """So the suite notices when a layer is gone: what stops an attack is what is said to stop it."""
+    gone = set(attack.layers) | (set(BOX) if FILES in attack.layers else set())
+    if FILES in gone and SECCOMP in available_layers():
+        gone.add(SECCOMP)  # bubblewrap is what puts the filter in force
+    with Baits() as baits:
+        found = strike(attack, available_layers().without(*gone), baits)
+    assert not found.stopped, found.words
+
+
+@needs_boxes
+@pytest.mark.parametrize("layer", sorted(set(NAMES) - {"users", CLOCK, MEMORY, PROCESSES}))
+def test_the_suite_fails_without_a_layer(layer: str) -> None:
+    """Of `users`, `memory` and `processes` another layer does the same, and of `clock` the clocks of processes."""
+    gone = BOX if layer == FILES else (layer,)
+    sole = [each for each in ATTACKS if each.alone and each.layers == (layer,)]
+    assert sole
+    assert any(not found.stopped for found in strikes(available_layers().without(*gone), sole[:4]))
+
+
+@needs_boxes
+def test_what_no_cgroup_enforces_other_layers_do() -> None:
+    bare = available_layers().without(MEMORY, PROCESSES, CLOCK)
+    names = ("memory", "memory of many", "processes", "threads", "processor time")
+    attacks = [each for each in ATTACKS if each.name.startswith(names)]
+    assert len(attacks) >= 8
+    assert [found.attack.name for found in strikes(bare, attacks) if not found.stopped] == []
+
+
+def test_a_machine_that_can_not_hold_a_program_refuses_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where the kernel forbids namespaces, this is what is said; here bubblewrap is made not to be found."""
+    monkeypatch.setenv("PATH", "/nowhere")
+    available_layers.cache_clear()
+    try:
+        layers = available_layers()
+        assert layers.missing() == ["bubblewrap makes no boxes here: it is not installed"]
+        with pytest.raises(InputError, match="makes no boxes here"):
+            boxed_controller("simple")
+        assert main(["sandbox", "check", "--no-attacks"]) == 2
+        assert main(["run", "demo", "--controller", "simple", "--sandbox", "--trials", "1"]) == 2
+        assert "--trust-submissions" in capsys.readouterr().err
+        monkeypatch.undo()
+        words = ["run", "demo", "--controller", "simple", "--sandbox", "--trials", "1", "--json"]
+        assert main([*words, "--trust-submissions"]) == 0
+        assert json.loads(capsys.readouterr().out)["trials"][0]["end"] == "duration"
+    finally:
+        available_layers.cache_clear()
+
+
+@pytest.mark.skipif(not MISSING, reason="boxes can be made here")
+def test_without_boxes_strangers_are_refused() -> None:
+    with pytest.raises(InputError):
+        boxed_controller("simple")
+
+
+def test_layers_are_named() -> None:
+    assert Layers().without(SECCOMP).missing() == [
+        "no filter of system calls: libseccomp2 and pyseccomp are needed"
+    ]
+    assert {name for attack in ATTACKS for name in attack.layers} <= set(NAMES)
+
+
+def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run this interpreter as another user, who sees it and its packages in places that all can read."""
+    name, shown, paths = interpreter()
+    places, steps = staged(shown)
+    where = {Path(own.place): Path(there.source) for own, there in zip(shown, places, strict=True)}
+
+    def seen(place: str) -> str:
+        for inside, there in where.items():
+            if Path(place).is_relative_to(inside):
+                return str(there / Path(place).relative_to(inside))
+        return place
+
+    package = seen("/own/dubins_traffic")
+    steps = [
+        *steps,
+        "mkdir -p /run/dubins-traffic/own",
+        f"ln -s {package} /run/dubins-traffic/own/dubins_traffic",
+    ]
+    folders = ["/run/dubins-traffic/own", *(seen(path) for path in paths if path != "/own")]
+    environment = {
+        "PATH": os.environ["PATH"],
+        "PYTHONPATH": ":".join(folders),
+        "LD_LIBRARY_PATH": str(Path(seen(name)).parents[1] / "lib"),
+        "HOME": "/tmp",
+        "DUBINS_TRAFFIC_KERNELS": "interpreted",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    drop = f"exec setpriv --reuid={user} --regid={user} --clear-groups --bounding-set=-all --"
+    command = shlex.join([seen(name), *words])
+    script = "\n".join(["set -e", *steps, f"{drop} {command}"])
+    return subprocess.run(
+        ["unshare", "--mount", "--propagation", "private", "--", "/bin/sh", "-c", script],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+        cwd="/",
+        stdin=subprocess.DEVNULL,
+    )
