@@ -266,6 +266,19 @@ def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     }
 
 
+def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(tmp_path: Path) -> None:
+    (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
+    (tmp_path / "controller.toml").write_text('program = ["./entry"]')
+    words = ("evaluate", ".", "--competition", ROOT / "examples" / "competition")
+    first, second = command(*words, cwd=tmp_path), command(*words, cwd=tmp_path)
+    assert (first.returncode, first.stdout) == (0, second.stdout), first.stderr
+    assert len(list((tmp_path / "evaluations" / "submissions").iterdir())) == 1
+    for place in ("out", "."):
+        refused = command(*words, "-o", place, cwd=tmp_path)
+        assert refused.returncode == 2
+        assert "lies in what is evaluated" in refused.stderr
+
+
 BASE = """
 import sys
 for name in ("pyarrow", "scipy", "matplotlib", "pandas", "cryptography", "httpx"):

@@ -59,6 +59,13 @@ def test_the_first_blocks_work_as_typed(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{line}\n{done.stderr}"
         said += done.stdout
     assert said.count("commitment ") == 2
+    text = (PAGES / "file.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=around, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "1 ours 0.0 (0.0, 0.0) ()\n"
+    assert len(list((tmp_path / "records").glob("*.mcap"))) == 4
     (folder,) = (tmp_path / "evaluations").glob("practice-*")
     found = load_evaluation(folder)
     assert {own.owner for own in found.results} == {None}

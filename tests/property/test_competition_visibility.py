@@ -50,7 +50,7 @@ def state_of(name: State, reason: str) -> SubmissionState:
     return SubmissionState(name, reason, None, "2026-01-10T00:00:00+00:00", 3)
 
 
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 @given(states, trials, trials, st.text(max_size=30), st.text(max_size=30))
 def test_other_seeds_change_no_byte_of_a_secret_phase(
     name: State, first: list[Judged], second: list[Judged], one_reason: str, other_reason: str
@@ -62,7 +62,7 @@ def test_other_seeds_change_no_byte_of_a_secret_phase(
     assert seen == json.dumps(visible(phase, state_of(name, other_reason), second, now=WITHIN))
 
 
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 @given(trials, trials)
 def test_how_a_submission_ended_is_not_seen_of_a_secret_phase(
     first: list[Judged], second: list[Judged]
@@ -84,7 +84,7 @@ def test_queued_and_running_look_alike_and_faults_of_ours_are_told() -> None:
     assert "seed" not in json.dumps(told)
 
 
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 @given(trials)
 def test_aggregates_are_rounded_and_told_of_enough_finished_trials_alone(found: list[Judged]) -> None:
     phase = FOUND.phase("validation")

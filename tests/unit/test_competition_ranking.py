@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from dubins_traffic.campaign.report.statistics import estimate
+from dubins_traffic.campaign.rows import RESULT
+from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import differences, missing, rank
 from dubins_traffic.errors import InputError
 from tests.competitions import PRACTICE, ROAD, competition, judged, results
@@ -94,3 +96,16 @@ def test_a_trial_without_rules_is_clean_if_nothing_was_touched() -> None:
     free = [judged(0, clean=None, verdict=None), judged(1, clean=None, verdict=None, collisions=1)]
     (place,) = rank({"free": free}, phase(2))
     assert (place.clean.count, place.satisfied.count) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    "change", [{"number": 7}, {"row": {"number": 0}}, {"end": "collision"}, {"owner": "me"}, {"seed": 3}]
+)
+def test_a_result_is_read_as_it_was_written_or_refused(change: dict[str, object]) -> None:
+    row = {**dict.fromkeys(RESULT), **judged(0).row}
+    own = Judged(0, row, "duration", None, "said", "00")
+    assert Judged.from_json(own.to_json()) == own
+    with pytest.raises(InputError):
+        Judged.from_json({**own.to_json(), **change})
+    with pytest.raises(InputError, match="not a number"):
+        Judged.from_json({**own.to_json(), "row": {**row, "counted_rounds": "many"}})

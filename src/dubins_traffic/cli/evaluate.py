@@ -19,7 +19,6 @@ EXAMPLES = options.examples(
     "evaluate my_entry --competition spring/competition.toml --workers 2 --records",
     "evaluate entry.zip --competition spring --phase test",
 )
-FOLDER = "evaluations"
 
 
 def evaluate(
@@ -51,7 +50,7 @@ def evaluate(
             "-o",
             metavar="DIR",
             help="Where results are kept as they come.",
-            show_default=f"{FOLDER}/PHASE-DIGEST",
+            show_default="evaluations/PHASE-DIGEST",
         ),
     ] = None,
     workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
@@ -70,11 +69,13 @@ def evaluate(
     """
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.competition import evaluating
+    from dubins_traffic.competition.contents import EVALUATIONS, check_apart
     from dubins_traffic.competition.submission import check_submission
     from dubins_traffic.competition.visibility import summary
 
     own = _competition(competition).phase(phase)
-    base = Path(output or FOLDER)
+    base = Path(output or EVALUATIONS)
+    check_apart(Path(path), base)
     submission = check_submission(path, base / "submissions")
     folder = base if output else base / f"{phase}-{submission.digest[:12]}"
     try:
@@ -114,20 +115,23 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
 
     from dubins_traffic.competition.visibility import summary, tail
 
+    several = len(phase.configurations) > 1
     table = Table(title=f"{phase.name}, submission {done.submission[:12]}")
-    for heading in ("trial", "configuration", "end", "rounds", "counted", "verdict", "collisions", "fault"):
+    where = ("configuration",) if several else ()
+    for heading in ("trial", *where, "end", "rounds", "counted", "verdict", "collisions", "fault"):
         table.add_column(heading, justify="right" if heading in ("trial", "rounds", "counted") else "left")
     for own in done.results:
-        named, _ = phase.place(own.number)
+        place = (phase.place(own.number)[0].name,) if several else ()
         cells = [own.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
         texts = ["" if cell is None else str(cell) for cell in cells]
-        table.add_row(str(own.number), named.name, own.end, *texts, own.owner or "")
+        table.add_row(str(own.number), *place, own.end, *texts, own.owner or "")
     console = Console(highlight=False, markup=False)
     console.print(table)
     faulty = [own for own in done.results if own.owner is not None]
     if faulty:
         console.print(f"trial {faulty[0].number} ended by {faulty[0].end}: {faulty[0].row['reason'] or ''}")
         console.print(tail(faulty[0].log, phase.model.log_lines))
-    for name, value in (summary(phase, done.results) or {}).items():
-        console.print(f"{name}: {value:.4g}")
+    means = summary(phase, done.results) or {"trials": 0}
+    told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")
+    console.print(f"means of {means['trials']} trials: {told}")
     options.tell(str(folder / "results.jsonl"))

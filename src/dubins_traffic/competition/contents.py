@@ -25,7 +25,9 @@ _LONGEST_NAME = 200
 _DEEPEST = 16
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED = 1
-_LEFT_OUT = frozenset({"__pycache__", "__MACOSX"})
+EVALUATIONS = "evaluations"
+"""Where `dubins-traffic evaluate` keeps its results unless it is told another place."""
+_LEFT_OUT = frozenset({"__pycache__", "__MACOSX", EVALUATIONS})
 """Folders that tools leave behind; with names that begin with a dot they are no part of a submission."""
 
 
@@ -58,8 +60,25 @@ def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
         raise InputError(
             f"can't be read ({error.strerror})", file=os.fspath(error.filename or folder)
         ) from None
-    _check_apart(found)
+    _check_names(found)
     return found
+
+
+def check_apart(folder: Path, results: Path) -> None:
+    """Refuse to keep results where they would become a part of what is evaluated.
+
+    Raises
+    ------
+    InputError
+        If `results` lies in `folder` and would be read as a part of it.
+    """
+    own, place = folder.resolve(), results.resolve()
+    if folder.is_dir() and place.is_relative_to(own) and _is_kept(place.relative_to(own).as_posix()):
+        raise InputError(
+            "lies in what is evaluated",
+            file=str(results),
+            expected=f"a folder elsewhere, or one called {EVALUATIONS}",
+        )
 
 
 def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
@@ -101,7 +120,7 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
         OSError,
     ) as error:
         raise InputError(f"a damaged archive ({error})", expected="a zip archive") from None
-    _check_apart(found)
+    _check_names(found)
     return found
 
 
@@ -171,7 +190,7 @@ def _checked_name(name: str) -> str:
     return name
 
 
-def _check_apart(files: dict[str, bytes]) -> None:
+def _check_names(files: dict[str, bytes]) -> None:
     """Refuse names that are one on some file systems, and a file where a folder must be."""
     taken: dict[str, str] = {}
     for name in files:

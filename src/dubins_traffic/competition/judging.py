@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
+from pydantic import model_validator
+
 from dubins_traffic.campaign import rows
 from dubins_traffic.competition.boxed import boxed
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraError
-from dubins_traffic.problem.faults import Strict, parse
+from dubins_traffic.problem.faults import Strict, fault, parse
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import owner_of
@@ -87,6 +89,24 @@ class _Judged(Strict):
     owner: Owner | None
     log: str
     frames: str | None
+
+    @model_validator(mode="after")
+    def _whole(self) -> _Judged:
+        lacking = [name for name in rows.RESULT if name not in self.row]
+        if lacking:
+            raise fault(
+                "a column is missing", f"the columns {', '.join(rows.RESULT[:6])}, ...", "row", lacking[0]
+            )
+        if (self.row["number"], self.row["end"]) != (self.number, self.end):
+            raise fault("a row of another trial", "number and end as in the row", "number", self.number)
+        for name in _NUMBERS:
+            if not isinstance(self.row[name], float | int | None):
+                raise fault("not a number", "a number or null", f"row.{name}", self.row[name])
+        return self
+
+
+_NUMBERS: Final = ("counted_rounds", "icra2016", "collisions", "clean")
+"""What ranking reads as numbers."""
 
 
 def judge(

@@ -59,17 +59,18 @@ class Limits(Strict):
         default=10.0, description="processor time a trial for decisions that take longer, s"
     )
     wall: Seconds = Field(
-        default=600.0, description="time a trial by the clock on the wall, against those that sleep, s"
+        default=600.0,
+        description="wall-clock time beyond five times its processor time, s: for those that sleep",
     )
     memory: Annotated[int, Field(ge=16, le=1_000_000)] = Field(default=1024, description="memory, MiB")
     processes: Annotated[int, Field(ge=1, le=10_000)] = Field(
         default=64, description="processes and threads at a time"
     )
     files: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        default=64, description="what it may write into its temporary folder, MiB"
+        default=64, description="what all files that it writes may hold together, MiB"
     )
     output: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=256, description="what it may print a trial, KiB; the tail is kept"
+        default=256, description="what it may print in a trial, KiB; the last 8 KiB are kept"
     )
 
 
