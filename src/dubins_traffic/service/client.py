@@ -26,7 +26,7 @@ OLDEST = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
-class Asked:
+class Address:
     """A service and a path of its API."""
 
     host: str
@@ -37,7 +37,7 @@ class Asked:
         return Connection(self.host, token)
 
 
-def competition_at(url: str) -> tuple[Asked, str | None]:
+def competition_at(url: str) -> tuple[Address, str | None]:
     """Return where a competition is by the address of its page, and the phase if it is that of a phase.
 
     Raises
@@ -50,23 +50,23 @@ def competition_at(url: str) -> tuple[Asked, str | None]:
         raise InputError(
             "no address of a competition", value=url, expected="https://host/c/COMPETITION/PHASE"
         )
-    return Asked(found[1], f"/api/competitions/{found[2]}"), found[3]
+    return Address(found[1], f"/api/competitions/{found[2]}"), found[3]
 
 
-def phase_at(url: str) -> Asked:
+def phase_at(url: str) -> Address:
     """Return where the submissions of a phase are; InputError if the address is not that of a phase."""
     competition, phase = competition_at(url)
     if phase is None:
         raise InputError("the address names no phase", value=url, expected="https://host/c/COMPETITION/PHASE")
-    return Asked(competition.host, f"{competition.path}/phases/{phase}/submissions")
+    return Address(competition.host, f"{competition.path}/phases/{phase}/submissions")
 
 
-def submission_at(url: str) -> Asked:
+def submission_at(url: str) -> Address:
     """Return where a submission is by the address of its page; InputError if it is no such address."""
     found = _SUBMISSION.fullmatch(url)
     if found is None:
         raise InputError("no address of a submission", value=url, expected="https://host/s/NUMBER")
-    return Asked(found[1], f"/api/submissions/{found[2]}")
+    return Address(found[1], f"/api/submissions/{found[2]}")
 
 
 def fetched_competition(url: str) -> Competition:

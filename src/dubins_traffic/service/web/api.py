@@ -106,29 +106,29 @@ class Api(Controller):
         """Hand in a submission; the same bytes again are the same submission, with status 200."""
         sent = data.file.file.read()
         number, new = receiving.take_in(office, viewer.person, slug, name, data.file.filename, sent)
-        return Response(_told(office, viewer, number), status_code=201 if new else 200)
+        return Response(_view(office, viewer, number), status_code=201 if new else 200)
 
     @get("/submissions/{number:int}", sync_to_thread=True, guards=[who.person])
     def submission(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return what may be seen of a submission."""
-        return _told(office, viewer, number)
+        return _view(office, viewer, number)
 
     @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[who.person], status_code=200)
     def cancel(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Cancel a submission."""
         receiving.cancel(office, viewer.person, number)
-        return _told(office, viewer, number)
+        return _view(office, viewer, number)
 
     @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[who.person], status_code=200)
     def name(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Let a submission be the one of its team that counts."""
         receiving.name_it(office, viewer.person, number)
-        return _told(office, viewer, number)
+        return _view(office, viewer, number)
 
     @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[who.person])
     def logs(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
-        told = _told(office, viewer, number)
+        told = _view(office, viewer, number)
         if "trials" in told:
             return {"trials": [{"number": own["number"], "log": own["log"]} for own in told["trials"]]}
         return {"log": told.get("log", "")}
@@ -141,7 +141,7 @@ def _found(session: viewing.Session, slug: str) -> Competition:
     return row
 
 
-def _told(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
+def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
     with office.database.reading() as session:
         found = receiving.found_submission(session, number, viewer.account)
         return viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))

@@ -31,7 +31,7 @@ from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
-from dubins_traffic.service.web import api, desk, doors, login, metrics, pages, submitting, team
+from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
 from dubins_traffic.service.web.said import moment
 from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
 
@@ -83,7 +83,15 @@ def create_app(office: Office) -> Litestar:
     environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
     return Litestar(
         route_handlers=[
-            *(pages.Pages, submitting.Submitting, login.Login, team.Teams, desk.Desk, api.Api, doors.Doors),
+            *(
+                pages.Pages,
+                submitting.Submitting,
+                login.Login,
+                team.Teams,
+                organisers.Organisers,
+                api.Api,
+                doors.Doors,
+            ),
             metrics.metrics,
             create_static_files_router(
                 "/static", [Path(__file__).with_name("static")], include_in_schema=False
@@ -98,7 +106,7 @@ def create_app(office: Office) -> Litestar:
         csrf_config=csrf,
         template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(environment)),
         stores={"sessions": FileStore(office.folder / "sessions", create_directories=True)},
-        exception_handlers=dict.fromkeys((HTTPException, *STATUS), _told),  # pyright: ignore[reportArgumentType]
+        exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
         after_request=_with_headers,
         request_max_body_size=largest + (1 << 20),
         logging_config=None,
@@ -140,7 +148,7 @@ async def _with_headers(response: Response[Any]) -> Response[Any]:
     return response
 
 
-def _told(request: Request[Any, Any, Any], error: Exception) -> Response[Any]:
+def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[Any]:
     """Return what went wrong: JSON to programs, a page to people; who is not logged in is led to the door."""
     if isinstance(error, HTTPException):
         status, detail = error.status_code, error.detail

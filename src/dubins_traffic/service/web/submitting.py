@@ -47,12 +47,12 @@ class Submitting(Controller):
     @get("/s/{number:int}", sync_to_thread=True)
     def submission(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Show a submission."""
-        return page(office, viewer, "submission", f"Submission {number}", **_told(office, viewer, number))
+        return page(office, viewer, "submission", f"Submission {number}", **_view(office, viewer, number))
 
     @get("/s/{number:int}/live", sync_to_thread=True)
     def live(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Return the part of the page of a submission that changes."""
-        return page(office, viewer, "live", "", **_told(office, viewer, number))
+        return page(office, viewer, "live", "", **_view(office, viewer, number))
 
     @post("/s/{number:int}/cancel", sync_to_thread=True)
     def cancel(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
@@ -67,7 +67,7 @@ class Submitting(Controller):
         return Redirect(f"/s/{number}", status_code=303)
 
 
-def _told(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
+def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
     with office.database.reading() as session:
         found = receiving.found_submission(session, number, viewer.account)
         told = viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))

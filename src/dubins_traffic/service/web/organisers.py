@@ -31,7 +31,7 @@ class NewCompetition:
     files: list[UploadFile]
 
 
-class Desk(Controller):
+class Organisers(Controller):
     """What organisers do."""
 
     path = "/desk"
