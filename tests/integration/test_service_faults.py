@@ -160,6 +160,21 @@ def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
     assert answers(service.url) is False
 
 
+def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
+    with season(tmp_path, SETTINGS.replace("2.0", "600.0"), "--workers", "1") as service:
+        organiser = service.organiser()
+        person = service.person().join(organiser.invite(), "Ann", "Ants")
+        number = person.submit("short/practice", STANDING)
+        wait_until(lambda: person.state(number) == "running", pause=0.02)
+        service.process.terminate()
+        assert service.process.wait(timeout=60) == 0
+    database = database_of(tmp_path, SETTINGS)
+    with database.reading() as session:
+        assert "leased" not in set(session.scalars(select(Chunk.state)))
+        assert session.get_one(Submission, number).state in ("running", "scoring", "done")
+    database.close()
+
+
 def send_many(person: Person, confirmed: dict[str, int]) -> None:
     """Send one thing after the other until nobody answers."""
     for k in range(50):

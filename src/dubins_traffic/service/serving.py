@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 import structlog
 import uvicorn
@@ -151,6 +153,31 @@ class Workers(threading.Thread):
         return subprocess.Popen(command, stdin=subprocess.PIPE, env={**os.environ, TOKEN: self._token})
 
 
+def _nothing(_number: int, _frame: FrameType | None) -> None:
+    """Do nothing; unlike a signal that is ignored, this is not handed on to workers."""
+
+
+class Server(uvicorn.Server):
+    """A web server that lets the workers beside it give back what they have on lease before it closes its door."""
+
+    def __init__(self, config: uvicorn.Config, beside: Workers) -> None:
+        super().__init__(config)
+        self._beside = beside
+        self._leaving = False
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End when the workers have ended; told a second time, at once."""
+        if self._leaving:
+            super().handle_exit(sig, frame)
+            return
+        self._leaving = True
+        threading.Thread(target=self._leave, args=(sig,), daemon=True).start()
+
+    def _leave(self, sig: int) -> None:
+        self._beside.stop()
+        super().handle_exit(sig, None)
+
+
 def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = False) -> None:
     """Serve until this process is told to end.
 
@@ -175,11 +202,13 @@ def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = 
         timeout_graceful_shutdown=10,
     )
     beside = Workers(workers, address_of(opened), local_token(office), office.folder / "work", trust=trust)
+    for number in (signal.SIGINT, signal.SIGTERM):  # the server raises them again when it has ended
+        signal.signal(number, _nothing)
     keeper = Housekeeper(office)
     keeper.start()
     beside.start()
     try:
-        uvicorn.Server(config).run(sockets=[opened])
+        Server(config, beside).run(sockets=[opened])
     finally:
         beside.stop()
         keeper.stop()

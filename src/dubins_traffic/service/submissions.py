@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer, undefer
 
 from dubins_traffic.competition.settings import Quota
 from dubins_traffic.errors import DubinsTrafficError, shown
@@ -222,10 +222,11 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
         submission.phase.version += 1
 
 
-def trials(session: Session, submission: Submission) -> Sequence[Trial]:
-    """Return the results of a submission's present run, in the order of their numbers."""
+def trials(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
+    """Return the results of a submission's present run, in the order of their numbers; logs are read if asked for."""
     own = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
-    return session.scalars(own.order_by(Trial.number)).all()
+    read = undefer(Trial.log) if logs else defer(Trial.log, raiseload=True)
+    return session.scalars(own.order_by(Trial.number).options(read)).all()
 
 
 def judge_again(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:

@@ -84,9 +84,12 @@ def told_submission(
     submission: Submission,
     account: Account | None,
     places: Mapping[int, int],
+    *,
+    logs: bool = True,
 ) -> dict[str, Any]:
-    """Return what somebody may see of a submission; the team of it and organisers get here."""
+    """Return what somebody may see of a submission, with or without logs; the team of it and organisers get here."""
     row = submission.phase
+    logs = logs or row.shows == "aggregates"
     place = places.get(submission.id) if submission.state in ("received", "queued") else None
     state = SubmissionState(
         submission.state,  # pyright: ignore[reportArgumentType]
@@ -95,7 +98,7 @@ def told_submission(
         iso(submission.received),
         place,
     )
-    results = standings.judged(submissions.trials(session, submission))
+    results = standings.judged(submissions.trials(session, submission, logs=logs), logs=logs)
     now = datetime.fromtimestamp(office.clock(), UTC)
     phase = office.phase(row)
     if is_organiser(account):

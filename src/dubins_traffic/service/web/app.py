@@ -81,6 +81,7 @@ def create_app(office: Office) -> Litestar:
         loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
     )
     environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
+    kept = FileStore(office.folder / "sessions", create_directories=True)
     return Litestar(
         route_handlers=[
             *(
@@ -105,7 +106,8 @@ def create_app(office: Office) -> Litestar:
         ],
         csrf_config=csrf,
         template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(environment)),
-        stores={"sessions": FileStore(office.folder / "sessions", create_directories=True)},
+        stores={"sessions": kept},
+        on_startup=[kept.delete_expired],
         exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
         after_request=_with_headers,
         request_max_body_size=largest + (1 << 20),

@@ -60,7 +60,9 @@ class Pages(Controller):
             if account is not None and account.team_id is not None:
                 places = viewing.places_of(session)
                 found = receiving.submissions_of(session, row, account.team_id)
-                own = [viewing.told_submission(office, session, one, None, places) for one in found]
+                own = [
+                    viewing.told_submission(office, session, one, None, places, logs=False) for one in found
+                ]
                 used = submissions.used(session, row, account.team_id, at)
             title = row.competition.title
         given = {"phase": told, "own": own, "used": used, "slug": slug, "competition": title}

@@ -70,7 +70,8 @@ class Submitting(Controller):
 def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
     with office.database.reading() as session:
         found = receiving.found_submission(session, number, viewer.account)
-        told = viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))
+        places = viewing.places_of(session)
+        told = viewing.told_submission(office, session, found, viewer.account, places, logs=False)
         differing = viewing.differing(session, found) if "trials" in told else []
         closed = found.phase.is_closed(office.clock())
     return {"submission": told, "differing": differing, "closed": closed}
