@@ -76,7 +76,9 @@ def checked(url: str, code: str, trusted: ssl.SSLContext) -> None:
     wait_until(is_there, 60)
     organiser = Person(url, verify=trusted)
     organiser.join(code, "Olga")
-    cookies = [cookie for cookie in organiser.http.cookies.jar if cookie.name in ("session", "csrftoken")]
+    cookies = [
+        cookie for cookie in organiser.http.cookies.jar if cookie.name in ("__Host-session", "__Host-csrf")
+    ]
     assert len(cookies) == 2
     assert all(cookie.secure for cookie in cookies)
     assert f"{url}/join?code=" in organiser.post("/desk/invite", form="/desk", role="participant").text

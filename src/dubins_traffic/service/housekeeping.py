@@ -19,15 +19,11 @@ PODIUM = 3
 log = structlog.get_logger("dubins_traffic.service")
 
 
-def sweep(office: Office) -> None:
-    """Do all that is due; doing it twice is doing it once."""
+def end_silent(office: Office) -> None:
+    """End leases that have run out, and submissions whose deadline has passed."""
     with office.database.writing() as session:
         end_leases(session, office.clock())
         end_overdue(session, office.clock())
-    organising.publish_opened(office)
-    standings.refresh(office)
-    with office.database.writing() as session:
-        check_podiums(office, session)
 
 
 def end_leases(session: Session, at: float) -> None:
@@ -52,20 +48,42 @@ def end_overdue(session: Session, at: float) -> None:
         submissions.fail(session, submission, f"stayed {submission.state} for too long", at)
 
 
-def check_podiums(office: Office, session: Session) -> None:
+def check_podiums(office: Office) -> None:
     """Queue all trials of the first entries of phases that have closed a second time, once."""
-    at = office.clock()
-    due = select(Phase).where(Phase.closes <= at, Phase.podium_checked.is_(False), Phase.shows != "all")
-    for phase in session.scalars(due).all():
-        active = Submission.state.in_(submissions.ACTIVE)
-        busy = session.scalars(select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1))
-        if busy.first() is not None or phase.ranked < phase.version:
-            continue
-        for number in standings.first_entries(session, phase, PODIUM):
-            submission = session.get_one(Submission, number)
-            left = [trial.number for trial in submissions.trials(session, submission) if trial.again is None]
-            queue.add(session, submission, "again", submissions.in_chunks(left))
-        phase.podium_checked = True
+    with office.database.writing() as session:
+        due = select(Phase).where(
+            Phase.closes <= office.clock(), Phase.podium_checked.is_(False), Phase.shows != "all"
+        )
+        for phase in session.scalars(due).all():
+            active = Submission.state.in_(submissions.ACTIVE)
+            busy = session.scalars(
+                select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
+            )
+            if busy.first() is None and phase.ranked >= phase.version:
+                _run_podium_again(session, phase)
+
+
+def _run_podium_again(session: Session, phase: Phase) -> None:
+    for number in standings.first_entries(session, phase, PODIUM):
+        submission = session.get_one(Submission, number)
+        left = [trial.number for trial in submissions.trials(session, submission) if trial.again is None]
+        queue.add(session, submission, "again", submissions.in_chunks(left))
+    phase.podium_checked = True
+
+
+STEPS = (end_silent, organising.publish_opened, standings.refresh, check_podiums)
+"""What is due again and again; each step may be taken twice, and does not wait for another that fails."""
+
+
+def sweep(office: Office) -> None:
+    """Take every step; one that fails is told of and taken again the next time."""
+    for step in STEPS:
+        try:
+            step(office)
+        except DBAPIError as error:
+            log.warning("the database is away", step=step.__name__, error=str(error.orig))
+        except Exception:
+            log.exception("housekeeping failed", step=step.__name__)
 
 
 class Housekeeper(threading.Thread):
@@ -79,12 +97,7 @@ class Housekeeper(threading.Thread):
     def run(self) -> None:
         """Sweep until told to stop."""
         while not self._stop_asked.wait(PAUSE_S):
-            try:
-                sweep(self._office)
-            except DBAPIError as error:
-                log.warning("the database is away", error=str(error.orig))
-            except Exception as error:
-                log.exception("housekeeping failed", error=str(error))
+            sweep(self._office)
 
     def stop(self) -> None:
         """End the sweeping, and wait for the last."""

@@ -26,7 +26,7 @@ CHUNK = 10
 """Trials in a unit of work."""
 SAMPLE = 20
 """One trial in so many is run twice, and one at least."""
-MOST_UPLOADS = 60
+MOST_UPLOADS = 200
 """Uploads of a team in an hour, rejected ones too: each costs us a check."""
 REASONS = {
     "received": "waits for a worker that checks it",

@@ -65,11 +65,17 @@ def create_app(office: Office) -> Litestar:
     async def give_office() -> Office:
         return office
 
+    prefix = "__Host-" if settings.secure else ""  # which no other host can set
     sessions = ServerSideSessionConfig(
-        secure=settings.secure, samesite="lax", max_age=14 * 86400, exclude=[*PROGRAMS, "/static/"]
+        key=f"{prefix}session",
+        secure=settings.secure,
+        samesite="lax",
+        max_age=14 * 86400,
+        exclude=[*PROGRAMS, "/static/"],
     )
     csrf = CSRFConfig(
         office.cookie_secret,
+        cookie_name=f"{prefix}csrf",
         cookie_secure=settings.secure,
         cookie_httponly=True,
         exclude=[*(f"^{path}" for path in PROGRAMS), "^/static/"],
