@@ -279,6 +279,25 @@ def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(tmp_path: Path
         assert "lies in what is evaluated" in refused.stderr
 
 
+def test_where_there_is_no_box_an_entry_runs_if_it_is_trusted_with_the_same_frames(tmp_path: Path) -> None:
+    (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
+    words = ["evaluate", "entry", "--competition", str(ROOT / "examples" / "competition"), "-o"]
+    (tmp_path / "bin").mkdir()
+
+    def without(*more: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "dubins_traffic.cli", *words, *more]
+        around = {**os.environ, "PATH": str(tmp_path / "bin")}
+        return subprocess.run(line, cwd=tmp_path, env=around, capture_output=True, text=True, check=False)
+
+    refused = without("out")
+    assert refused.returncode == 2
+    assert "--trust-submissions" in refused.stderr
+    trusted = without("out", "--trust-submissions")
+    assert trusted.returncode == 0, trusted.stderr
+    assert command(*words, "boxed", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "out" / RESULTS).read_bytes() == (tmp_path / "boxed" / RESULTS).read_bytes()
+
+
 BASE = """
 import sys
 for name in ("pyarrow", "scipy", "matplotlib", "pandas", "cryptography", "httpx"):

@@ -42,6 +42,11 @@ def test_entries_whose_differences_hold_zero_are_ties() -> None:
     assert (one.larger, one.smaller) == (8, 9)
 
 
+def test_one_trial_tells_no_two_entries_apart() -> None:
+    places = rank({"a": results([5]), "b": results([1])}, phase(1))
+    assert [(own.place, own.ties) for own in places] == [(1, ("b",)), (2, ("a",))]
+
+
 def test_the_share_of_satisfied_trials_parts_equal_means() -> None:
     good = [judged(k) for k in range(4)]
     less = [judged(k, verdict="unfinished" if k == 2 else "satisfied") for k in range(4)]

@@ -187,8 +187,12 @@ def is_clean(row: Mapping[str, Any]) -> bool:
 
 
 def holds_zero(found: Estimate) -> bool:
-    """Tell whether differences are none that could be told from nothing."""
-    return found.mean_interval is None or found.mean_interval[0] <= 0.0 <= found.mean_interval[1]
+    """Tell whether differences are none that could be told from nothing; one difference alone tells nothing."""
+    return (
+        found.count < 2
+        or found.mean_interval is None
+        or found.mean_interval[0] <= 0.0 <= found.mean_interval[1]
+    )
 
 
 def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
