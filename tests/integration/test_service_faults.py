@@ -112,10 +112,12 @@ def test_workers_killed_with_a_lease(tmp_path: Path, settings: str) -> None:
         for k in range(FAULTS):
             name = f"victim{k}"
             worker = launched(service, token, name, tmp_path)
-            wait_until(lambda name=name: running(tmp_path, settings, name), pause=0.02)
-            time.sleep(0.3 * (k % 3))
-            os.killpg(worker.pid, signal.SIGKILL)
-            worker.wait()
+            try:
+                wait_until(lambda name=name: running(tmp_path, settings, name), pause=0.02)
+                time.sleep(0.3 * (k % 3))
+            finally:
+                os.killpg(worker.pid, signal.SIGKILL)
+                worker.wait()
         survivor = launched(service, token, "survivor", tmp_path)
         for person, number in zip(people, numbers, strict=True):
             person.ended(number)
