@@ -17,7 +17,7 @@ FAMILIES = {
 GROUND = {"kernels", "files", "display", "errors", "record", "protocols", "outside"}
 TASK = {"problem", "rules", "logic", "roads", "cars", "synthesis", "scoring"}
 TRIALS = {
-    "engine", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
+    "engine", "sandbox", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
     "observations", "routing",
 }  # fmt: skip
 WHAT = {
@@ -30,6 +30,7 @@ WHAT = {
     "runs": "the work of one command",
     "viewer": "pictures, replays; records held against what must have happened",
     "scoring": "metrics and verdicts: sinks for frames",
+    "sandbox": "strangers' controllers, limits, attacks",
     "trial": "the tick, and the frames of a trial",
     "simulators": "what stands behind the protocols",
     "shield": "the nearest command that keeps the rules",

@@ -6,11 +6,15 @@ import json
 import os
 import shlex
 import subprocess
-from collections.abc import Sequence
+import sys
+import tempfile
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+import dubins_traffic
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.sandbox import Layers, available_layers, boxed_controller
@@ -48,6 +52,21 @@ def test_all_attacks_are_stopped_as_an_ordinary_user() -> None:
     assert [each for each in found["attacks"] if not each["stopped"]] == []
     assert len(found["attacks"]) == len(ATTACKS)
     assert done.returncode == 0, done.stderr
+
+
+@needs_boxes
+@as_root
+def test_a_controller_drives_in_a_box_of_an_ordinary_user_as_in_process(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ["run", "demo", "--controller", "simple", "--trials", "2", "--json"]
+    done = as_user(USER, ["-m", "dubins_traffic.cli", *words, "--sandbox"])
+    assert done.returncode == 0, done.stderr
+    assert main(words) == 0
+    here = json.loads(capsys.readouterr().out)["trials"]
+    for trial, own in zip(json.loads(done.stdout)["trials"], here, strict=True):
+        assert trial["controller"] == "simple+sandbox"
+        assert (trial["goals"], trial["distance_m"]) == (own["goals"], own["distance_m"])
 
 
 @needs_boxes
@@ -103,6 +122,26 @@ def test_a_machine_that_can_not_hold_a_program_refuses_it(
         available_layers.cache_clear()
 
 
+@needs_boxes
+@as_root
+def test_a_kernel_that_forbids_namespaces_is_told_of_in_one_line() -> None:
+    """In a user namespace of its own, of which the kernel forbids more."""
+    check = shlex.join([sys.executable, "-m", "dubins_traffic.cli", "sandbox", "check"])
+    forbid = "echo 0 >/proc/sys/user/max_user_namespaces"
+    done = subprocess.run(
+        ["unshare", "--user", "--map-root-user", "--", "/bin/sh", "-c", f"{forbid} && exec {check}"],
+        env={**os.environ, "PYTHONPATH": str(Path(dubins_traffic.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("dubins-traffic: --sandbox: bubblewrap makes no boxes here: ")
+    assert "--trust-submissions" in line
+
+
 @pytest.mark.skipif(not MISSING, reason="boxes can be made here")
 def test_without_boxes_strangers_are_refused() -> None:
     with pytest.raises(InputError):
@@ -116,8 +155,21 @@ def test_layers_are_named() -> None:
     assert {name for attack in ATTACKS for name in attack.layers} <= set(NAMES)
 
 
+@contextmanager
+def open_folder() -> Generator[Path]:
+    """Yield a folder that every user can read, as those of pytest are not."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
 def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run this interpreter as another user, who sees it and its packages in places that all can read."""
+    with open_folder() as folder:
+        return _as_user(user, words, folder)
+
+
+def _as_user(user: int, words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     name, shown, paths = interpreter()
     places, steps = staged(shown)
     where = {Path(own.place): Path(there.source) for own, there in zip(shown, places, strict=True)}
@@ -128,13 +180,8 @@ def as_user(user: int, words: Sequence[str]) -> subprocess.CompletedProcess[str]
                 return str(there / Path(place).relative_to(inside))
         return place
 
-    package = seen("/own/dubins_traffic")
-    steps = [
-        *steps,
-        "mkdir -p /run/dubins-traffic/own",
-        f"ln -s {package} /run/dubins-traffic/own/dubins_traffic",
-    ]
-    folders = ["/run/dubins-traffic/own", *(seen(path) for path in paths if path != "/own")]
+    (folder / "dubins_traffic").symlink_to(seen("/own/dubins_traffic"))
+    folders = [str(folder), *(seen(path) for path in paths if path != "/own")]
     environment = {
         "PATH": os.environ["PATH"],
         "PYTHONPATH": ":".join(folders),

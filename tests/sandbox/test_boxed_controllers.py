@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import stat
+import subprocess
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -95,6 +97,27 @@ def test_a_decision_may_take_longer_while_the_bank_lasts(tmp_path: Path) -> None
     assert 3 <= beyond.ending.ticks <= 6
 
 
+def test_what_a_controller_could_do_in_the_judges_process_it_can_not_do_from_a_box(tmp_path: Path) -> None:
+    """In process one of these read the instance's seed through `gc`, and another replaced `Scorer.result`."""
+    body = """
+import gc
+if seen.tick == 0:
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.scoring.score import Scorer
+    print([each.seed for each in gc.get_objects() if isinstance(each, Instance)])
+    Scorer.result = lambda self, **more: 1 / 0
+class Lying(float):
+    def __repr__(self): return 'os.system'
+return Lying(0.25), True
+"""
+    result, controller = driven(written(tmp_path, body))
+    assert controller.log_tail == "[]"
+    plain, _ = driven(written(tmp_path, "return 0.25, 1.0", "plain.py"))
+    assert result.ending.end is End.DURATION, result.ending
+    clocks = {"time_to_begin_s": None}
+    assert result.score.asdict() | clocks == plain.score.asdict() | clocks
+
+
 def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
     program = tmp_path / "drive"
     program.write_text(
@@ -117,6 +140,30 @@ def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
     (folder / "controller.toml").write_text('program = ["./drive"]\n')
     result, _ = driven(str(folder))
     assert result.ending.end is End.DURATION
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
+def test_a_program_in_cpp_with_threads_drives(tmp_path: Path) -> None:
+    source = tmp_path / "drive.cc"
+    source.write_text(
+        textwrap.dedent("""\
+        #include <iostream>
+        #include <string>
+        #include <thread>
+        int main() {
+            std::string line;
+            for (int tick = 0; std::getline(std::cin, line);) {
+                if (line.rfind("{\\"frame\\"", 0) != 0) continue;
+                double speed = 0.0;
+                std::thread([&] { speed = 0.25; }).join();
+                std::cout << "{\\"command\\": [" << speed << ", 0], \\"tick\\": " << tick++ << "}" << std::endl;
+            }
+        }
+        """)
+    )
+    subprocess.run(["g++", "-pthread", source, "-o", tmp_path / "drive"], check=True, timeout=300)
+    result, controller = driven(f"program:{tmp_path / 'drive'}")
+    assert result.ending.end is End.DURATION, controller.end
 
 
 def test_a_folder_with_a_manifest_may_import_its_neighbours(tmp_path: Path) -> None:
@@ -149,3 +196,21 @@ def test_a_campaign_can_tell_who_answers_for_every_end() -> None:
     from dubins_traffic.sandbox import owner_of
 
     assert {json.dumps(owner_of(end)) for end in End} == {'"platform"', '"submission"'}
+
+
+def test_what_closing_does_in_a_box_is_told_as_in_process(tmp_path: Path) -> None:
+    spec = written(tmp_path, "return 0.1, 0.0")
+    with (tmp_path / "mine.py").open("a") as file:
+        file.write("    def close(self): raise ValueError('not yet')\n")
+    result, _ = driven(spec)
+    assert result.ending.end is End.DURATION
+    assert "close raised" in result.ending.detail
+    assert "ValueError: not yet" in result.ending.detail
+
+
+def test_what_a_controller_makes_that_answers_at_once_is_looked_at_too(tmp_path: Path) -> None:
+    body = "for k in range(200): open(f'/tmp/{seen.tick}-{k}', 'w').close()\nreturn 0.1, 0.0"
+    result, controller = driven(written(tmp_path, body), Limits(files=1 << 20), ticks=3000)
+    assert result.ending.end is End.OUT_OF_MEMORY
+    assert "more than 1024 files" in result.ending.detail
+    assert controller.end is not None

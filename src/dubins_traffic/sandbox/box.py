@@ -18,8 +18,12 @@ from dubins_traffic.transports.answers import LONGEST
 
 LOOK: Final = 0.02
 """Seconds between two looks at the clocks while an answer is waited for."""
+SELDOM: Final = 0.1
+"""Seconds between two looks at memory and files of a program that answers at once."""
 SLACK: Final = 5.0
 """So many times its processor time an answer may take before the rest counts as sleep."""
+FAREWELL: Final = 30.0
+"""Seconds that a program is waited for that has been told that its trial is over."""
 GRACE: Final = 10.0
 """Seconds within which a program that has closed its output ends."""
 
@@ -63,8 +67,8 @@ class Box:
         self._limits, self._judges = limits, JUDGE in layers
         self.bank = limits.bank_seconds
         self.over: BoxEnd | None = None
-        self._allowed = limits.start_seconds
-        self._spent = self._began = self._waited = 0.0
+        self._allowed, self._patience = limits.start_seconds, limits.wall_seconds
+        self._spent = self._began = self._waited = self._looked = 0.0
         self._said = bytearray()
         self._printed, self._prints = Printed(), True
         try:
@@ -109,6 +113,11 @@ class Box:
     def decide(self) -> None:
         """From here on an answer may take the processor time of a decision, not that of the start."""
         self._allowed = self._limits.decision_seconds
+
+    def part(self) -> None:
+        """From here on an answer is waited for as long as one waits to say goodbye."""
+        spent = self.seconds()
+        self._patience = min(self._patience, self._waited - SLACK * spent + FAREWELL)
 
     def seconds(self) -> float:
         """Return the processor time that the box has used so far."""
@@ -184,7 +193,10 @@ class Box:
         if not data and self._prints:
             self._poll.unregister(self._processes.printed)
             self._prints = False
+        stood = self._printed.stands
         self._printed.add(data)
+        if self._printed.stands and not stood:
+            self._processes.note()
         if self._judges and self._printed.count > self._limits.output:
             raise self.fault(End.OUTPUT_FLOOD, f"it printed more than {self._limits.output} bytes")
 
@@ -193,24 +205,30 @@ class Box:
         spent = self._processes.seconds()
         self._waited += monotonic() - self._began
         used, self._spent = spent - self._spent, spent
+        if monotonic() - self._looked > SELDOM:
+            self._watch()
         if used > self._allowed and self._judges:
             self.bank -= used - self._allowed
             if self.bank < 0.0:
                 raise self._out_of_time()
 
     def _watch(self) -> None:
-        """End what uses more than it may while an answer is waited for."""
+        """End what uses more than it may: while an answer is waited for, and now and then."""
+        self._looked = monotonic()
         if not self._judges:
             return
         spent = self.seconds()
         if spent - self._spent > self._allowed + self.bank:
             raise self._out_of_time()
         waited = self._waited + monotonic() - self._began
-        if waited - SLACK * spent > self._limits.wall_seconds:
+        if waited - SLACK * spent > self._patience:
             detail = f"no answer: {waited:.0f} s waited for, {spent:.1f} s of processor time used"
             raise self.fault(End.PEER_SILENT, detail)
         if self._processes.out_of_memory():
             raise self._out_of_memory()
+        if self._processes.files() > self._limits.most_files:
+            detail = f"more than {self._limits.most_files} files"
+            raise self.fault(End.OUT_OF_MEMORY, detail)
 
     def _out_of_time(self) -> BoxOverError:
         limits = self._limits

@@ -107,6 +107,7 @@ class BoxedController:
             return
         try:
             if box.over is None and self._program.shim:
+                box.part()
                 message_in(box.ask(as_line({"end": {}})))
         except AnswerError as error:
             raise CloseError(error.detail) from None

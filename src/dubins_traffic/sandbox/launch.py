@@ -27,6 +27,8 @@ USER: Final = 1000
 FIRST_USER: Final = 0x20000000
 """Boxes that root begins have users of their own from here on, who own nothing and have no name."""
 OPEN_FILES: Final = 256
+STAGE: Final = 1 << 30
+"""Bytes of a submission's folder at most, where root has to copy it."""
 DEVICES: Final = ("null", "zero", "full", "random", "urandom")
 SETTINGS: Final = ("ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives")
 """What is seen of /etc: what the dynamic linker needs."""
@@ -91,6 +93,8 @@ def command_line(
     if not root:
         return _entered(outer, doors, ())
     dropped = [*_setpriv(), *outer]
+    if not steps:
+        return _entered(dropped, doors, ())
     return ["unshare", "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
 
 
@@ -119,31 +123,56 @@ def _entered(command: Sequence[str], doors: Sequence[str], steps: Sequence[str])
 
 
 def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
-    """Return what is shown from places that everybody can read, and the steps that put it there."""
+    """Return what is shown from places that everybody can read, and the steps of a shell that put it there.
+
+    Folders are bound, and the rest is copied: what a submission's owner can read, a box need not be able to.
+    """
     stage = _stage()
-    steps = [f"mount -t tmpfs -o mode=755,nosuid,nodev box {stage}"]
     found: list[Shown] = []
+    binds: list[str] = []
+    copies: list[str] = []
     for number, each in enumerate(shown):
-        source, place = shlex.quote(each.source), f"{stage}/{number}"
-        if each.own:
-            steps += [f"cp -R -P -- {source} {place}", f"chmod -R a+rX {place}"]
-        elif Path(each.source).is_dir():
-            steps += [f"mkdir {place}", f"mount --bind {source} {place}"]
+        if _is_open(each):
+            found.append(each)
+            continue
+        source = shlex.quote(each.source)
+        if each.own or not Path(each.source).is_dir():
+            place = f"{stage}/copies/{number}"
+            copies += [f"cp -R -P -- {source} {place}", f"chmod -R a+rX {place}"]
         else:
-            steps += [f": >{place}", f"mount --bind {source} {place}"]
+            place = f"{stage}/{number}"
+            Path(place).mkdir(mode=0o755, exist_ok=True)
+            binds.append(f"mount --bind {source} {place}")
         found.append(Shown(place, each.place))
-    return found, steps
+    if copies:
+        copies.insert(0, f"mount -t tmpfs -o mode=755,nosuid,nodev,size={STAGE} box {stage}/copies")
+    return found, binds + copies
+
+
+def _is_open(shown: Shown) -> bool:
+    """Tell whether every user can read what is shown; of a submission's folder it is not known."""
+    path = Path(shown.source)
+    if shown.own and not path.is_file():
+        return False
+    try:
+        modes = [folder.stat().st_mode & 0o1 for folder in path.parents]
+        wanted = 0o5 if path.is_dir() else 0o4
+        return all(modes) and path.stat().st_mode & wanted == wanted
+    except OSError:
+        return False
 
 
 @cache
 def _stage() -> str:
-    """Return an empty folder over which a box's own mount lies, in namespaces of its own."""
-    fixed = Path("/run/dubins-traffic")
+    """Return a folder with empty ones, over which a box's own mounts lie, in namespaces of their own."""
+    place = "/run/dubins-traffic"
     try:
-        fixed.mkdir(mode=0o755, exist_ok=True)
+        Path(place).mkdir(mode=0o755, exist_ok=True)
     except OSError:
-        return tempfile.mkdtemp(prefix="dubins-traffic-")
-    return str(fixed)
+        place = tempfile.mkdtemp(prefix="dubins-traffic-")
+        Path(place).chmod(0o755)
+    (Path(place) / "copies").mkdir(mode=0o755, exist_ok=True)
+    return place
 
 
 def _bubblewrap(

@@ -35,7 +35,7 @@ class Limits:
     processes : int
         Processes and threads at a time.
     files : int
-        Bytes that all files together may hold.
+        Bytes that all files together may hold; there may be as many files as these are KiB.
     output : int
         Bytes that it may print in a trial.
 
@@ -66,6 +66,11 @@ class Limits:
                 raise InputError(
                     "not a limit", file="--limits", field=each.name, value=value, expected=expected
                 )
+
+    @property
+    def most_files(self) -> int:
+        """How many files there may be: an empty one costs the kernel's memory, about a KiB."""
+        return max(1, self.files // 1024)
 
     @classmethod
     def from_text(cls, text: str) -> Limits:

@@ -62,6 +62,8 @@ class Processes:
         self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
         for each in own:
             os.set_blocking(each, False)
+        self._others: list[int] = []
+        self._first = 0
         self._clocks = ProcessClocks(self._process.pid)
 
     def _begin(self, program: Program) -> None:
@@ -102,31 +104,49 @@ class Processes:
             return self._group.out_of_memory()
         return self._clocks.memory > self._limits.memory
 
+    def files(self) -> int:
+        """Return how many files the box has of its own, 0 where that can't be seen."""
+        if not self._first:
+            return 0
+        try:
+            found = os.statvfs(f"/proc/{self._first}/root/tmp")
+        except OSError:
+            return 0
+        return found.f_files - found.f_ffree
+
     def status(self, seconds: float) -> str | None:
         """Return how the first process ended, None if it does not within some `seconds`."""
-        try:
-            status = self._process.wait(seconds)
-        except subprocess.TimeoutExpired:
-            return None
+        for first in _opened([self._process.pid]):
+            ended = _ends(first, seconds)
+            os.close(first)
+            if not ended:
+                return None
+        status = self._process.wait()
         number = -status if status < 0 else status - 128
         try:
             return f"signal {signal.Signals(number).name}" if number > 0 else f"status {status}"
         except ValueError:
             return f"status {status}"
 
+    def note(self) -> None:
+        """Note the first process of the box itself, with whose end that of all others is waited for."""
+        if self._layers.boxes and not self._others:
+            found = children(self._process.pid)
+            self._others, self._first = _opened(found), next(iter(found), 0)
+
     def _kill(self) -> None:
-        """Kill the first process, and wait until all others have gone with it."""
-        others = _opened(children(self._process.pid)) if self._layers.boxes else []
+        """Kill the first process, and with it the box."""
+        self.note()
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        for other in others:
-            _see_off(other)
 
     def close(self) -> None:
         """Kill them all and leave nothing behind. May be called twice."""
         if self._process.returncode is None:
             self._kill()
+        while self._others:
+            _see_off(self._others.pop())
         for stream in filter(None, self._streams):
             stream.close()
         if self._group is not None:
@@ -150,10 +170,15 @@ def _see_off(process: int) -> None:
     """
     with contextlib.suppress(ProcessLookupError, PermissionError):
         signal.pidfd_send_signal(process, signal.SIGKILL)
+    _ends(process, GRACE)
+    os.close(process)
+
+
+def _ends(process: int, seconds: float) -> bool:
+    """Wait for the end of the process of a descriptor; return whether it came."""
     waiting = select.poll()
     waiting.register(process, select.POLLIN)
-    waiting.poll(GRACE * 1000.0)
-    os.close(process)
+    return bool(waiting.poll(seconds * 1000.0))
 
 
 def _groups(layers: Layers) -> cgroups.Trees:

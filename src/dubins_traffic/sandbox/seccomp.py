@@ -19,6 +19,7 @@ ALLOWED: Final = """
     readlink readlinkat getcwd chdir fchdir getdents getdents64 mkdir mkdirat rmdir unlink unlinkat rename renameat
     renameat2 link linkat symlink symlinkat truncate ftruncate fallocate fsync fdatasync sync_file_range umask chmod
     fchmod fchmodat utime utimes utimensat futimesat fadvise64 readahead copy_file_range sendfile splice tee flock
+    getxattr lgetxattr fgetxattr listxattr llistxattr flistxattr
     select pselect6 poll ppoll epoll_create epoll_create1 epoll_ctl epoll_wait epoll_pwait epoll_pwait2 eventfd eventfd2
     timerfd_create timerfd_settime timerfd_gettime inotify_init inotify_init1 inotify_add_watch inotify_rm_watch
     mmap munmap mprotect mremap madvise msync mincore brk mlock munlock mlockall munlockall mlock2 membarrier

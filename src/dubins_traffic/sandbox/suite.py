@@ -82,14 +82,14 @@ def strike(attack: Attack, layers: Layers, baits: Baits) -> Strike:
     return Strike(attack, stopped, words)
 
 
-def _asked(box: Box, attack: Attack, baits: Baits) -> bytes:
+def _answer(box: Box, attack: Attack, baits: Baits) -> bytes:
     return box.ask(as_line({"source": attack.source, "bait": baits.document()}))
 
 
 def _reached(box: Box, attack: Attack, baits: Baits) -> tuple[bool, str]:
     """Return whether an attack that says what it got was stopped, and by what."""
     try:
-        message = message_in(_asked(box, attack, baits))
+        message = message_in(_answer(box, attack, baits))
     except BoxOverError as error:
         return _ended(error)
     words = str(message.get("stopped") or message.get("got"))
@@ -100,7 +100,7 @@ def _said(box: Box, attack: Attack, baits: Baits) -> tuple[bool, str]:
     """Return whether an attack ended as it must that is asked for a command, and how it ended."""
     ends = attack.end if isinstance(attack.end, tuple) else (attack.end,)
     try:
-        line = _asked(box, attack, baits)
+        line = _answer(box, attack, baits)
         command_in(line, 0)
         return False, "its answer was taken"
     except AnswerError as error:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 NO_TICK = -1
+TOO_LONG = f"a line longer than {LONGEST} bytes"
 
 
 class Piped(Protocol):
@@ -181,10 +182,10 @@ class Stdio:
         peer.unread = bytearray(rest)
         for line in lines:
             self._take(peer, bytes(line))
-        if len(rest) > LONGEST:
-            self._mailbox.fault(peer.car, End.PEER_GARBAGE, f"a line longer than {LONGEST} bytes")
-            return False
-        return bool(data)
+        whole = len(rest) <= LONGEST
+        if not whole:
+            self._mailbox.fault(peer.car, End.PEER_GARBAGE, TOO_LONG)
+        return whole and bool(data)
 
     def _take(self, peer: _Peer, line: bytes) -> None:
         """Hand on what a line says; a tick that has not been shown yet is a lie."""

@@ -60,6 +60,11 @@ try:
 finally:
     for each in made: os.unlink(each)
 """),
+    Attack("empty files", (JUDGE,), """
+names = [f'/tmp/empty-{number}' for number in range(60_000)]
+for name in names: open(name, 'w').close()
+got = len(names)
+"""),
     Attack("a file in shared memory", (FILES, RLIMITS), """
 with open('/dev/shm/big', 'wb') as file:
     try:

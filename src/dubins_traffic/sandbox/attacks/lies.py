@@ -29,7 +29,7 @@ GARBAGE = {
 }
 """Lines that are no answer to tick 0."""
 
-CONDUCT = (
+LIES = (
     *(
         Attack(f"says {name}", (JUDGE,), f"os.write(answers, {line} + b'\\n'); time.sleep(600)", End.PEER_GARBAGE, alone=False)
         for name, line in GARBAGE.items()
