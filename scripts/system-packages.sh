@@ -1,7 +1,8 @@
 #!/bin/sh
-# Install the system packages that the tests need: Chromium and its driver, for the test of the replay page; ROS 1, a
-# compiler and Fast DDS, for the tests over ROS 1 and 2; bubblewrap and libseccomp, for boxes (docs/sandbox.md). Does
-# nothing where they are, and says in one line what it can't install; the status is 0 either way.
+# Install the system packages that the tests need: Chromium and its driver, for the tests of pages; nginx, PostgreSQL and
+# SQLite's command, for the tests of the service; ROS 1, a compiler and Fast DDS, for the tests over ROS 1 and 2;
+# bubblewrap and libseccomp, for boxes (docs/sandbox.md). Does nothing where they are, and says in one line what it can't
+# install; the status is 0 either way.
 set -eu
 
 ros="python3-rospy python3-rosmaster python3-roslaunch python3-genpy python3-gencpp python3-nav-msgs"
@@ -20,6 +21,7 @@ has chromium chromedriver || missing="chromium chromium-driver"
 installed bubblewrap libseccomp2 || missing="$missing bubblewrap libseccomp2"
 # shellcheck disable=SC2086 # a list of words
 installed $ros || missing="$missing $ros"
+installed nginx openssl postgresql-15 sqlite3 || missing="$missing nginx openssl postgresql-15 sqlite3"
 [ -n "$missing" ] || exit 0
 
 if ! has apt-get; then

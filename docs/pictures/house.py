@@ -22,6 +22,7 @@ TRIALS = {
 }  # fmt: skip
 WHAT = {
     "cli": "one short file a command",
+    "service": "accounts, the queue, pages, workers",
     "competition": "phases, submissions of strangers, places",
     "campaign": "many trials and their reports; a check of controllers; bags and logs",
     "sessions": "drivers or worlds in other processes",

@@ -11,7 +11,7 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.competition.competition import Phase
+    from dubins_traffic.competition.competition import Competition, Phase
     from dubins_traffic.competition.evaluating import Evaluation
 
 EXAMPLES = options.examples(
@@ -33,7 +33,10 @@ def evaluate(
     competition: Annotated[
         str,
         typer.Option(
-            "--competition", metavar="FILE|URL", help="A competition file or its folder.", show_default=False
+            "--competition",
+            metavar="FILE|URL",
+            help="A competition file, its folder, or the address of its page.",
+            show_default=False,
         ),
     ],
     phase: Annotated[
@@ -66,12 +69,11 @@ def evaluate(
     """
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.competition import evaluating
-    from dubins_traffic.competition.competition import load_competition
     from dubins_traffic.competition.contents import EVALUATIONS, check_apart
     from dubins_traffic.competition.submission import check_submission
     from dubins_traffic.competition.visibility import summary
 
-    own = load_competition(competition).phase(phase)
+    own = _competition(competition).phase(phase)
     base = Path(output or EVALUATIONS)
     check_apart(Path(path), base)
     submission = check_submission(path, base / "submissions")
@@ -93,6 +95,17 @@ def evaluate(
         _show(done, own, folder)
     if any(result.owner is not None for result in done.results):
         raise typer.Exit(faults.FAILED)
+
+
+def _competition(place: str) -> Competition:
+    """Return the competition of a file, or of the address of its page."""
+    from dubins_traffic.competition.competition import load_competition
+
+    if not place.startswith(("http://", "https://")):
+        return load_competition(place)
+    from dubins_traffic.service.client import fetched_competition
+
+    return fetched_competition(place)
 
 
 def _show(done: Evaluation, phase: Phase, folder: Path) -> None:

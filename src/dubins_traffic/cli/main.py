@@ -27,12 +27,15 @@ from dubins_traffic.cli import (
     run,
     sandbox,
     score,
+    serve,
     session,
     spec,
+    submit,
     synth,
     template,
     verify,
     warm,
+    worker,
 )
 from dubins_traffic.sessions.registry import TRANSPORTS
 
@@ -91,6 +94,12 @@ app.add_typer(gazebo.app, name="gazebo")
 app.add_typer(sandbox.app, name="sandbox")
 for name, transport in transports.items():
     app.add_typer(transport, name=name)
+app.command("submit", epilog=submit.EXAMPLES)(submit.submit)
+app.command("status", epilog=submit.STATUS_EXAMPLES)(submit.status)
+app.command("logs", epilog=submit.LOGS_EXAMPLES)(submit.logs)
+app.command("cancel", epilog=submit.CANCEL_EXAMPLES)(submit.cancel)
+app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
+app.command("worker", epilog=worker.EXAMPLES)(worker.worker)
 app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)
 

@@ -1,0 +1,75 @@
+"""`dubins-traffic serve`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import options
+
+EXAMPLES = options.examples(
+    "serve season --competition examples/competition",
+    "serve season --workers 4 --key-file /etc/season.key",
+    "serve season --host 0.0.0.0 --port 8000 --workers 0",
+)
+
+
+def serve(
+    folder: Annotated[str, typer.Argument(metavar="DIR", help="The folder of the service, made if missing.")],
+    workers: Annotated[
+        int, typer.Option("--workers", metavar="N", min=0, help="Workers beside the server, on this machine.")
+    ] = 1,
+    host: Annotated[str, typer.Option("--host", metavar="H", help="Address to listen at.")] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option("--port", metavar="P", min=0, max=65535, help="Port; 0: any that is free.")
+    ] = 8000,
+    competition: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--competition",
+            metavar="PATH",
+            help="A competition file, or the folder of one, made unless it is there; may be given several times.",
+        ),
+    ] = None,
+    key_file: Annotated[
+        str | None,
+        typer.Option(
+            "--key-file",
+            metavar="FILE",
+            help="Key of secret seeds, outside DIR; drawn if missing.",
+            show_default="in your configuration folder",
+        ),
+    ] = None,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
+        ),
+    ] = False,
+) -> None:
+    """Serve competitions on the web: accounts, a queue, workers that judge, tables, replays.
+
+    What it needs to know stands in DIR/service.toml; without one it works on this machine alone. Ctrl-C ends it.
+    """
+    from dubins_traffic.cli.extras import needs
+
+    with needs("serving competitions", "service"):
+        from dubins_traffic.service import logs, serving
+        from dubins_traffic.service.office import Office, default_key
+        from dubins_traffic.service.worker import check_boxes
+    logs.to_stderr()
+    if workers:
+        check_boxes(trust=trust)
+    place = Path(folder)
+    office = Office(place, default_key(place) if key_file is None else Path(key_file))
+    opened = serving.listen(serving.Place(host, port))
+    url = serving.address_of(opened)
+    joining = serving.prepare(office, [Path(path) for path in competition or ()], url)
+    print(f"Serving {folder} at {office.settings.url or url}", flush=True)
+    if office.settings.url:
+        print(f"The proxy finds it at {url}", flush=True)
+    if joining is not None:
+        print(f"The first organiser joins at {joining}", flush=True)
+    serving.serve(office, opened, workers, trust=trust)

@@ -1,0 +1,62 @@
+"""`dubins-traffic worker`."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import options
+
+EXAMPLES = options.examples("worker https://compete.example.org --token-file worker.token")
+
+
+def worker(
+    url: Annotated[str, typer.Argument(metavar="URL", help="Address of the service.")],
+    token_file: Annotated[
+        str | None,
+        typer.Option(
+            "--token-file",
+            metavar="FILE",
+            help="The token that the organiser's desk gave for this worker.",
+            show_default="DUBINS_TRAFFIC_TOKEN of the environment",
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name", metavar="NAME", help="What the service calls it.", show_default="this machine's"
+        ),
+    ] = None,
+    folder: Annotated[
+        str | None,
+        typer.Option(
+            "--folder", metavar="DIR", help="For submissions, unpacked.", show_default="in your cache folder"
+        ),
+    ] = None,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
+        ),
+    ] = False,
+    with_parent: Annotated[bool, typer.Option("--with-parent", hidden=True)] = False,
+) -> None:
+    """Judge trials for a service, which may be on another machine; start as many as there are cores to spare.
+
+    What is at work when it is told to end is given back. It gives way to other programs of the machine.
+    """
+    from dubins_traffic.cli.extras import needs
+
+    with needs("a worker", "service"):
+        from dubins_traffic.service import logs
+        from dubins_traffic.service import worker as room
+        from dubins_traffic.service.connection import Connection, token_from
+    logs.to_stderr()
+    place = room.default_folder() if folder is None else Path(folder)
+    made = room.Worker(
+        Connection(url, token_from(token_file)), name or socket.gethostname()[:60], place, trust=trust
+    )
+    room.until_signalled(made, with_parent=with_parent)

@@ -1,0 +1,199 @@
+"""Accounts by invitation, teams, passwords, tokens of the API, and the log of what organisers did."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import unicodedata
+from collections.abc import Sequence
+from functools import cache
+
+from argon2 import PasswordHasher
+from argon2.exceptions import InvalidHashError, VerificationError
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.service.tables import Account, Act, Code, Team, Token
+
+ORGANISER, PARTICIPANT = "organiser", "participant"
+ROLES = (PARTICIPANT, ORGANISER)
+SHORTEST_PASSWORD = 10
+LONGEST_PASSWORD = 1000
+LONGEST_NAME = 60
+INVITATION_S = 30 * 86400.0
+"""How long an invitation is good, seconds."""
+RESET_S = 86400.0
+"""How long a code for a new password is good, seconds."""
+
+
+class WrongEntryError(DubinsTrafficError):
+    """A form or a document of the API is filled in wrongly; the text says what and what was expected."""
+
+
+def clean_name(name: str, what: str) -> str:
+    """Return a name as it is kept: one line, normalised, of visible letters.
+
+    Raises
+    ------
+    WrongEntryError
+        If nothing is left of it, it is too long, or it has signs that can't be seen.
+    """
+    name = " ".join(unicodedata.normalize("NFKC", name).split())
+    if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable():
+        raise WrongEntryError(f"{what}: 1 to {LONGEST_NAME} visible letters")
+    return name
+
+
+def _checked_password(password: str) -> str:
+    if not SHORTEST_PASSWORD <= len(password) <= LONGEST_PASSWORD:
+        raise WrongEntryError(f"password: {SHORTEST_PASSWORD} to {LONGEST_PASSWORD} signs")
+    return password
+
+
+@cache
+def _hasher() -> PasswordHasher:
+    return PasswordHasher()
+
+
+@cache
+def _nobody() -> str:
+    """Return a hash that is verified where there is no account, so that the time tells nothing."""
+    return _hasher().hash(secrets.token_hex(16))
+
+
+def digest_of(secret: str) -> str:
+    """Return the SHA-256 by which a code or token is kept; both have 256 random bits."""
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def invite(session: Session, role: str, team: Team | None, at: float) -> str:
+    """Return a new code by which one person can register, for a team or for none yet."""
+    code = secrets.token_urlsafe(32)
+    session.add(
+        Code(
+            digest=digest_of(code),
+            kind="invitation",
+            role=role,
+            team_id=team and team.id,
+            expires=at + INVITATION_S,
+        )
+    )
+    return code
+
+
+def _use(session: Session, code: str, kind: str, at: float) -> Code:
+    query = select(Code).where(Code.digest == digest_of(code.strip()), Code.kind == kind)
+    found = session.scalars(query).first()
+    if found is None or found.used is not None or found.expires <= at:
+        raise WrongEntryError("code: unknown, used or expired; ask the organiser for another")
+    found.used = at
+    return found
+
+
+def register(session: Session, code: str, name: str, password: str, team: str, at: float) -> Account:
+    """Make the account of a person who was invited; `team` names the team to found, if the code is for none.
+
+    Raises
+    ------
+    WrongEntryError
+        If the code is not good, or a name or the password is not.
+    """
+    invitation = _use(session, code, "invitation", at)
+    name = clean_name(name, "name")
+    if session.scalar(select(func.count()).where(func.lower(Account.name) == name.lower())):
+        raise WrongEntryError("name: taken")
+    account = Account(
+        name=name,
+        password=_hasher().hash(_checked_password(password)),
+        role=invitation.role or PARTICIPANT,
+        team_id=invitation.team_id,
+        created=at,
+    )
+    session.add(account)
+    session.flush()
+    if account.team_id is None and team.strip():
+        account.team_id = found_team(session, team, at).id
+    return account
+
+
+def found_team(session: Session, name: str, at: float) -> Team:
+    """Make a new team; WrongEntryError if the name is taken or is none."""
+    name = clean_name(name, "team")
+    if session.scalar(select(func.count()).where(func.lower(Team.name) == name.lower())):
+        raise WrongEntryError("team: the name is taken; a team's members invite further ones")
+    team = Team(name=name, created=at)
+    session.add(team)
+    session.flush()
+    return team
+
+
+def verified(session: Session, name: str, password: str) -> Account | None:
+    """Return the account that a name and a password are of, else None."""
+    wanted = unicodedata.normalize("NFKC", name).strip().lower()
+    query = select(Account).where(func.lower(Account.name) == wanted, Account.removed.is_(None))
+    account = session.scalars(query).first()
+    try:
+        _hasher().verify(_nobody() if account is None else account.password, password[:LONGEST_PASSWORD])
+    except (VerificationError, InvalidHashError):
+        return None
+    return account
+
+
+def offer_reset(session: Session, account: Account, at: float) -> str:
+    """Return a code by which a person who has lost the password can choose another."""
+    code = secrets.token_urlsafe(32)
+    session.add(Code(digest=digest_of(code), kind="password", account_id=account.id, expires=at + RESET_S))
+    return code
+
+
+def reset(session: Session, code: str, password: str, at: float) -> Account:
+    """Set a new password by a code; it ends all log-ins and tokens. WrongEntryError if the code is not good."""
+    account = session.get(Account, _use(session, code, "password", at).account_id)
+    if account is None or account.removed is not None:
+        raise WrongEntryError("code: its account has been removed")
+    set_password(session, account, password, at)
+    return account
+
+
+def set_password(session: Session, account: Account, password: str, at: float) -> None:
+    """Set another password; log-ins with the old one end, and so do the tokens."""
+    account.password = _hasher().hash(_checked_password(password))
+    account.epoch += 1
+    for token in tokens(session, account):
+        token.revoked = at
+
+
+def remove(session: Session, account: Account, at: float) -> None:
+    """Remove a person: name, password and tokens go; the team's submissions and what it won stay."""
+    for token in tokens(session, account):
+        token.revoked = at
+        token.name = "removed"
+    account.name, account.password = f"removed {account.id}", "none"
+    account.team_id, account.removed, account.role = None, at, PARTICIPANT
+    account.epoch += 1
+
+
+def tokens(session: Session, account: Account) -> Sequence[Token]:
+    """Return the tokens of an account that are good."""
+    query = select(Token).where(Token.account_id == account.id, Token.revoked.is_(None))
+    return session.scalars(query.order_by(Token.id)).all()
+
+
+def new_token(session: Session, name: str, account: Account | None, at: float) -> str:
+    """Return a new token of the API for an account, or without one for a worker; only its SHA-256 is kept."""
+    token = secrets.token_urlsafe(32)
+    owner = account and account.id
+    session.add(Token(digest=digest_of(token), name=clean_name(name, "name"), account_id=owner, created=at))
+    return token
+
+
+def token_of(session: Session, token: str) -> Token | None:
+    """Return what is known of a token that is good, else None."""
+    query = select(Token).where(Token.digest == digest_of(token), Token.revoked.is_(None))
+    return session.scalars(query).first()
+
+
+def note(session: Session, account: Account | None, act: str, subject: str, detail: str, at: float) -> None:
+    """Add to the log what an organiser did, or without an account what the service did by itself."""
+    session.add(Act(at=at, account_id=account and account.id, act=act, subject=subject, detail=detail))

@@ -1,0 +1,113 @@
+"""The database: SQLite with a write-ahead log in the folder of the service, or PostgreSQL by its address.
+
+Writers go one after another on both: SQLite by ``BEGIN IMMEDIATE``, PostgreSQL by a lock that the transaction holds.
+So what a writer has read is still true when it commits, and one text of the queue serves both.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import ConnectionPoolEntry
+
+WRITERS_LOCK = 0x64756269
+"""Number of the lock that writers hold on PostgreSQL."""
+PATIENCE_S = 60.0
+"""How long a writer waits for the database to come back."""
+Found = TypeVar("Found")
+
+
+class Database:
+    """Sessions for reading and for writing.
+
+    Parameters
+    ----------
+    url : str
+        Address as SQLAlchemy has it: ``sqlite:///FILE`` or ``postgresql+psycopg://...``.
+    """
+
+    def __init__(self, url: str) -> None:
+        sqlite = url.startswith("sqlite")
+        options: dict[str, Any] = {"connect_args": {"timeout": 30}} if sqlite else {"pool_pre_ping": True}
+        self.engine: Engine = create_engine(url, pool_size=16, max_overflow=32, **options)
+        self._writes = self.engine.execution_options(writes=True)
+        if sqlite:
+            event.listen(self.engine, "connect", _prepare_sqlite)
+            event.listen(self.engine, "begin", _begin_sqlite)
+        else:
+            event.listen(self.engine, "begin", _begin_postgresql)
+
+    @contextlib.contextmanager
+    def reading(self) -> Generator[Session]:
+        """Give a session that sees one state of the database."""
+        with Session(self.engine, expire_on_commit=False) as session:
+            yield session
+
+    @contextlib.contextmanager
+    def writing(self) -> Generator[Session]:
+        """Give a session that is the only writer; it commits when the body ends well, all of it or nothing."""
+        with Session(self._writes, expire_on_commit=False) as session, session.begin():
+            yield session
+
+    def patiently(self, work: Callable[[Session], Found]) -> Found:
+        """Return what `work` gives in a writer's session; it is tried again while the database is away.
+
+        `work` is called anew in a new transaction each time, so it must do nothing outside of it.
+
+        Raises
+        ------
+        sqlalchemy.exc.DBAPIError
+            If the database stays away for `PATIENCE_S`.
+        """
+        until, pause = time.monotonic() + PATIENCE_S, 0.05
+        while True:
+            try:
+                with self.writing() as session:
+                    return work(session)
+            except DBAPIError as error:
+                away = isinstance(error, OperationalError) or error.connection_invalidated
+                if not away or time.monotonic() > until:
+                    raise
+            time.sleep(pause)
+            pause = min(2.0, 2.0 * pause)
+
+    def migrate(self, revision: str = "head") -> None:
+        """Bring the tables to those of this version of the package, whatever version made them."""
+        config = Config()
+        config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))
+        with self._writes.begin() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, revision)
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.engine.dispose()
+
+
+def _prepare_sqlite(connection: Any, _entry: ConnectionPoolEntry) -> None:
+    """Let SQLAlchemy begin transactions, not the driver; a commit has reached the disk before it returns."""
+    connection.isolation_level = None
+    for setting in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=30000"):
+        connection.execute(f"PRAGMA {setting}").close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if _writes(connection) else "BEGIN")
+
+
+def _begin_postgresql(connection: Connection) -> None:
+    if _writes(connection):
+        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": WRITERS_LOCK})
+
+
+def _writes(connection: Connection) -> bool:
+    return bool(connection.get_execution_options().get("writes"))

@@ -1,0 +1,105 @@
+"""What the service does by itself: leases that ran out, deadlines that passed, new tables, the podium run again."""
+
+from __future__ import annotations
+
+import threading
+
+import structlog
+from sqlalchemy import select
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.orm import Session
+
+from dubins_traffic.service import organising, queue, standings, submissions
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.tables import Phase, Submission
+
+PAUSE_S = 1.0
+PODIUM = 3
+"""Entries whose every trial is run a second time after the phase has closed."""
+log = structlog.get_logger("dubins_traffic.service")
+
+
+def end_silent(office: Office) -> None:
+    """End leases that have run out, and submissions whose deadline has passed."""
+    with office.database.writing() as session:
+        end_leases(session, office.clock())
+        end_overdue(session, office.clock())
+
+
+def end_leases(session: Session, at: float) -> None:
+    """Let chunks wait again whose workers were silent too long."""
+    for chunk in queue.overdue(session, at):
+        log.warning("lease ran out", chunk=chunk.id, worker=chunk.worker, attempt=chunk.attempts)
+        give_back(session, chunk.id, f"worker {chunk.worker} fell silent", at)
+
+
+def give_back(session: Session, chunk_id: int, why: str, at: float) -> None:
+    """End a lease without a result; a chunk that was tried too often ends its submission by our fault."""
+    chunk = session.get_one(queue.Chunk, chunk_id)
+    if not queue.release(session, chunk, why, at) and chunk.submission.state in submissions.ACTIVE:
+        submissions.fail(session, chunk.submission, f"tried {chunk.attempts} times: {why}", at)
+
+
+def end_overdue(session: Session, at: float) -> None:
+    """End submissions that stayed in a state for too long: that is our fault."""
+    late = select(Submission).where(Submission.state.in_(submissions.ACTIVE), Submission.deadline < at)
+    for submission in session.scalars(late).all():
+        log.error("deadline passed", submission=submission.id, state=submission.state)
+        submissions.fail(session, submission, f"stayed {submission.state} for too long", at)
+
+
+def check_podiums(office: Office) -> None:
+    """Queue all trials of the first entries of phases that have closed a second time, once."""
+    with office.database.writing() as session:
+        due = select(Phase).where(
+            Phase.closes <= office.clock(), Phase.podium_checked.is_(False), Phase.shows != "all"
+        )
+        for phase in session.scalars(due).all():
+            active = Submission.state.in_(submissions.ACTIVE)
+            busy = session.scalars(
+                select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
+            )
+            if busy.first() is None and phase.ranked >= phase.version:
+                _run_podium_again(session, phase)
+
+
+def _run_podium_again(session: Session, phase: Phase) -> None:
+    for number in standings.first_entries(session, phase, PODIUM):
+        submission = session.get_one(Submission, number)
+        left = [trial.number for trial in submissions.trials(session, submission) if trial.again is None]
+        queue.add(session, submission, "again", submissions.in_chunks(left))
+    phase.podium_checked = True
+
+
+STEPS = (end_silent, organising.publish_opened, standings.refresh, check_podiums)
+"""What is due again and again; each step may be taken twice, and does not wait for another that fails."""
+
+
+def sweep(office: Office) -> None:
+    """Take every step; one that fails is told of and taken again the next time."""
+    for step in STEPS:
+        try:
+            step(office)
+        except DBAPIError as error:
+            log.warning("the database is away", step=step.__name__, error=str(error.orig))
+        except Exception:
+            log.exception("housekeeping failed", step=step.__name__)
+
+
+class Housekeeper(threading.Thread):
+    """Sweeps every second until it is told to stop; a database that is away is waited for."""
+
+    def __init__(self, office: Office) -> None:
+        super().__init__(name="housekeeper", daemon=True)
+        self._office = office
+        self._stop_asked = threading.Event()
+
+    def run(self) -> None:
+        """Sweep until told to stop."""
+        while not self._stop_asked.wait(PAUSE_S):
+            sweep(self._office)
+
+    def stop(self) -> None:
+        """End the sweeping, and wait for the last."""
+        self._stop_asked.set()
+        self.join(timeout=30)

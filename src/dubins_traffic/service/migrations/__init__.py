@@ -1,0 +1,1 @@
+"""Migrations of the tables, one file a version; `Database.migrate` runs them."""

@@ -1,0 +1,123 @@
+"""The service as one object: its folder, database, store, key and clock, and the competitions it holds."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, joinedload
+
+from dubins_traffic.competition import competition as files
+from dubins_traffic.competition import keys
+from dubins_traffic.service.database import Database
+from dubins_traffic.service.settings import Settings, load_settings, own_secret
+from dubins_traffic.service.storage import Storage
+from dubins_traffic.service.tables import Competition, Phase
+
+Clock = Callable[[], float]
+
+
+class Office:
+    """What every part of the service works with.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the service; made if missing.
+    key_file : Path, optional
+        The key of secret seeds, outside of `folder`; drawn if there is none. Without it there are no secret seeds.
+    clock : callable
+        Seconds since 1970, UTC.
+    """
+
+    def __init__(self, folder: Path, key_file: Path | None = None, clock: Clock = time.time) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        self.settings: Settings = load_settings(folder)
+        self.clock = clock
+        self.database = Database(self.settings.database or f"sqlite:///{folder / 'service.db'}")
+        self.storage = Storage(self.settings.storage or str(folder / "store"))
+        self.cookie_secret = own_secret(folder, "cookies.key")
+        self._key = None if key_file is None else _key(key_file, folder)
+        self._competitions: dict[int, files.Competition] = {}
+        self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
+
+    @property
+    def key(self) -> bytes | None:
+        """What unlocks secret seeds."""
+        return self._key
+
+    def competition(self, row: Competition) -> files.Competition:
+        """Return a competition as its file says it."""
+        found = self._competitions.get(row.id)
+        if found is None:
+            place = self.place(row.slug)
+            found = files.Competition.from_document(json.loads(row.document), row.slug, place)
+            self._competitions[row.id] = found
+        return found
+
+    def place(self, slug: str) -> Path:
+        """Return the folder of a competition: its file, sealed seeds and what is published."""
+        return self.folder / "competitions" / slug
+
+    def phase(self, row: Phase) -> files.Phase:
+        """Return a phase as its file says it, opening and closing when the organiser has it do."""
+        phase = self.competition(row.competition).phase(row.name)
+        times = {"opens": _moment(row.opens), "closes": _moment(row.closes)}
+        return dataclasses.replace(phase, model=phase.model.model_copy(update=times))
+
+    def seeds(self, row: Phase) -> tuple[int, ...]:
+        """Return the seed of each trial of a phase, by number; they are unlocked once and then remembered."""
+        phase = self.phase(row)
+        which = (row.id, phase.rules)
+        if which not in self._seeds:
+            self._seeds[which] = phase.seeds(self._key)
+        return self._seeds[which]
+
+    def close(self) -> None:
+        """Let go of the database."""
+        self.database.close()
+
+
+def competition_of(session: Session, slug: str) -> Competition | None:
+    """Return the competition at an address, its phases with it."""
+    query = select(Competition).where(Competition.slug == slug).options(joinedload(Competition.phases))
+    return session.scalars(query).unique().first()
+
+
+def phase_of(session: Session, slug: str, name: str) -> Phase | None:
+    """Return a phase by the address of its competition and its name."""
+    query = select(Phase).join(Competition).where(Competition.slug == slug, Phase.name == name)
+    return session.scalars(query.options(joinedload(Phase.competition))).first()
+
+
+def limits_of(phase: files.Phase) -> Mapping[str, object]:
+    """Return what a submission may use in a trial, by the names of the competition file."""
+    return phase.limits.model_dump()
+
+
+def default_key(folder: Path) -> Path:
+    """Return where the key of a folder's secret seeds lies unless told otherwise: in the user's configuration."""
+    import platformdirs
+
+    name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
+    return (
+        Path(platformdirs.user_config_dir("dubins-traffic")) / "keys" / f"{folder.resolve().name}-{name}.key"
+    )
+
+
+def _moment(at: float | None) -> datetime | None:
+    return None if at is None else datetime.fromtimestamp(at, UTC)
+
+
+def _key(path: Path, folder: Path) -> bytes:
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        keys.make_key_file(path, folder)
+    return keys.read_key(path, folder)

@@ -1,0 +1,222 @@
+"""What an organiser does with competitions: create, open, close, judge again, disqualify, reveal. All is logged."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tempfile
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.competition import sealing
+from dubins_traffic.competition.competition import FILE, load_competition
+from dubins_traffic.competition.competition import Competition as Loaded
+from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.service import submissions
+from dubins_traffic.service.accounts import WrongEntryError, note
+from dubins_traffic.service.office import Office, competition_of
+from dubins_traffic.service.tables import Account, Competition, Phase, Submission
+
+SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")
+PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
+NOTHING_TO_DO = "the phase is {} already"
+
+
+def create(office: Office, slug: str, given: Mapping[str, bytes], by: Account | None) -> Competition:
+    """Make a competition from its files: ``competition.toml``, and the configurations and networks it names.
+
+    Parameters
+    ----------
+    office : Office
+        The service.
+    slug : str
+        Its address: lower letters, digits and hyphens.
+    given : Mapping
+        Name of a file to its bytes; a single one may be called as it likes.
+    by : Account or None
+        Who does it.
+
+    Raises
+    ------
+    WrongEntryError
+        If the address is no address or taken.
+    InputError
+        If something is wrong in the files.
+    """
+    if not SLUG.fullmatch(slug):
+        raise WrongEntryError("address: lower-case letters, digits and hyphens, 60 at most")
+    given = {FILE: next(iter(given.values()))} if len(given) == 1 else given
+    place = office.place(slug)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=place.parent) as draft:
+        loaded = _written(Path(draft), given)
+        for phase in loaded.phases:
+            if phase.secret:
+                sealing.seal(phase, _needed(office))
+        with office.database.writing() as session:
+            if competition_of(session, slug) is not None:
+                raise WrongEntryError("address: taken")
+            made = _rows(session, slug, loaded, office.clock())
+            note(session, by, "create", slug, loaded.title, office.clock())
+            shutil.rmtree(
+                place, ignore_errors=True
+            )  # of a creation that was killed before its rows were kept
+            shutil.copytree(draft, place)
+    publish_opened(office)
+    return made
+
+
+def slug_of(path: Path) -> str:
+    """Return the address of a competition that is made from a path: its name, in lower-case letters and hyphens."""
+    name = path.resolve().parent.name if path.name == FILE else path.resolve().stem
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60].strip("-")
+    return slug or "competition"
+
+
+def files_of(path: Path) -> Mapping[str, bytes]:
+    """Return the files of a competition that lies in a folder, or is one file."""
+    if path.is_file():
+        return {FILE: path.read_bytes()}
+    if not (path / FILE).is_file():
+        raise InputError("no competition", file=str(path / FILE), expected="a competition file, TOML")
+    return {item.name: item.read_bytes() for item in sorted(path.iterdir()) if item.is_file()}
+
+
+def _written(draft: Path, given: Mapping[str, bytes]) -> Loaded:
+    for name, data in given.items():
+        if not PLAIN.fullmatch(name):
+            raise WrongEntryError("files: names of letters, digits, '.', '_' and '-'")
+        (draft / name).write_bytes(data)
+    for entry in _named_files(draft):
+        if not PLAIN.fullmatch(entry):
+            raise InputError(
+                "a file that was not given",
+                field="configurations",
+                value=entry,
+                expected="files beside competition.toml",
+            )
+    return load_competition(draft)
+
+
+def _named_files(draft: Path) -> list[str]:
+    """Return the names of configurations that look like paths: such files are read only if they were given."""
+    try:
+        document: Any = tomllib.loads((draft / FILE).read_text(encoding="utf-8"))
+        entries: list[Any] = list(document.get("configurations", []))
+    except (OSError, ValueError, TypeError):
+        return []  # load_competition says what is wrong
+    named: list[Any] = [
+        cast("Any", entry).get("file", "") if isinstance(entry, dict) else entry for entry in entries
+    ]
+    return [name for name in named if isinstance(name, str) and ("/" in name or "\\" in name)]
+
+
+def _needed(office: Office) -> bytes:
+    if office.key is None:
+        raise InputError(
+            "no key for secret seeds", file="--key-file", expected="a key file outside the folder"
+        )
+    return office.key
+
+
+def _rows(session: Session, slug: str, loaded: Loaded, at: float) -> Competition:
+    document = json.dumps(loaded.document, sort_keys=True)
+    made = Competition(slug=slug, title=loaded.title, document=document, created=at)
+    for phase in loaded.phases:
+        opens, closes = phase.opens, phase.closes
+        made.phases.append(
+            Phase(
+                name=phase.name,
+                shows=phase.shows,
+                opens=opens and opens.timestamp(),
+                closes=closes and closes.timestamp(),
+            )
+        )
+    session.add(made)
+    session.flush()
+    return made
+
+
+def publish_opened(office: Office) -> None:
+    """Publish the commitments of phases that have opened since the last time."""
+    at = office.clock()
+    with office.database.reading() as session:
+        rows = session.scalars(select(Phase).where(Phase.commitment.is_(None))).all()
+        found: dict[int, str] = {}
+        for row in rows:
+            phase = office.phase(row)
+            if phase.secret and (row.opens is None or row.opens <= at):
+                found[row.id] = sealing.publish(phase, row.competition.title).commitment
+    if found:
+        with office.database.writing() as session:
+            for number, commitment in found.items():
+                row = session.get_one(Phase, number)
+                row.commitment = commitment
+                note(session, None, "publish", _name(row), commitment, at)
+
+
+def open_phase(office: Office, session: Session, phase: Phase, by: Account) -> None:
+    """Open a phase now; RefusedError if it is open or over."""
+    at = office.clock()
+    if phase.is_open(at) or phase.is_closed(at):
+        raise submissions.RefusedError(NOTHING_TO_DO.format("open" if phase.is_open(at) else "closed"))
+    phase.opens = at
+    note(session, by, "open", _name(phase), "", at)
+
+
+def close_phase(office: Office, session: Session, phase: Phase, by: Account) -> None:
+    """Close a phase now; what is received from this second on does not count. RefusedError if it is over."""
+    at = office.clock()
+    if phase.is_closed(at):
+        raise submissions.RefusedError(NOTHING_TO_DO.format("closed"))
+    phase.closes = at
+    phase.version += 1
+    note(session, by, "close", _name(phase), "", at)
+
+
+def reveal(office: Office, session: Session, phase: Phase, by: Account) -> None:
+    """Reveal the secret seeds of a phase that has closed and whose submissions have all ended.
+
+    Raises
+    ------
+    RefusedError
+        If the phase has no secret seeds, is not over, or something of it is still to be run.
+    """
+    at = office.clock()
+    active = Submission.state.in_(submissions.ACTIVE)
+    if session.scalars(select(Submission).where(Submission.phase_id == phase.id, active).limit(1)).first():
+        raise submissions.RefusedError("submissions of this phase are still to be judged")
+    if phase.revealed is not None:
+        raise submissions.RefusedError("the seeds are revealed already")
+    try:
+        sealing.reveal(office.phase(phase), _needed(office))
+    except DubinsTrafficError as error:
+        raise submissions.RefusedError(str(error)) from error
+    phase.revealed = at
+    note(session, by, "reveal", _name(phase), phase.commitment or "", at)
+
+
+def judge_again(office: Office, session: Session, submission: Submission, by: Account, why: str) -> None:
+    """Let a submission be judged anew, all of it."""
+    at = office.clock()
+    submissions.judge_again(session, submission, office.phase(submission.phase).numbers, at)
+    submission.phase.version += 1
+    note(session, by, "rejudge", f"submission {submission.id}", why, at)
+
+
+def disqualify(office: Office, session: Session, submission: Submission, by: Account, why: str) -> None:
+    """Take a submission out of the ranking, with the reason that its team reads; an empty one lets it in again."""
+    submission.disqualified = why.strip()[:500]
+    submission.phase.version += 1
+    act = "disqualify" if submission.disqualified else "readmit"
+    note(session, by, act, f"submission {submission.id}", submission.disqualified, office.clock())
+
+
+def _name(phase: Phase) -> str:
+    return f"{phase.competition.slug}/{phase.name}"

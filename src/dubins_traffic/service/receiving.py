@@ -1,0 +1,116 @@
+"""Taking in submissions, and what their teams do with them: cancel, and name the one that counts."""
+
+from __future__ import annotations
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.service import submissions, viewing
+from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.office import Office, phase_of
+from dubins_traffic.service.submissions import RefusedError, Upload
+from dubins_traffic.service.tables import Account, Phase, Submission
+
+
+class UnknownError(DubinsTrafficError):
+    """There is no such thing, or not for who asks."""
+
+
+def found_phase(session: Session, slug: str, name: str) -> Phase:
+    """Return a phase; UnknownError if there is none."""
+    phase = phase_of(session, slug, name)
+    if phase is None:
+        raise UnknownError("no such phase")
+    return phase
+
+
+def found_submission(session: Session, number: int, account: Account | None) -> Submission:
+    """Return a submission of somebody's team; UnknownError if there is none, or it is another team's."""
+    submission = session.get(Submission, number) if number < 1 << 31 else None
+    if submission is None or not viewing.owns(account, submission):
+        raise UnknownError("no such submission")
+    return submission
+
+
+def take_in(
+    office: Office, account: Account, slug: str, name: str, filename: str, data: bytes
+) -> tuple[int, bool]:
+    """Keep what somebody has sent and queue it; the same again is the same submission.
+
+    The bytes are in the store before a row names them, so a server that is killed in between loses nothing that it
+    has confirmed.
+
+    Returns
+    -------
+    tuple of int and bool
+        Number of the submission, and whether it is new.
+
+    Raises
+    ------
+    RefusedError, UnknownError, WrongEntryError
+        If the phase is not open, there is none, the quota is used up, or nothing was sent.
+    """
+    if not data:
+        raise WrongEntryError("file: empty; choose a controller in Python, a zip archive or a program")
+    if len(data) > office.settings.largest_upload << 20:
+        raise WrongEntryError(f"file: at most {office.settings.largest_upload} MiB")
+    at = office.clock()
+    with office.database.reading() as session:
+        phase = found_phase(session, slug, name)
+        if not phase.is_open(at) and not phase.is_closed(at):
+            raise RefusedError("the phase is not open yet")
+    digest = office.storage.put(data, "submissions")
+
+    def keep(session: Session) -> tuple[int, bool]:
+        row = found_phase(session, slug, name)
+        own = session.get_one(Account, account.id)
+        upload = Upload(digest, filename or "upload", len(data))
+        submission, new = submissions.receive(session, row, office.phase(row).quota, own, upload, at)
+        return submission.id, new
+
+    return office.database.patiently(keep)
+
+
+def cancel(office: Office, account: Account, number: int) -> None:
+    """Cancel a submission of somebody's team; RefusedError if it has ended."""
+
+    def end(session: Session) -> None:
+        submissions.cancel(session, found_submission(session, number, account), office.clock())
+
+    office.database.patiently(end)
+
+
+def name_it(office: Office, account: Account, number: int) -> None:
+    """Let a submission be the one of its team that counts in its phase.
+
+    Raises
+    ------
+    RefusedError
+        If the phase is over, or the submission was rejected or cancelled.
+    """
+
+    def choose(session: Session) -> None:
+        submission = found_submission(session, number, account)
+        if submission.team_id != account.team_id:
+            raise RefusedError("only its team may name it")
+        if submission.phase.is_closed(office.clock()):
+            raise RefusedError("the phase is closed")
+        if submission.state in ("rejected", "cancelled"):
+            raise RefusedError(f"it is {submission.state}")
+        own = update(Submission).where(
+            Submission.phase_id == submission.phase_id, Submission.team_id == submission.team_id
+        )
+        session.execute(own.values(named=False))
+        submission.named = True
+        submission.phase.version += 1
+
+    office.database.patiently(choose)
+
+
+def submissions_of(session: Session, phase: Phase, team_id: int | None) -> list[Submission]:
+    """Return the submissions of a team to a phase, newest first; of all teams if none is given."""
+    query = select(Submission).where(Submission.phase_id == phase.id)
+    if team_id is not None:
+        query = query.where(Submission.team_id == team_id)
+    return list(session.scalars(query.order_by(Submission.id.desc())))

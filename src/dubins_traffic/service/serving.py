@@ -1,0 +1,215 @@
+"""The process of `dubins-traffic serve`: the web server, the housekeeper, and workers beside it that are kept alive."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+import structlog
+import uvicorn
+from sqlalchemy import func, select, update
+from sqlalchemy.orm import Session
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.service import accounts, organising
+from dubins_traffic.service.connection import TOKEN
+from dubins_traffic.service.housekeeping import Housekeeper
+from dubins_traffic.service.office import Office, competition_of
+from dubins_traffic.service.tables import Account, Code, Token
+from dubins_traffic.service.web.app import create_app
+
+log = structlog.get_logger("dubins_traffic.service")
+LOCAL = "workers beside the server"
+WORKER = (sys.executable, "-m", "dubins_traffic.cli", "worker")
+WATCH_S = 1.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to listen: host and port, 0 for any that is free."""
+
+    host: str = "127.0.0.1"
+    port: int = 8000
+
+
+def listen(place: Place) -> socket.socket:
+    """Return a socket that listens at a place.
+
+    Raises
+    ------
+    InputError
+        If somebody else does, or it is no place of this machine.
+    """
+    try:
+        family = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0][0]
+        opened = socket.create_server((place.host, place.port), family=family, backlog=1024)
+    except OSError as error:
+        raise InputError(
+            f"can't listen ({error.strerror or error})", file="--port", value=place.port
+        ) from None
+    opened.set_inheritable(False)
+    return opened
+
+
+def address_of(opened: socket.socket) -> str:
+    """Return the address of what a socket listens to."""
+    name, port = opened.getsockname()[:2]
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(str(name), str(name))
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
+def prepare(office: Office, competitions: list[Path], url: str) -> str | None:
+    """Bring the tables up to date and make competitions that are not there yet.
+
+    Returns
+    -------
+    str or None
+        The address at which the first organiser joins, while there is none.
+
+    Raises
+    ------
+    InputError
+        If a competition can't be made.
+    """
+    office.database.migrate()
+    for path in competitions:
+        slug = organising.slug_of(path)
+        with office.database.reading() as session:
+            known = competition_of(session, slug)
+        if known is None:
+            organising.create(office, slug, organising.files_of(path), None)
+    with office.database.writing() as session:
+        organisers = select(func.count()).where(Account.role == accounts.ORGANISER, Account.removed.is_(None))
+        if session.scalar(organisers):
+            return None
+        unused = update(Code).where(Code.role == accounts.ORGANISER, Code.used.is_(None))
+        session.execute(unused.values(used=office.clock()))
+        code = accounts.invite(session, accounts.ORGANISER, None, office.clock())
+    return f"{office.settings.url.rstrip('/') or url}/join?code={code}"
+
+
+def local_token(office: Office) -> str:
+    """Return a token for the workers beside this server; those of servers before it end."""
+
+    def make(session: Session) -> str:
+        old = update(Token).where(Token.name == LOCAL, Token.account_id.is_(None), Token.revoked.is_(None))
+        session.execute(old.values(revoked=office.clock()))
+        return accounts.new_token(session, LOCAL, None, office.clock())
+
+    return office.database.patiently(make)
+
+
+class Workers(threading.Thread):
+    """Workers as processes of this machine; one that ends is replaced, and all end with this process."""
+
+    def __init__(self, count: int, url: str, token: str, folder: Path, *, trust: bool = False) -> None:
+        super().__init__(name="workers", daemon=True)
+        self._count, self._url, self._token, self._folder = count, url, token, folder
+        self._trust = trust
+        self._stop_asked = threading.Event()
+        self.processes: list[subprocess.Popen[bytes]] = []
+
+    def run(self) -> None:
+        """Keep the workers alive."""
+        self.processes = [self._launched(number) for number in range(self._count)]
+        while not self._stop_asked.wait(WATCH_S):
+            for number, process in enumerate(self.processes):
+                if process.poll() is not None:
+                    log.warning("a worker ended", worker=number, status=process.returncode)
+                    self.processes[number] = self._launched(number)
+
+    def stop(self) -> None:
+        """Let all workers give back what they have on lease, and end."""
+        self._stop_asked.set()
+        if self.is_alive():
+            self.join(timeout=10)
+        for process in self.processes:
+            process.terminate()
+        for process in self.processes:
+            try:
+                process.wait(timeout=20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def _launched(self, number: int) -> subprocess.Popen[bytes]:
+        folder = self._folder / f"worker-{number}"
+        command = [
+            *WORKER,
+            self._url,
+            "--name",
+            f"{socket.gethostname()[:40]} {number}",
+            "--folder",
+            str(folder),
+        ]
+        command += ["--with-parent", *(["--trust-submissions"] if self._trust else [])]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, env={**os.environ, TOKEN: self._token})
+
+
+def _nothing(_number: int, _frame: FrameType | None) -> None:
+    """Do nothing; unlike a signal that is ignored, this is not handed on to workers."""
+
+
+class Server(uvicorn.Server):
+    """A web server that lets the workers beside it give back what they have on lease before it closes its door."""
+
+    def __init__(self, config: uvicorn.Config, beside: Workers) -> None:
+        super().__init__(config)
+        self._beside = beside
+        self._leaving = False
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End when the workers have ended; told a second time, at once."""
+        if self._leaving:
+            super().handle_exit(sig, frame)
+            return
+        self._leaving = True
+        threading.Thread(target=self._leave, args=(sig,), daemon=True).start()
+
+    def _leave(self, sig: int) -> None:
+        self._beside.stop()
+        super().handle_exit(sig, None)
+
+
+def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = False) -> None:
+    """Serve until this process is told to end.
+
+    Parameters
+    ----------
+    office : Office
+        Whose tables are up to date.
+    opened : socket
+        Where to listen.
+    workers : int
+        How many workers to keep beside the server.
+    trust : bool
+        As for workers.
+    """
+    config = uvicorn.Config(
+        create_app(office),
+        proxy_headers=True,
+        forwarded_allow_ips=",".join(office.settings.proxies),
+        server_header=False,
+        access_log=False,
+        log_level="warning",
+        timeout_graceful_shutdown=10,
+    )
+    beside = Workers(workers, address_of(opened), local_token(office), office.folder / "work", trust=trust)
+    for number in (signal.SIGINT, signal.SIGTERM):  # the server raises them again when it has ended
+        signal.signal(number, _nothing)
+    keeper = Housekeeper(office)
+    keeper.start()
+    beside.start()
+    try:
+        Server(config, beside).run(sockets=[opened])
+    finally:
+        beside.stop()
+        keeper.stop()
+        office.close()

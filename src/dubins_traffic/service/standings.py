@@ -1,0 +1,132 @@
+"""Tables of places: which submission of a team counts, the ranking of these, and the history of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.competition.competition import Phase as Loaded
+from dubins_traffic.competition.judging import Judged
+from dubins_traffic.competition.ranking import missing, rank
+from dubins_traffic.service import submissions
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
+
+ANSWERS_A_DAY = 24
+"""So often a day at most a table of rounded aggregates is made anew."""
+DAY = 86400.0
+
+
+def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
+    """Return results as the ranking reads them, with their logs if these have been read."""
+    return [
+        Judged(own.number, own.row, own.end, own.owner, own.log if logs else "", own.frames)  # pyright: ignore[reportArgumentType]
+        for own in trials
+    ]
+
+
+def counting(session: Session, phase: Phase) -> Mapping[int, Submission]:
+    """Return the submission of each team that counts: the one it has named, else the last valid one."""
+    own = select(Submission).where(Submission.phase_id == phase.id, Submission.disqualified == "")
+    ended = own.where(Submission.state.in_(["done", "scoring"]))
+    found: dict[int, Submission] = {}
+    for submission in session.scalars(ended.order_by(Submission.named, Submission.received, Submission.id)):
+        found[submission.team_id] = submission
+    return found
+
+
+def refresh(office: Office) -> None:
+    """Rank the phases whose results have changed, and end the submissions that waited for it."""
+    scoring = select(Submission.phase_id).where(Submission.state == "scoring")
+    with office.database.reading() as session:
+        due = session.scalars(
+            select(Phase.id).where((Phase.version > Phase.ranked) | Phase.id.in_(scoring))
+        ).all()
+    for number in due:
+        _rank_phase(office, number)
+
+
+def _rank_phase(office: Office, number: int) -> None:
+    """Rank a phase in a reader's session, since it takes its time; nothing is kept that has changed meanwhile."""
+    at = office.clock()
+    with office.database.reading() as session:
+        row = session.get_one(Phase, number)
+        waiting = session.scalars(
+            select(Submission.id).where(Submission.phase_id == number, Submission.state == "scoring")
+        ).all()
+        silent = row.shows == "aggregates" and not row.is_closed(at) and not _may_answer(session, row, at)
+        version = row.version
+        places = None if silent or version == row.ranked else table(session, row, office.phase(row))
+    if silent and not waiting:
+        return
+    with office.database.writing() as session:
+        for submission in session.scalars(select(Submission).where(Submission.id.in_(waiting))):
+            if submission.state == "scoring":
+                submissions.enter(submission, "done", at)
+        row = session.get_one(Phase, number)
+        if places is not None and row.version == version:
+            row.ranked = version
+            latest = latest_standing(session, row)
+            if latest is None or latest.places != places:
+                session.add(Standing(phase_id=row.id, at=at, version=version, places=places))
+
+
+def _may_answer(session: Session, phase: Phase, at: float) -> bool:
+    latest = latest_standing(session, phase)
+    return latest is None or at - latest.at >= DAY / ANSWERS_A_DAY
+
+
+def table(session: Session, row: Phase, phase: Loaded) -> list[dict[str, Any]]:
+    """Return the places of a phase as JSON objects, each with its team and submission; incomplete ones are left out."""
+    entries: dict[str, list[Judged]] = {}
+    whose: dict[str, Submission] = {}
+    for team_id, submission in counting(session, row).items():
+        results = judged(submissions.trials(session, submission))
+        if not missing(results, phase):
+            name = session.get_one(Team, team_id).name
+            entries[name], whose[name] = results, submission
+    return [
+        {**place.to_json(), "team": whose[place.entry].team_id, "submission": whose[place.entry].id}
+        for place in rank(entries, phase)
+    ]
+
+
+def latest_standing(session: Session, phase: Phase) -> Standing | None:
+    """Return the newest table of a phase, if there is one."""
+    query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc()).limit(1)
+    return session.scalars(query).first()
+
+
+def history(session: Session, phase: Phase) -> Sequence[Standing]:
+    """Return all tables of a phase, oldest first."""
+    return session.scalars(select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id)).all()
+
+
+def first_entries(session: Session, phase: Phase, count: int) -> list[int]:
+    """Return the numbers of the submissions on the first places."""
+    latest = latest_standing(session, phase)
+    return (
+        [] if latest is None else [place["submission"] for place in latest.places if place["place"] <= count]
+    )
+
+
+def shown_table(phase: Loaded, standing: Standing | None) -> list[dict[str, Any]]:
+    """Return a table as participants may see it before the phase closes: rounded, over enough trials."""
+    if standing is None:
+        return []
+    if phase.shows != "aggregates":
+        return list(standing.places)
+    if len(phase.numbers) < phase.model.least_trials:
+        return []
+    return [_rounded(place, phase.model.digits) for place in standing.places]
+
+
+def _rounded(value: Any, digits: int) -> Any:
+    if isinstance(value, dict):
+        return {name: _rounded(own, digits) for name, own in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list):
+        return [_rounded(own, digits) for own in cast("list[Any]", value)]
+    return round(value, digits) if isinstance(value, float) else value

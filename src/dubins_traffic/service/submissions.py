@@ -1,0 +1,244 @@
+"""The life of a submission: received, checking, queued, running, scoring, then done, rejected, failed or cancelled."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, defer, undefer
+
+from dubins_traffic.competition.settings import Quota
+from dubins_traffic.errors import DubinsTrafficError, shown
+from dubins_traffic.service import queue
+from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
+
+HOUR = 3600.0
+DEADLINES = {"received": HOUR, "checking": HOUR, "queued": 168 * HOUR, "running": 48 * HOUR, "scoring": HOUR}
+"""How long a submission may stay in a state, seconds; what stays longer fails by our fault."""
+ACTIVE = tuple(DEADLINES)
+FINAL = ("done", "rejected", "failed", "cancelled")
+OURS, THEIRS = "platform", "submission"
+CHUNK = 10
+"""Trials in a unit of work."""
+SAMPLE = 20
+"""One trial in so many is run twice, and one at least."""
+MOST_UPLOADS = 200
+"""Uploads of a team in an hour, rejected ones too: each costs us a check."""
+REASONS = {
+    "received": "waits for a worker that checks it",
+    "checking": "a worker looks whether it can be run",
+    "queued": "waits for its turn",
+    "running": "its trials are run",
+    "scoring": "all trials are run; the table is made anew",
+    "done": "all trials are judged",
+}
+
+
+class RefusedError(DubinsTrafficError):
+    """What was asked for is not allowed now: a closed phase, a quota that is used up, a state it is too late for."""
+
+
+@dataclass(frozen=True)
+class Upload:
+    """What a participant has sent: SHA-256 of its bytes, its name and size."""
+
+    digest: str
+    filename: str
+    size: int
+
+
+def enter(submission: Submission, state: str, at: float, reason: str = "", fault: str = "") -> None:
+    """Put a submission into a state, with the reason and whose fault it is."""
+    submission.state, submission.changed = state, at
+    submission.reason, submission.fault = reason or REASONS.get(state, ""), fault
+    submission.deadline = at + DEADLINES.get(state, 0.0)
+
+
+def receive(
+    session: Session, phase: Phase, quota: Quota, account: Account, upload: Upload, at: float
+) -> tuple[Submission, bool]:
+    """Take in what a team has sent, and queue its check; the same bytes again are the same submission.
+
+    Returns
+    -------
+    tuple of Submission and bool
+        The submission, and whether it is new.
+
+    Raises
+    ------
+    RefusedError
+        If the account is in no team, the phase is not open at `at`, or the team's quota is used up.
+    """
+    if account.team_id is None:
+        raise RefusedError("you are in no team: join or found one first")
+    same = select(Submission).where(
+        Submission.phase_id == phase.id,
+        Submission.team_id == account.team_id,
+        Submission.digest == upload.digest,
+    )
+    known = session.scalars(same).first()
+    if known is not None and not _may_repeat(known):
+        return known, False
+    if not phase.is_open(at):
+        raise RefusedError("the phase is closed" if phase.is_closed(at) else "the phase is not open yet")
+    _within_quota(session, phase, quota, account.team_id, at)
+    if known is None:
+        known = Submission(phase_id=phase.id, team_id=account.team_id, digest=upload.digest, size=upload.size)
+        known.run = 0
+    else:
+        known.run += 1
+    known.account_id, known.filename, known.received = account.id, shown(upload.filename, 100), at
+    known.costs, known.named, known.disqualified = True, known.named or False, ""
+    enter(known, "received", at)
+    session.add(known)
+    session.flush()
+    queue.add(session, known, "check", [[]])
+    return known, True
+
+
+def _may_repeat(submission: Submission) -> bool:
+    """Whether sending the same again begins anew: it was cancelled, or failed by our fault."""
+    return submission.state == "cancelled" or (submission.state == "failed" and submission.fault == OURS)
+
+
+def used(session: Session, phase: Phase, team_id: int, at: float) -> tuple[int, int, int]:
+    """Return how many submissions of a team count today (from 0:00 UTC), in the phase, and wait or run."""
+    day = datetime.fromtimestamp(at, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
+    own = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
+    costs = own.where(Submission.costs)
+    active = own.where(Submission.state.in_(ACTIVE))
+    counted = (
+        session.scalar(query) or 0 for query in (costs.where(Submission.received >= day), costs, active)
+    )
+    today, total, queued = counted
+    return today, total, queued
+
+
+def _within_quota(session: Session, phase: Phase, quota: Quota, team_id: int, at: float) -> None:
+    names = ("today", "in this phase", "that wait or run")
+    limits = (quota.a_day, quota.total, quota.queued)
+    for name, limit, count in zip(names, limits, used(session, phase, team_id, at), strict=True):
+        if limit is not None and count >= limit:
+            raise RefusedError(f"the quota is used up: {count} of {limit} submissions {name}")
+    hour = select(func.count()).where(Submission.team_id == team_id, Submission.received > at - HOUR)
+    if (session.scalar(hour) or 0) >= MOST_UPLOADS:
+        raise RefusedError(f"more than {MOST_UPLOADS} uploads in an hour: try later")
+
+
+def taken(submission: Submission, chunk: Chunk, at: float) -> None:
+    """Note on a submission that a chunk of it is on lease."""
+    if chunk.kind == "check" and submission.state == "received":
+        enter(submission, "checking", at)
+    elif submission.state == "queued":
+        enter(submission, "running", at)
+
+
+def accept(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:
+    """Queue the trials of a submission that was found to be one, and a sample of them a second time."""
+    enter(submission, "queued", at)
+    queue.add(session, submission, "trials", in_chunks(numbers))
+    queue.add(session, submission, "again", in_chunks(sample(submission.digest, numbers)))
+
+
+def in_chunks(numbers: Sequence[int]) -> list[list[int]]:
+    """Return numbers of trials in the units in which they are run."""
+    return [list(numbers[k : k + CHUNK]) for k in range(0, len(numbers), CHUNK)]
+
+
+def sample(digest: str, numbers: Sequence[int]) -> list[int]:
+    """Return which trials of a submission are run twice: it follows from its digest."""
+
+    def key(number: int) -> bytes:
+        return hashlib.sha256(f"{digest} {number}".encode()).digest()
+
+    return sorted(sorted(numbers, key=key)[: max(1, len(numbers) // SAMPLE)])
+
+
+def reject(session: Session, submission: Submission, reason: str, at: float) -> None:
+    """End a submission that can't be run: its team's fault, yet it costs no quota."""
+    queue.drop(session, submission)
+    submission.costs = False
+    enter(submission, "rejected", at, shown(reason, 500), THEIRS)
+
+
+def fail(session: Session, submission: Submission, reason: str, at: float) -> None:
+    """End a submission by a fault of ours, which costs no quota."""
+    queue.drop(session, submission)
+    submission.costs = False
+    enter(submission, "failed", at, shown(reason, 500), OURS)
+
+
+def cancel(session: Session, submission: Submission, at: float) -> None:
+    """End a submission as its team wishes; what has not begun to run costs no quota.
+
+    Raises
+    ------
+    RefusedError
+        If it has ended already.
+    """
+    if submission.state not in ACTIVE:
+        raise RefusedError(f"it is {submission.state} already")
+    queue.drop(session, submission)
+    submission.costs = submission.state in ("running", "scoring")
+    enter(submission, "cancelled", at, "cancelled by the team", THEIRS)
+
+
+def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float) -> None:
+    """Keep the results of a chunk of trials, end its lease, and let the submission go on.
+
+    Parameters
+    ----------
+    session : Session
+        A writer's.
+    chunk : Chunk
+        The chunk, on lease.
+    results : sequence of dict
+        For each of its trials `number`, `row`, `end`, `owner`, `log`, `frames` and `replay`.
+    at : float
+        Now.
+
+    Raises
+    ------
+    RefusedError
+        If these are not the results of this chunk's trials.
+    """
+    if [result["number"] for result in results] != chunk.numbers:
+        raise RefusedError(f"chunk {chunk.id}: results of other trials")
+    submission = chunk.submission
+    if chunk.kind == "again":
+        hashes = {result["number"]: result["frames"] for result in results}
+        for trial in trials(session, submission):
+            trial.again = hashes.get(trial.number, trial.again)
+    else:
+        for result in results:
+            session.add(Trial(submission_id=submission.id, run=chunk.run, **result))
+    queue.finish(session, chunk)
+    if queue.unfinished(session, submission) == 0 and submission.state in ACTIVE:
+        enter(submission, "scoring", at)
+        submission.phase.version += 1
+
+
+def trials(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
+    """Return the results of a submission's present run, in the order of their numbers; logs are read if asked for."""
+    own = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
+    read = undefer(Trial.log) if logs else defer(Trial.log, raiseload=True)
+    return session.scalars(own.order_by(Trial.number).options(read)).all()
+
+
+def judge_again(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:
+    """Judge a submission anew, from its trials on; the results so far are kept as those of an earlier run.
+
+    Raises
+    ------
+    RefusedError
+        If it was rejected, so that there is nothing to run.
+    """
+    if submission.state == "rejected":
+        raise RefusedError("it was rejected: there is nothing to run")
+    queue.drop(session, submission)
+    submission.run += 1
+    accept(session, submission, numbers, at)

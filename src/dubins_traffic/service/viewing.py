@@ -1,0 +1,160 @@
+"""What each viewer may see of phases, submissions and trials. Pages and the API show what these functions return."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.competition.visibility import SubmissionState, visible
+from dubins_traffic.service import queue, standings, submissions
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Submission, Trial, Worker
+
+ALIVE_S = 120.0
+"""A worker that was heard of within so many seconds is there."""
+
+
+def iso(at: float | None) -> str | None:
+    """Return a time as ISO 8601 in UTC, to the second."""
+    return None if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def is_organiser(account: Account | None) -> bool:
+    """Whether somebody may see everything."""
+    return account is not None and account.role == "organiser"
+
+
+def owns(account: Account | None, submission: Submission) -> bool:
+    """Whether a submission is of somebody's team, or somebody is an organiser."""
+    if account is None:
+        return False
+    return is_organiser(account) or account.team_id == submission.team_id
+
+
+def sees_table(row: Phase, account: Account | None, at: float) -> bool:
+    """Whether somebody may see the table of a phase now."""
+    return row.shows != "nothing" or row.is_closed(at) or is_organiser(account)
+
+
+def sees_trials(row: Phase, account: Account | None, submission: Submission, at: float) -> bool:
+    """Whether somebody may see the trials of a submission and their replays now."""
+    if is_organiser(account):
+        return True
+    if row.shows != "all" and not row.is_closed(at):
+        return False
+    return owns(account, submission) or (row.is_closed(at) and submission.state == "done")
+
+
+def told_competition(office: Office, row: Competition) -> dict[str, Any]:
+    """Return a competition for everybody."""
+    at, loaded = office.clock(), office.competition(row)
+    return {
+        "address": row.slug,
+        "title": row.title,
+        "about": loaded.model.about,
+        "phases": [told_phase(office, phase, at) for phase in row.phases],
+    }
+
+
+def told_phase(office: Office, row: Phase, at: float) -> dict[str, Any]:
+    """Return a phase for everybody."""
+    phase = office.phase(row)
+    return {
+        "name": row.name,
+        "shows": row.shows,
+        "opens": iso(row.opens),
+        "closes": iso(row.closes),
+        "state": "closed" if row.is_closed(at) else "open" if row.is_open(at) else "to come",
+        "trials": len(phase.numbers),
+        "limits": phase.limits.model_dump(),
+        "quota": phase.quota.model_dump(),
+        "ranking": phase.ranking.model_dump(),
+        "commitment": row.commitment,
+        "revealed": iso(row.revealed),
+    }
+
+
+def told_submission(
+    office: Office,
+    session: Session,
+    submission: Submission,
+    account: Account | None,
+    places: Mapping[int, int],
+    *,
+    logs: bool = True,
+) -> dict[str, Any]:
+    """Return what somebody may see of a submission, with or without logs; the team of it and organisers get here."""
+    row = submission.phase
+    logs = logs or row.shows == "aggregates"
+    place = places.get(submission.id) if submission.state in ("received", "queued") else None
+    state = SubmissionState(
+        submission.state,  # pyright: ignore[reportArgumentType]
+        submission.reason,
+        submission.fault or None,  # pyright: ignore[reportArgumentType]
+        iso(submission.received),
+        place,
+    )
+    results = standings.judged(submissions.trials(session, submission, logs=logs), logs=logs)
+    now = datetime.fromtimestamp(office.clock(), UTC)
+    phase = office.phase(row)
+    if is_organiser(account):
+        open_model = phase.model.model_copy(update={"shows": "all"})
+        phase = type(phase)(phase.name, open_model, phase.configurations, phase.ranking, phase.folder)
+    return {
+        "id": submission.id,
+        "competition": row.competition.slug,
+        "team": submission.team.name,
+        "file": submission.filename,
+        "digest": submission.digest,
+        "named": submission.named,
+        "disqualified": submission.disqualified,
+        "active": submission.state in submissions.ACTIVE,
+        **visible(phase, state, results, now=now),
+        "shows": row.shows,
+        "deadline": iso(submission.deadline) if submission.state in submissions.ACTIVE else None,
+    }
+
+
+def differing(session: Session, submission: Submission) -> list[int]:
+    """Return the trials whose frames were others when they were run a second time."""
+    own = submissions.trials(session, submission)
+    return [trial.number for trial in own if trial.again is not None and trial.again != trial.frames]
+
+
+def trial_of(session: Session, submission: Submission, number: int) -> Trial | None:
+    """Return the result of a trial of a submission's present run."""
+    query = select(Trial).where(
+        Trial.submission_id == submission.id, Trial.run == submission.run, Trial.number == number
+    )
+    return session.scalars(query).first()
+
+
+def told_status(office: Office, session: Session) -> dict[str, Any]:
+    """Return how long the queue is and how many workers there are, for everybody."""
+    at = office.clock()
+    counts = session.execute(
+        select(Chunk.state, func.count()).where(Chunk.state.in_(["waiting", "leased"])).group_by(Chunk.state)
+    )
+    found = {row[0]: row[1] for row in counts}
+    alive = session.scalar(select(func.count()).where(Worker.seen > at - ALIVE_S)) or 0
+    return {
+        "time": iso(at),
+        "waiting": found.get("waiting", 0),
+        "running": found.get("leased", 0),
+        "workers": alive,
+        "teams_waiting": len(set(session.scalars(select(Chunk.team_id).where(Chunk.state == "waiting")))),
+    }
+
+
+def places_of(session: Session) -> Mapping[int, int]:
+    """Return the places in the queue, by submission."""
+    return queue.places(session)
+
+
+def workers(session: Session) -> list[Worker]:
+    """Return all workers that have ever asked for work, those heard of last first."""
+    return list(session.scalars(select(Worker).order_by(Worker.seen.desc()).limit(100)))

@@ -1,0 +1,147 @@
+"""The API of participants: what the pages show, as JSON, by a token."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from litestar import Controller, Response, get, post
+from litestar.datastructures import UploadFile
+from litestar.params import MultipartBody, PathParameter
+from sqlalchemy import select
+
+from dubins_traffic.service import receiving, standings, viewing
+from dubins_traffic.service.office import Office, competition_of
+from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.tables import Competition
+from dubins_traffic.service.web import viewer as who
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+
+Name = Annotated[str, PathParameter(pattern="^[a-z0-9-]{1,60}$")]
+Number = Annotated[int, PathParameter(ge=1, le=2**31 - 1)]
+
+
+@dataclass
+class Handed:
+    """A submission: a controller in Python, a zip archive or a program."""
+
+    file: UploadFile
+
+
+class Api(Controller):
+    """What programs of participants ask."""
+
+    path = "/api"
+    tags = ["participants"]  # noqa: RUF012
+
+    @get("/status", sync_to_thread=True)
+    def status(self, office: OfficeHere) -> dict[str, Any]:
+        """Return how long the queue is, and how many workers there are."""
+        with office.database.reading() as session:
+            return viewing.told_status(office, session)
+
+    @get("/competitions", sync_to_thread=True)
+    def competitions(self, office: OfficeHere) -> list[dict[str, Any]]:
+        """Return all competitions."""
+        with office.database.reading() as session:
+            rows = session.scalars(select(Competition).order_by(Competition.id)).all()
+            return [viewing.told_competition(office, row) for row in rows]
+
+    @get("/competitions/{slug:str}", sync_to_thread=True)
+    def competition(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
+        """Return a competition and its phases."""
+        with office.database.reading() as session:
+            return viewing.told_competition(office, _found(session, slug))
+
+    @get("/competitions/{slug:str}/file", sync_to_thread=True)
+    def file(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
+        """Return the competition file with its configurations written in, so that it can be evaluated at home."""
+        with office.database.reading() as session:
+            return dict(office.competition(_found(session, slug)).document)
+
+    @get("/competitions/{slug:str}/phases/{name:str}/table", sync_to_thread=True)
+    def table(self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
+        """Return the table of a phase, as far as it may be seen."""
+        at = office.clock()
+        with office.database.reading() as session:
+            row = receiving.found_phase(session, slug, name)
+            if not viewing.sees_table(row, viewer.account, at):
+                return []
+            latest = standings.latest_standing(session, row)
+            if viewer.organiser or row.is_closed(at):
+                return [] if latest is None else list(latest.places)
+            return standings.shown_table(office.phase(row), latest)
+
+    @get("/account", sync_to_thread=True, guards=[who.person])
+    def account(self, viewer: ViewerHere) -> dict[str, Any]:
+        """Return whose token this is."""
+        return {
+            "name": viewer.person.name,
+            "role": viewer.person.role,
+            "team": viewer.team and viewer.team.name,
+        }
+
+    @get("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
+    def submissions(
+        self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name
+    ) -> list[dict[str, Any]]:
+        """Return the submissions of the own team to a phase, newest first."""
+        with office.database.reading() as session:
+            row = receiving.found_phase(session, slug, name)
+            if viewer.person.team_id is None:
+                return []
+            places = viewing.places_of(session)
+            found = receiving.submissions_of(session, row, viewer.person.team_id)
+            return [viewing.told_submission(office, session, one, viewer.person, places) for one in found]
+
+    @post("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
+    def submit(
+        self,
+        office: OfficeHere,
+        viewer: ViewerHere,
+        slug: Name,
+        name: Name,
+        data: MultipartBody[Handed],
+    ) -> Response[dict[str, Any]]:
+        """Hand in a submission; the same bytes again are the same submission, with status 200."""
+        sent = data.file.file.read()
+        number, new = receiving.take_in(office, viewer.person, slug, name, data.file.filename, sent)
+        return Response(_view(office, viewer, number), status_code=201 if new else 200)
+
+    @get("/submissions/{number:int}", sync_to_thread=True, guards=[who.person])
+    def submission(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+        """Return what may be seen of a submission."""
+        return _view(office, viewer, number)
+
+    @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[who.person], status_code=200)
+    def cancel(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+        """Cancel a submission."""
+        receiving.cancel(office, viewer.person, number)
+        return _view(office, viewer, number)
+
+    @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[who.person], status_code=200)
+    def name(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+        """Let a submission be the one of its team that counts."""
+        receiving.name_it(office, viewer.person, number)
+        return _view(office, viewer, number)
+
+    @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[who.person])
+    def logs(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+        """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
+        told = _view(office, viewer, number)
+        if "trials" in told:
+            return {"trials": [{"number": own["number"], "log": own["log"]} for own in told["trials"]]}
+        return {"log": told.get("log", "")}
+
+
+def _found(session: viewing.Session, slug: str) -> Competition:
+    row = competition_of(session, slug)
+    if row is None:
+        raise UnknownError("no such competition")
+    return row
+
+
+def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
+    with office.database.reading() as session:
+        found = receiving.found_submission(session, number, viewer.account)
+        return viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))

@@ -1,0 +1,193 @@
+"""The application: routes, who may use them, and what every answer carries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import structlog
+from jinja2 import Environment, PackageLoader, select_autoescape
+from litestar import Litestar, MediaType, Request, Response
+from litestar.config.csrf import CSRFConfig
+from litestar.di import Provide
+from litestar.exceptions import HTTPException
+from litestar.middleware import DefineMiddleware
+from litestar.middleware.rate_limit import RateLimitConfig
+from litestar.middleware.session.server_side import ServerSideSessionConfig
+from litestar.openapi import OpenAPIConfig
+from litestar.openapi.plugins import JsonRenderPlugin
+from litestar.openapi.spec import Components, SecurityScheme
+from litestar.plugins.jinja import JinjaTemplateEngine
+from litestar.response import Redirect, Template
+from litestar.static_files import create_static_files_router  # pyright: ignore[reportUnknownVariableType]
+from litestar.stores.file import FileStore
+from litestar.template import TemplateConfig
+from sqlalchemy.exc import DBAPIError
+
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.queue import StaleLeaseError
+from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.storage import StorageError
+from dubins_traffic.service.submissions import RefusedError
+from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
+from dubins_traffic.service.web.said import moment
+from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
+
+log = structlog.get_logger("dubins_traffic.service")
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "form-action 'self'; frame-src 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+}
+STATUS = {
+    WrongEntryError: 400,
+    UnknownError: 404,
+    RefusedError: 409,
+    StaleLeaseError: 409,
+    StorageError: 503,
+    DBAPIError: 503,
+    DubinsTrafficError: 400,
+}
+
+
+def create_app(office: Office) -> Litestar:
+    """Return the application of a service."""
+    settings = office.settings
+    largest = max(settings.largest_upload, settings.largest_replay) << 20
+
+    async def give_office() -> Office:
+        return office
+
+    prefix = "__Host-" if settings.secure else ""  # which no other host can set
+    sessions = ServerSideSessionConfig(
+        key=f"{prefix}session",
+        secure=settings.secure,
+        samesite="lax",
+        max_age=14 * 86400,
+        exclude=[*PROGRAMS, "/static/"],
+    )
+    csrf = CSRFConfig(
+        office.cookie_secret,
+        cookie_name=f"{prefix}csrf",
+        cookie_secure=settings.secure,
+        cookie_httponly=True,
+        exclude=[*(f"^{path}" for path in PROGRAMS), "^/static/"],
+    )
+    guessing = RateLimitConfig(
+        rate_limit=("minute", settings.logins), check_throttle_handler=_is_guess, set_rate_limit_headers=False
+    )
+    environment = Environment(
+        loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
+    )
+    environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
+    kept = FileStore(office.folder / "sessions", create_directories=True)
+    return Litestar(
+        route_handlers=[
+            *(
+                pages.Pages,
+                submitting.Submitting,
+                login.Login,
+                team.Teams,
+                organisers.Organisers,
+                api.Api,
+                doors.Doors,
+            ),
+            metrics.metrics,
+            create_static_files_router(
+                "/static", [Path(__file__).with_name("static")], include_in_schema=False
+            ),
+        ],
+        dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},
+        middleware=[
+            guessing.middleware,
+            sessions.middleware,
+            DefineMiddleware(Recognition, exclude=["^/static/"]),
+        ],
+        csrf_config=csrf,
+        template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(environment)),
+        stores={"sessions": kept},
+        on_startup=[kept.delete_expired],
+        exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
+        after_request=_with_headers,
+        request_max_body_size=largest + (1 << 20),
+        logging_config=None,
+        openapi_config=_described(settings.name),
+        state=_state(office),
+    )
+
+
+def _state(office: Office) -> Any:
+    from litestar.datastructures import State
+
+    return State({"office": office})
+
+
+async def _viewer(request: Request[Any, Any, Any]) -> Viewer:
+    return request.user
+
+
+def _is_guess(request: Request[Any, Any, Any]) -> bool:
+    """Whether a request tries a password or a code."""
+    return request.method == "POST" and request.url.path in ("/login", "/join", "/reset")
+
+
+def _described(name: str) -> OpenAPIConfig:
+    return OpenAPIConfig(
+        title=f"{name}: competitions",
+        version="1",
+        path="/api",
+        render_plugins=[JsonRenderPlugin(path="/openapi.json")],
+        components=Components(security_schemes={"token": SecurityScheme(type="http", scheme="bearer")}),
+        security=[{"token": []}],
+    )
+
+
+async def _with_headers(response: Response[Any]) -> Response[Any]:
+    for name, value in HEADERS.items():
+        response.headers.setdefault(name, value)
+    response.headers.setdefault("cache-control", "no-store")
+    return response
+
+
+def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[Any]:
+    """Return what went wrong: JSON to programs, a page to people; who is not logged in is led to the door."""
+    if isinstance(error, HTTPException):
+        status, detail = error.status_code, error.detail
+        if status < 500 and error.extra:
+            detail = f"{detail}: {error.extra}"[:500]
+    else:
+        status = next(code for kind, code in STATUS.items() if isinstance(error, kind))
+        detail = "the database is away" if isinstance(error, DBAPIError) else str(error)
+    if status >= 500:
+        log.error("request failed", path=request.url.path, status=status, error=str(error))
+    if request.url.path.startswith(PROGRAMS):
+        return Response(
+            {"status_code": status, "detail": detail},
+            status_code=status,
+            media_type=MediaType.JSON,
+            headers=HEADERS,
+        )
+    if status == 401 and request.method == "GET":
+        return Redirect("/login", headers=HEADERS)
+    viewer = request.scope["user"] if "user" in request.scope else Viewer()
+    office: Office = request.app.state["office"]
+    return Template(
+        "error.html",
+        context={
+            "viewer": viewer,
+            "site": office.settings.name,
+            "status": status,
+            "detail": detail,
+            "title": f"Error {status}",
+        },
+        status_code=status,
+        headers=HEADERS,
+        media_type=MediaType.HTML,
+    )

@@ -1,0 +1,205 @@
+"""The door of the workers: leases, what is to be run, and reports under the token of a lease."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+from litestar import Controller, Request, Response, get, post, put
+from litestar.exceptions import ClientException, NotFoundException
+from litestar.openapi.spec import Example
+from litestar.params import FromPath, FromQuery, JSONBody, PathParameter
+from litestar.status_codes import HTTP_200_OK, HTTP_204_NO_CONTENT
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.service import housekeeping, queue, submissions
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.tables import Chunk, Submission, Worker
+from dubins_traffic.service.web import viewer
+from dubins_traffic.service.web.viewer import OfficeHere
+
+Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
+Text = Annotated[str, msgspec.Meta(max_length=60)]
+LongText = Annotated[str, msgspec.Meta(max_length=100_000)]
+Whole = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
+
+
+class AskedFor(msgspec.Struct, forbid_unknown_fields=True):
+    """Who asks for work."""
+
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=60)]
+
+
+class Leased(msgspec.Struct):
+    """Work on lease. `seeds` are those of the trials `numbers`, by number."""
+
+    chunk: int
+    token: int
+    seconds: float
+    kind: str
+    numbers: list[int]
+    digest: str
+    phase: str
+    competition: dict[str, Any]
+    seeds: dict[str, int]
+
+
+class Held(msgspec.Struct, forbid_unknown_fields=True):
+    """The fencing token of a lease."""
+
+    token: Whole
+
+
+class Released(msgspec.Struct, forbid_unknown_fields=True):
+    """Why a lease ends without a result; `left`: the worker stops in order."""
+
+    token: Whole
+    note: Annotated[str, msgspec.Meta(max_length=1000)] = ""
+    left: bool = False
+
+
+class Result(msgspec.Struct, forbid_unknown_fields=True):
+    """What came of a trial, as `dubins_traffic.competition.judging.Judged` has it."""
+
+    number: Whole
+    row: dict[str, Any]
+    end: Annotated[str, msgspec.Meta(max_length=40)]
+    owner: Annotated[str, msgspec.Meta(max_length=20)] | None
+    log: LongText
+    frames: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
+    replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
+
+
+class Report(msgspec.Struct, forbid_unknown_fields=True):
+    """The end of a lease: of a check `content` or `rejected`, of trials their results."""
+
+    token: Whole
+    content: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None = None
+    rejected: Annotated[str, msgspec.Meta(max_length=5000)] | None = None
+    trials: list[Result] | None = None
+
+
+class Doors(Controller):
+    """What workers ask."""
+
+    path = "/worker"
+    guards = [viewer.worker]  # noqa: RUF012
+    tags = ["workers"]  # noqa: RUF012
+    include_in_schema = True
+
+    @post("/lease", sync_to_thread=True, status_code=HTTP_200_OK)
+    def lease(self, office: OfficeHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
+        """Lease the next chunk; nothing if none waits."""
+        found = office.database.patiently(lambda session: _lease(office, session, data.name))
+        if found is None:
+            return Response(None, status_code=HTTP_204_NO_CONTENT)
+        return Response(found)
+
+    @get("/submissions/{digest:str}", sync_to_thread=True)
+    def submission(self, office: OfficeHere, digest: Digest) -> Response[bytes]:
+        """Return what a team has sent, by its SHA-256."""
+        with office.database.reading() as session:
+            if (
+                session.scalars(select(Submission.id).where(Submission.digest == digest).limit(1)).first()
+                is None
+            ):
+                raise NotFoundException("no such submission")
+        return Response(office.storage.get(digest, "submissions"), media_type="application/octet-stream")
+
+    @post("/chunks/{number:int}/heartbeat", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
+    def heartbeat(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Held]) -> None:
+        """Renew a lease."""
+
+        def renew(session: Session) -> None:
+            chunk = queue.held(session, number, data.token)
+            chunk.leased_until = office.clock() + office.settings.lease
+            _seen(session, chunk.worker, office.clock(), _busy(chunk))
+
+        office.database.patiently(renew)
+
+    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK)
+    async def replay(
+        self,
+        office: OfficeHere,
+        number: FromPath[int],
+        token: FromQuery[int],
+        request: Request[Any, Any, Any],
+    ) -> dict[str, str]:
+        """Keep the page that replays a trial, packed by gzip, and return its SHA-256."""
+        with office.database.reading() as session:
+            queue.held(session, number, token)
+        data = await request.body()
+        if not data.startswith(b"\x1f\x8b"):
+            raise ClientException("a replay is packed by gzip")
+        return {"digest": office.storage.put(data, "replays")}
+
+    @post("/chunks/{number:int}/done", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
+    def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
+        """End a lease with its results; they and what follows from them are kept together, or not at all."""
+        office.database.patiently(lambda session: _done(office, session, number, data))
+
+    @post("/chunks/{number:int}/release", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
+    def release(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Released]) -> None:
+        """End a lease without a result: the chunk waits again."""
+
+        def give_back(session: Session) -> None:
+            chunk = queue.held(session, number, data.token)
+            if data.left:
+                queue.release(session, chunk, data.note, office.clock(), worker_left=True)
+            else:
+                housekeeping.give_back(session, chunk.id, data.note, office.clock())
+            _seen(session, chunk.worker, office.clock(), "")
+
+        office.database.patiently(give_back)
+
+
+def _lease(office: Office, session: Session, name: str) -> Leased | None:
+    at = office.clock()
+    chunk = queue.take(session, name, at, office.settings.lease)
+    _seen(session, name, at, "" if chunk is None else _busy(chunk))
+    if chunk is None:
+        return None
+    submission = chunk.submission
+    submissions.taken(submission, chunk, at)
+    seeds = office.seeds(submission.phase) if chunk.numbers else ()
+    return Leased(
+        chunk=chunk.id,
+        token=chunk.token,
+        seconds=office.settings.lease,
+        kind=chunk.kind,
+        numbers=chunk.numbers,
+        digest=submission.digest,
+        phase=submission.phase.name,
+        competition=dict(office.competition(submission.phase.competition).document),
+        seeds={str(own): seeds[own] for own in chunk.numbers},
+    )
+
+
+def _done(office: Office, session: Session, number: int, report: Report) -> None:
+    at = office.clock()
+    chunk = queue.held(session, number, report.token)
+    submission = chunk.submission
+    if chunk.kind != "check":
+        submissions.record(session, chunk, [msgspec.to_builtins(own) for own in report.trials or ()], at)
+    elif report.rejected is not None:
+        queue.finish(session, chunk)
+        submissions.reject(session, submission, report.rejected, at)
+    else:
+        queue.finish(session, chunk)
+        submission.content = report.content
+        submissions.accept(session, submission, office.phase(submission.phase).numbers, at)
+    _seen(session, chunk.worker, at, "")
+
+
+def _seen(session: Session, name: str, at: float, busy: str) -> None:
+    found = session.scalars(select(Worker).where(Worker.name == name)).first()
+    if found is None:
+        found = Worker(name=name)
+        session.add(found)
+    found.seen, found.busy = at, busy
+
+
+def _busy(chunk: Chunk) -> str:
+    what = "check" if chunk.kind == "check" else f"{len(chunk.numbers)} trials"
+    return f"submission {chunk.submission_id}, {what}"

@@ -1,0 +1,188 @@
+"""The organiser's desk: create, open, close, judge again, disqualify, reveal, export; accounts and the log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from litestar import Controller, Response, get, post
+from litestar.datastructures import UploadFile
+from litestar.params import FromPath, MultipartBody, URLEncodedBody
+from litestar.response import Redirect, Template
+from sqlalchemy import select
+
+from dubins_traffic.service import accounts, exporting, organising, receiving, viewing
+from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
+from dubins_traffic.service.web import viewer as who
+from dubins_traffic.service.web.said import Form, page
+from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+
+Given = URLEncodedBody[Form]
+
+
+@dataclass
+class NewCompetition:
+    """The form with a new competition: its address and its files."""
+
+    address: str
+    files: list[UploadFile]
+
+
+class Organisers(Controller):
+    """What organisers do."""
+
+    path = "/desk"
+    include_in_schema = False
+    guards = [who.organiser]  # noqa: RUF012
+
+    @get("/", sync_to_thread=True)
+    def desk(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+        """Show the desk."""
+        return _shown(office, viewer)
+
+    @post("/create", sync_to_thread=True)
+    def create(
+        self,
+        office: OfficeHere,
+        viewer: ViewerHere,
+        data: MultipartBody[NewCompetition],
+    ) -> Redirect:
+        """Make a competition from its files."""
+        given = {item.filename: item.file.read() for item in data.files if item.filename}
+        if not given:
+            raise WrongEntryError("files: choose competition.toml and the files that it names")
+        made = organising.create(office, data.address, given, viewer.person)
+        return Redirect(f"/desk/c/{made.slug}", status_code=303)
+
+    @post("/invite", sync_to_thread=True, status_code=200)
+    def invite(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
+        """Show a new invitation."""
+        role = data.get("role", accounts.PARTICIPANT)
+        if role not in accounts.ROLES:
+            raise WrongEntryError("role: participant or organiser")
+        with office.database.writing() as session:
+            code = accounts.invite(session, role, None, office.clock())
+            accounts.note(session, viewer.person, "invite", role, "", office.clock())
+        return _shown(office, viewer, code=code)
+
+    @post("/worker", sync_to_thread=True, status_code=200)
+    def worker(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
+        """Show the token of a new worker, this once."""
+        with office.database.writing() as session:
+            token = accounts.new_token(session, data.get("name", ""), None, office.clock())
+            accounts.note(session, viewer.person, "worker token", data.get("name", ""), "", office.clock())
+        return _shown(office, viewer, token=token)
+
+    @post("/accounts/{number:int}/reset", sync_to_thread=True, status_code=200)
+    def reset(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Show a code by which a person can choose another password."""
+        with office.database.writing() as session:
+            account = _account(session, number)
+            code = accounts.offer_reset(session, account, office.clock())
+            accounts.note(session, viewer.person, "reset", f"account {number}", "", office.clock())
+        return _shown(office, viewer, reset=code)
+
+    @post("/accounts/{number:int}/remove", sync_to_thread=True)
+    def remove(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Remove an account."""
+        with office.database.writing() as session:
+            accounts.remove(session, _account(session, number), office.clock())
+            accounts.note(session, viewer.person, "remove account", f"account {number}", "", office.clock())
+        return Redirect("/desk", status_code=303)
+
+    @get("/c/{slug:str}", sync_to_thread=True)
+    def competition(self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
+        """Show the phases of a competition and all its submissions."""
+        with office.database.reading() as session:
+            row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
+            if row is None:
+                raise UnknownError("no such competition")
+            told, places = viewing.told_competition(office, row), viewing.places_of(session)
+            for phase, shown in zip(row.phases, told["phases"], strict=True):
+                found = receiving.submissions_of(session, phase, None)
+                shown["submissions"] = [
+                    {"row": one, "team": one.team.name, "place": places.get(one.id)} for one in found
+                ]
+        return page(office, viewer, "organise", f"Organise {told['title']}", competition=told)
+
+    @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
+    def act(
+        self,
+        office: OfficeHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        act: FromPath[str],
+    ) -> Redirect:
+        """Open, close or reveal a phase."""
+        acts = {"open": organising.open_phase, "close": organising.close_phase, "reveal": organising.reveal}
+        if act not in acts:
+            raise UnknownError("no such act")
+        with office.database.writing() as session:
+            acts[act](office, session, receiving.found_phase(session, slug, name), viewer.person)
+        organising.publish_opened(office)
+        return Redirect(f"/desk/c/{slug}", status_code=303)
+
+    @get("/c/{slug:str}/export.zip", sync_to_thread=True)
+    def export(self, office: OfficeHere, slug: FromPath[str]) -> Response[bytes]:
+        """Return all that is needed to run the competition again."""
+        with office.database.reading() as session:
+            row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
+            if row is None:
+                raise UnknownError("no such competition")
+            data = exporting.export(office, session, row)
+        headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
+        return Response(data, media_type="application/zip", headers=headers)
+
+    @post("/s/{number:int}/{act:str}", sync_to_thread=True)
+    def submission(
+        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], act: FromPath[str], data: Given
+    ) -> Redirect:
+        """Judge a submission again, or disqualify it."""
+        acts = {"rejudge": organising.judge_again, "disqualify": organising.disqualify}
+        if act not in acts:
+            raise UnknownError("no such act")
+        with office.database.writing() as session:
+            found = session.get(Submission, number) if number < 1 << 31 else None
+            if found is None:
+                raise UnknownError("no such submission")
+            acts[act](office, session, found, viewer.person, data.get("why", ""))
+            slug = found.phase.competition.slug
+        return Redirect(f"/desk/c/{slug}", status_code=303)
+
+    @get("/log", sync_to_thread=True)
+    def log(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+        """Show what organisers did."""
+        with office.database.reading() as session:
+            acts = session.scalars(select(Act).order_by(Act.id.desc()).limit(500)).all()
+            names = {account.id: account.name for account in session.scalars(select(Account))}
+        return page(office, viewer, "log", "Log of acts", acts=acts, names=names)
+
+
+def _account(session: viewing.Session, number: int) -> Account:
+    account = session.get(Account, number) if number < 1 << 31 else None
+    if account is None or account.removed is not None:
+        raise UnknownError("no such account")
+    return account
+
+
+def _shown(office: Office, viewer: Viewer, **secret: Any) -> Template:
+    with office.database.reading() as session:
+        competitions = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
+        people = session.scalars(select(Account).where(Account.removed.is_(None)).order_by(Account.id)).all()
+        teams = {team.id: team.name for team in session.scalars(select(Team))}
+    given = {"code": "", "token": "", "reset": "", **secret}
+    return page(
+        office,
+        viewer,
+        "desk",
+        "Desk",
+        competitions=competitions,
+        people=people,
+        teams=teams,
+        url=office.settings.url,
+        **given,
+    )

@@ -1,0 +1,229 @@
+"""A worker: it asks a service for work, judges trials in the sandbox, and reports under the token of its lease.
+
+It knows nothing but an address and a token; seeds come with the work and are gone with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import os
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from dubins_traffic.competition.competition import Competition, Phase
+from dubins_traffic.competition.judging import Judged, judge
+from dubins_traffic.competition.submission import Submission, check_submission
+from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.sandbox import available_layers
+from dubins_traffic.service.connection import AwayError, Connection, RefusalError
+
+log = structlog.get_logger("dubins_traffic.worker")
+IDLE_S = 0.5
+AWAY_S = 2.0
+
+
+class Worker:
+    """Takes chunks until it is told to stop.
+
+    Parameters
+    ----------
+    connection : Connection
+        To the service, with a worker's token.
+    name : str
+        Shown on the page of the queue.
+    folder : Path
+        For submissions that are unpacked; kept between chunks.
+    trust : bool
+        Whether submissions may run with fewer limits than this machine should enforce.
+    """
+
+    def __init__(self, connection: Connection, name: str, folder: Path, *, trust: bool = False) -> None:
+        self._service = connection
+        self._name = name
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        self._trust = trust
+        self._stopping = threading.Event()
+
+    def stop(self) -> None:
+        """Give back what is on lease, and end."""
+        self._stopping.set()
+
+    def work(self) -> None:
+        """Work until `stop`; a service that is away is waited for.
+
+        Raises
+        ------
+        InputError
+            If this machine can't hold a stranger's program, and the worker does not trust submissions.
+        """
+        check_boxes(trust=self._trust)
+        while not self._stopping.is_set():
+            try:
+                lease = self._service.post("/worker/lease", {"name": self._name})
+                if lease:
+                    self._serve(lease)
+                else:
+                    self._stopping.wait(IDLE_S)
+            except AwayError as error:
+                log.warning("the service is away", error=str(error))
+                self._stopping.wait(AWAY_S)
+
+    def _serve(self, lease: dict[str, Any]) -> None:
+        where = f"/worker/chunks/{lease['chunk']}"
+        token = {"token": lease["token"]}
+        with self._heartbeat(where, token, float(lease["seconds"])) as lost:
+            try:
+                report = self._done(lease, lost)
+                if report is None:
+                    self._service.post(f"{where}/release", {**token, "note": "worker stopped", "left": True})
+                else:
+                    self._service.patiently("POST", f"{where}/done", {**token, **report})
+            except RefusalError as error:
+                log.info("a lease is lost", chunk=lease["chunk"], error=str(error))
+            except AwayError:
+                raise
+            except Exception as error:
+                log.exception("a chunk failed", chunk=lease["chunk"])
+                note = f"{type(error).__name__}: {error}"[:500]
+                with contextlib.suppress(RefusalError):
+                    self._service.post(f"{where}/release", {**token, "note": note, "left": False})
+
+    @contextlib.contextmanager
+    def _heartbeat(self, where: str, token: dict[str, Any], seconds: float) -> Generator[threading.Event]:
+        """Renew a lease while the body runs; the event says that it is lost."""
+        lost, ended = threading.Event(), threading.Event()
+
+        def beat() -> None:
+            while not ended.wait(seconds / 4.0):
+                try:
+                    self._service.post(f"{where}/heartbeat", token)
+                except AwayError:
+                    continue
+                except RefusalError:
+                    lost.set()
+                    return
+
+        thread = threading.Thread(target=beat, daemon=True, name="heartbeat")
+        thread.start()
+        try:
+            yield lost
+        finally:
+            ended.set()
+            thread.join()
+
+    def _done(self, lease: dict[str, Any], lost: threading.Event) -> dict[str, Any] | None:
+        """Return the report of a chunk, None if the worker is to stop or has lost the lease before its end."""
+        data = self._service.fetch(f"/worker/submissions/{lease['digest']}")
+        try:
+            submission = check_submission(data, self._folder / "submissions")
+        except InputError as error:
+            return {"rejected": str(error)}
+        if lease["kind"] == "check":
+            return {"content": submission.digest}
+        phase = Competition.from_document(lease["competition"]).phase(lease["phase"])
+        seeds = {int(number): int(seed) for number, seed in lease["seeds"].items()}
+        return self._judged(phase, seeds, submission, lease, lost)
+
+    def _judged(
+        self,
+        phase: Phase,
+        seeds: dict[int, int],
+        submission: Submission,
+        lease: dict[str, Any],
+        lost: threading.Event,
+    ) -> dict[str, Any] | None:
+        numbers: list[int] = lease["numbers"]
+        trials: list[dict[str, Any]] = []
+        with tempfile.TemporaryDirectory(dir=self._folder) as drafts:
+            records = None if lease["kind"] == "again" else Path(drafts)
+            for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, records=records):
+                if not judged.counts:
+                    raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
+                trials.append({**judged.to_json(), "replay": self._replay(judged, lease)})
+                if lost.is_set() or self._stopping.is_set():
+                    return None
+        return {"trials": trials}
+
+    def _replay(self, judged: Judged, lease: dict[str, Any]) -> str | None:
+        """Send the page that replays a trial, and return its SHA-256; None for a trial without a frame."""
+        if judged.record is None or not judged.record.exists():
+            return None
+        try:
+            page = replay_of(judged.record)
+        except InputError:
+            return None
+        judged.record.unlink()
+        where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
+        return self._service.put(where, gzip.compress(page.encode(), 6, mtime=0))["digest"]
+
+
+def replay_of(record: Path) -> str:
+    """Return the page that replays a record, with its score; InputError if it holds no frame."""
+    from dubins_traffic.runs.sources import load_record
+    from dubins_traffic.scoring.score import score
+    from dubins_traffic.viewer.replay import replay_page
+
+    found = load_record(str(record))
+    scored = score(found)
+    told = {
+        "counted_rounds": scored.counted_rounds,
+        "rounds": scored.rounds,
+        "collisions": len(scored.collisions),
+        "duration_s": scored.duration_s,
+    }
+    return replay_page(found.instance, found.frames, found.ending, told, (), scored.verdict)
+
+
+def check_boxes(*, trust: bool) -> None:
+    """Refuse to work where this machine can't hold a stranger's program, unless submissions are trusted.
+
+    Raises
+    ------
+    InputError
+        With the layers of the box that are missing.
+    """
+    if not trust:
+        available_layers().require()
+
+
+def default_folder() -> Path:
+    """Return where a worker unpacks submissions unless told otherwise."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("dubins-traffic")) / "worker"
+
+
+def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
+    """Work until this process is told to end; the chunk on lease is given back then.
+
+    Parameters
+    ----------
+    worker : Worker
+        Which.
+    with_parent : bool
+        End at once when the process at the other end of standard input has ended.
+    """
+
+    def stop(_number: int, _frame: object) -> None:
+        worker.stop()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, stop)
+    if with_parent:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.nice(10)
+    worker.work()
+
+
+def _end_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)

@@ -1,0 +1,191 @@
+"""The pages of the service in a real browser: live, by keyboard, on a phone, in the dark, and under axe."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+
+from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+FLAGS = (
+    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --window-size=1280,900"
+)
+REASON = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
+AXE = Path(__file__).parents[1] / "vendor" / "axe.min.js"
+NASTY = "<img src=x onerror=window.broken=1>"
+WAIT_S = 120
+PHONE, DESKTOP = (390, 844), (1280, 900)
+
+if (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true":
+    pytest.skip(REASON, allow_module_level=True)
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "short.toml").write_text(competition_text())
+    arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
+    with serving(folder / "here", *arguments, settings="logins = 10000\n") as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    if CHROMIUM is None or DRIVER is None:
+        pytest.fail(REASON)
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+def fill(browser: webdriver.Chrome, **fields: str) -> None:
+    """Fill in fields by their ids, and send the form by the Enter key."""
+    last = None
+    for name, value in fields.items():
+        last = browser.find_element(By.ID, name)
+        last.clear()
+        last.send_keys(value)
+    assert last is not None
+    last.send_keys(Keys.ENTER)
+
+
+def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
+    browser.delete_all_cookies()
+    browser.get(f"{service.url}/login")
+    fill(browser, name=name, password=PASSWORD)
+    WebDriverWait(browser, 20).until(lambda _: browser.current_url == f"{service.url}/")
+
+
+def faults(browser: webdriver.Chrome) -> list[str]:
+    """Return what axe finds of the page that is serious."""
+    browser.execute_script(AXE.read_text(encoding="utf-8"))
+    found = browser.execute_async_script(
+        "const done = arguments[arguments.length - 1]; axe.run({iframes: false}).then(r => done(r.violations))"
+    )
+    return [
+        f"{one['id']}: {one['nodes'][0]['html'][:200]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def dark(browser: webdriver.Chrome, on: bool) -> None:
+    features = [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
+def test_a_participant_from_the_invitation_to_the_replay(
+    browser: webdriver.Chrome, service: Service, tmp_path: Path
+) -> None:
+    organiser = service.organiser()
+    browser.set_window_size(*DESKTOP)
+    browser.get(f"{service.url}/join?code={organiser.invite()}")
+    fill(browser, name=NASTY, password=PASSWORD, team=f"{NASTY} team")
+    WebDriverWait(browser, 20).until(lambda _: browser.current_url == f"{service.url}/")
+    browser.get(f"{service.url}/c/short/practice")
+    entry = tmp_path / "controller.py"
+    entry.write_text(STANDING)
+    browser.find_element(By.ID, "file").send_keys(str(entry))
+    browser.find_element(By.XPATH, "//button[text()='Submit']").click()
+    WebDriverWait(browser, 20).until(lambda _: "/s/" in browser.current_url)
+    browser.execute_script("window.same = true")
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".tag.done"))
+    assert browser.execute_script("return window.same"), (
+        "the page was loaded anew; htmx should have changed it"
+    )
+    browser.find_element(By.LINK_TEXT, "1").click()
+    frame = WebDriverWait(browser, 20).until(lambda _: browser.find_element(By.CSS_SELECTOR, "iframe.replay"))
+    assert frame.get_attribute("sandbox") == "allow-scripts"
+    browser.switch_to.frame(frame)
+    WebDriverWait(browser, 60).until(lambda _: browser.execute_script("return window.replay?.ready === true"))
+    with pytest.raises(Exception, match=r"(?i)cookie|denied|sandbox"):
+        browser.execute_script("return document.cookie")
+    browser.switch_to.default_content()
+    shot(browser, "trial")
+    assert browser.execute_script("return window.broken === undefined")
+    assert NASTY in browser.find_element(By.TAG_NAME, "h1").text
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def shot(browser: webdriver.Chrome, name: str) -> None:
+    """Keep a picture of the page where DUBINS_TRAFFIC_SHOTS says, for people to look at."""
+    place = os.environ.get("DUBINS_TRAFFIC_SHOTS")
+    if place:
+        browser.save_screenshot(f"{place}/{name}.png")
+
+
+def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) -> None:
+    """No serious fault by axe in the light, in the dark and on a phone; nothing wider than it; no script in names."""
+    organiser = service.person()
+    assert organiser.login("Olga").status_code == 303
+    person = service.person().join(organiser.invite(), "Ann", "Ants")
+    number = person.submit("short/practice", CRASHING)
+    person.ended(number)
+    people = {
+        "": (
+            "/",
+            "/login",
+            "/join",
+            "/reset",
+            "/c/short",
+            "/c/short/practice",
+            "/c/short/practice/table",
+            "/status",
+            "/none",
+        ),
+        "Ann": ("/c/short/practice", f"/s/{number}", f"/s/{number}/trials/0", "/team"),
+        "Olga": ("/desk", "/desk/c/short", "/desk/log", "/status"),
+    }
+    found: dict[str, list[str]] = {}
+    for name, paths in people.items():
+        browser.delete_all_cookies()
+        if name:
+            login(browser, service, name)
+        for path in paths:
+            for size, night in ((DESKTOP, False), (DESKTOP, True), (PHONE, False)):
+                browser.set_window_size(*size)
+                dark(browser, night)
+                browser.get(service.url + path)
+                wrong = faults(browser)
+                if browser.execute_script("return document.documentElement.scrollWidth > innerWidth"):
+                    wrong.append(f"wider than {size[0]} pixels")
+                if wrong:
+                    found[f"{path} {name} {size} {'dark' if night else 'light'}"] = wrong
+                shot(
+                    browser,
+                    f"{path.strip('/').replace('/', '-') or 'home'}-{size[0]}-{'dark' if night else 'light'}",
+                )
+            assert browser.execute_script("return window.broken === undefined")
+    dark(browser, False)
+    assert found == {}
+
+
+def test_the_keyboard_is_enough(browser: webdriver.Chrome, service: Service) -> None:
+    """The first Tab leads past the navigation; forms are filled in and sent without a mouse."""
+    browser.set_window_size(*DESKTOP)
+    browser.delete_all_cookies()
+    browser.get(f"{service.url}/login")
+    body = browser.find_element(By.TAG_NAME, "body")
+    body.send_keys(Keys.TAB)
+    assert browser.switch_to.active_element.text == "Skip to content"
+    browser.switch_to.active_element.send_keys(Keys.ENTER)
+    assert browser.current_url.endswith("#main")
+    browser.switch_to.active_element.send_keys(Keys.TAB)
+    assert browser.switch_to.active_element.get_attribute("id") == "name"
+    browser.switch_to.active_element.send_keys("Olga", Keys.TAB, PASSWORD, Keys.ENTER)
+    WebDriverWait(browser, 20).until(lambda _: browser.find_elements(By.LINK_TEXT, "Desk"))

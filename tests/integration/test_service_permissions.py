@@ -1,0 +1,223 @@
+"""Every route of the service and who may use it: nobody, another team, the team, an organiser, a worker."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+import pytest
+
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.web.app import create_app
+from tests.services import STANDING, Person, Service, competition_text, serving, shown_secret
+
+NOBODY, OTHER, TEAM, ORGANISER, WORKER = "nobody", "other team", "team", "organiser", "worker"
+ROLES = (NOBODY, OTHER, TEAM, ORGANISER, WORKER)
+PEOPLE = {OTHER, TEAM, ORGANISER}
+ALL, OWN, NONE = set(ROLES), {TEAM, ORGANISER}, set[str]()
+REFUSALS = (302, 401, 403, 404)
+NO_COMPETITION, NO_SUBMISSION = "/c/short/none", "/s/99999"
+
+ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
+    ("GET", "/"): ("/", ALL),
+    ("GET", "/c/{slug:str}"): ("/c/short", ALL),
+    ("GET", "/c/{slug:str}/{name:str}"): ("/c/short/test", ALL),
+    ("GET", "/c/{slug:str}/{name:str}/table"): ("/c/short/test/table", ALL),
+    ("GET", "/c/{slug:str}/{name:str}/commitment.json"): ("/c/short/test/commitment.json", ALL),
+    ("GET", "/c/{slug:str}/{name:str}/seeds.txt"): ("/c/short/test/seeds.txt", NONE),
+    ("POST", "/c/{slug:str}/{name:str}/submit"): ("/c/short/practice/submit", PEOPLE),
+    ("GET", "/s/{number:int}"): ("/s/1", OWN),
+    ("GET", "/s/{number:int}/live"): ("/s/1/live", OWN),
+    ("POST", "/s/{number:int}/name"): ("/s/1/name", OWN),
+    ("POST", "/s/{number:int}/cancel"): ("/s/1/cancel", OWN),
+    ("GET", "/s/{number:int}/trials/{trial:int}"): ("/s/1/trials/0", NONE),
+    ("GET", "/s/{number:int}/trials/{trial:int}/replay"): ("/s/1/trials/0/replay", NONE),
+    ("GET", "/status"): ("/status", ALL),
+    ("GET", "/login"): ("/login", ALL),
+    ("POST", "/login"): ("/login", ALL),
+    ("POST", "/logout"): ("", ALL),
+    ("GET", "/join"): ("/join", ALL),
+    ("POST", "/join"): ("/join", ALL),
+    ("GET", "/reset"): ("/reset", ALL),
+    ("POST", "/reset"): ("/reset", ALL),
+    ("GET", "/team"): ("/team", PEOPLE),
+    ("POST", "/team/found"): ("/team/found", PEOPLE),
+    ("POST", "/team/invite"): ("/team/invite", PEOPLE),
+    ("POST", "/team/tokens"): ("/team/tokens", PEOPLE),
+    ("POST", "/team/tokens/{number:int}/revoke"): ("/team/tokens/999/revoke", PEOPLE),
+    ("POST", "/team/password"): ("/team/password", PEOPLE),
+    ("POST", "/team/remove"): ("/team/remove", PEOPLE),
+    ("GET", "/desk"): ("/desk", {ORGANISER}),
+    ("POST", "/desk/create"): ("/desk/create", {ORGANISER}),
+    ("POST", "/desk/invite"): ("/desk/invite", {ORGANISER}),
+    ("POST", "/desk/worker"): ("/desk/worker", {ORGANISER}),
+    ("POST", "/desk/accounts/{number:int}/reset"): ("/desk/accounts/2/reset", {ORGANISER}),
+    ("POST", "/desk/accounts/{number:int}/remove"): ("", {ORGANISER}),
+    ("GET", "/desk/c/{slug:str}"): ("/desk/c/short", {ORGANISER}),
+    ("GET", "/desk/c/{slug:str}/export.zip"): ("/desk/c/short/export.zip", {ORGANISER}),
+    ("POST", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/open", {ORGANISER}),
+    ("POST", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", {ORGANISER}),
+    ("GET", "/desk/log"): ("/desk/log", {ORGANISER}),
+    ("GET", "/api/status"): ("/api/status", ALL),
+    ("GET", "/api/competitions"): ("/api/competitions", ALL),
+    ("GET", "/api/competitions/{slug:str}"): ("/api/competitions/short", ALL),
+    ("GET", "/api/competitions/{slug:str}/file"): ("/api/competitions/short/file", ALL),
+    ("GET", "/api/competitions/{slug:str}/phases/{name:str}/table"): (
+        "/api/competitions/short/phases/test/table",
+        ALL,
+    ),
+    ("GET", "/api/competitions/{slug:str}/phases/{name:str}/submissions"): (
+        "/api/competitions/short/phases/test/submissions",
+        PEOPLE,
+    ),
+    ("POST", "/api/competitions/{slug:str}/phases/{name:str}/submissions"): (
+        "/api/competitions/short/phases/test/submissions",
+        PEOPLE,
+    ),
+    ("GET", "/api/account"): ("/api/account", PEOPLE),
+    ("GET", "/api/submissions/{number:int}"): ("/api/submissions/1", OWN),
+    ("GET", "/api/submissions/{number:int}/logs"): ("/api/submissions/1/logs", OWN),
+    ("POST", "/api/submissions/{number:int}/cancel"): ("/api/submissions/1/cancel", OWN),
+    ("POST", "/api/submissions/{number:int}/name"): ("/api/submissions/1/name", OWN),
+    ("GET", "/metrics"): ("/metrics", {ORGANISER, WORKER}),
+    ("GET", "/worker/submissions/{digest:str}"): (f"/worker/submissions/{'0' * 64}", {WORKER}),
+    ("POST", "/worker/lease"): ("", {WORKER}),
+    ("POST", "/worker/chunks/{number:int}/heartbeat"): ("/worker/chunks/999/heartbeat", {WORKER}),
+    ("POST", "/worker/chunks/{number:int}/done"): ("/worker/chunks/999/done", {WORKER}),
+    ("POST", "/worker/chunks/{number:int}/release"): ("/worker/chunks/999/release", {WORKER}),
+    ("PUT", "/worker/chunks/{number:int}/replays"): ("/worker/chunks/999/replays?token=1", {WORKER}),
+}
+"""What is asked for on each route, and who is let in; an empty path is asked for elsewhere."""
+
+
+@dataclass
+class World:
+    """A service with a submission to its test phase, and somebody in each role."""
+
+    service: Service
+    people: dict[str, Person]
+
+    def ask(self, role: str, method: str, path: str) -> httpx.Response:
+        """Ask as people do on pages, and by token elsewhere."""
+        person = self.people[role]
+        if path.startswith(("/api/", "/worker/", "/metrics")):
+            headers = {"authorization": f"Bearer {person.token}"} if person.token else {}
+            given = {"json": {"token": 1}} if path.startswith("/worker/chunks") and method == "POST" else {}
+            return person.http.request(method, path, headers=headers, **given)
+        if method == "GET":
+            return person.get(path)
+        return person.post(path, form="/login")
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
+    folder = tmp_path_factory.mktemp("permissions")
+    (folder / "short.toml").write_text(competition_text())
+    arguments = ("--workers", "0", "--competition", str(folder / "short.toml"))
+    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as service:
+        organiser = service.organiser().with_token()
+        team = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
+        other = service.person().join(organiser.invite(), "Bob", "Bees").with_token()
+        worker = service.person()
+        worker.token = shown_secret(organiser.post("/desk/worker", form="/desk", name="far away"))
+        assert team.submit("short/test", STANDING) == 1
+        people = {NOBODY: service.person(), OTHER: other, TEAM: team, ORGANISER: organiser, WORKER: worker}
+        yield World(service, people)
+
+
+def test_the_table_names_every_route(tmp_path: Path) -> None:
+    office = Office(tmp_path / "here")
+    app = create_app(office)
+    found = {
+        (method, route.path_format.replace("//", "/"))
+        for route in app.routes
+        for method in getattr(route, "methods", ())
+        if method not in ("OPTIONS", "HEAD")
+        and not route.path.startswith(("/static", "/api/openapi", "/api:"))
+    }
+    office.close()
+    named = {(method, re.sub(r":\w+}", "}", path)) for method, path in ROUTES}
+    assert {one for one in found if one[1] not in ("/api", "/api/{path}")} == named
+
+
+@pytest.mark.parametrize(("route", "role"), [(route, role) for route in ROUTES for role in ROLES])
+def test_who_may_use_a_route(world: World, route: tuple[str, str], role: str) -> None:
+    path, allowed = ROUTES[route]
+    if not path:
+        return
+    answer = world.ask(role, route[0], path)
+    assert answer.status_code < 500
+    refused = answer.status_code in REFUSALS and not (
+        answer.status_code == 404 and role in allowed and path.endswith("0" * 64)
+    )
+    assert refused == (role not in allowed), (answer.status_code, answer.text[-600:])
+
+
+def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:
+    answer = world.people[ORGANISER].http.post("/desk/invite", data={"role": "organiser"})
+    assert answer.status_code == 403
+
+
+def test_a_session_ends_with_its_password(world: World) -> None:
+    organiser = world.people[ORGANISER]
+    first = world.service.person().join(organiser.invite(), "Cid", "Cats").with_token()
+    second = world.service.person()
+    assert second.login("Cid").status_code == 303
+    assert (
+        second.post("/team/password", form="/team", password="wrong wrong", new="another secret").status_code
+        == 400
+    )
+    answer = second.post(
+        "/team/password", form="/team", password="correct horse battery", new="another secret"
+    )
+    assert answer.status_code == 303
+    assert second.get("/team").status_code == 200
+    assert first.get("/team").status_code == 302
+    assert first.api("GET", "/account").status_code == 401
+    removed = second.post("/team/remove", form="/team", password="another secret")
+    assert removed.status_code == 303
+    assert second.get("/team").status_code == 302
+    assert "Cid" not in organiser.get("/desk").text
+
+
+def test_a_lost_password_is_reset_by_the_organiser(world: World) -> None:
+    organiser = world.people[ORGANISER]
+    person = world.service.person().join(organiser.invite(), "Dan", "Dogs")
+    number = re.search(
+        r'accounts/(\d+)/reset"[^>]*>\s*<input[^>]*>\s*<button aria-label="Lost password of Dan"',
+        organiser.get("/desk").text,
+    )
+    assert number is not None
+    code = shown_secret(organiser.post(f"/desk/accounts/{number[1]}/reset", form="/desk"))
+    assert person.post("/reset", form="/reset", code=code, password="a new secret").status_code == 303
+    assert person.post("/reset", form="/reset", code=code, password="a new secret").status_code == 200
+    assert service_login(world, "Dan", "a new secret") == 303
+    assert service_login(world, "Dan", "correct horse battery") == 200
+
+
+def service_login(world: World, name: str, password: str) -> int:
+    return world.service.person().login(name, password).status_code
+
+
+def test_an_invitation_is_good_once_and_a_member_invites_to_the_team(world: World) -> None:
+    team = world.people[TEAM]
+    code = shown_secret(team.post("/team/invite", form="/team"))
+    world.service.person().join(code, "Eve")
+    assert "Eve" in team.get("/team").text
+    used = world.service.person().post(
+        "/join", form="/join", code=code, name="Fay", password="0123456789", team=""
+    )
+    assert used.status_code == 200
+    assert "used or expired" in used.text
+    name = world.service.person().post(
+        "/join",
+        form="/join",
+        code=world.people[ORGANISER].invite(),
+        name="ANN",
+        password="0123456789",
+        team="",
+    )
+    assert "taken" in name.text
