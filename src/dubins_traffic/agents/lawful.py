@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.policies.rules.kept import KeptPath, coasting
+from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
     ABSENT,
@@ -126,7 +126,7 @@ def drivers_of(
         vehicle=vehicles_of([instance.problem for instance in instances]),
         car=cars,
         way=table(KeptPath, cars.shape),
-        coasting=coasting(*cars.shape),
+        command=kept_commands(*cars.shape),
         stage=stage,
         distance=distance,
     )

@@ -9,7 +9,7 @@ from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
-from dubins_traffic.policies.rules.kept import KeptPath, coasting
+from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
     ROUND,
@@ -67,7 +67,7 @@ class Rules:
             vehicle=vehicles_of([problem]),
             car=rows,
             way=table(KeptPath, (1, cars)),
-            coasting=coasting(1, cars),
+            command=kept_commands(1, cars),
             stage=stage,
             distance=distance,
         )

@@ -13,7 +13,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.policies.rules.kept import KeptPath, coasting
+from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
@@ -136,7 +136,7 @@ def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtake
         state=State.zeros(trials, 1),
         labels=Labels.zeros(trials, 1),
         drivers=drivers.replace(
-            car=table(Driver, (trials, 1)), way=table(KeptPath, (trials, 1)), coasting=coasting(trials, 1)
+            car=table(Driver, (trials, 1)), way=table(KeptPath, (trials, 1)), command=kept_commands(trials, 1)
         ),
     )
     alone = Alone(unseen, np.zeros((trials, 1, 2)))
@@ -175,7 +175,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
         vehicle=vehicles_of(problems),
         car=rows,
         way=table(KeptPath, (trials, cars)),
-        coasting=coasting(trials, cars),
+        command=kept_commands(trials, cars),
         stage=np.array(stage, dtype=np.int64),
         distance=distance,
     )

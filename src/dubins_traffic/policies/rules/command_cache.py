@@ -2,7 +2,7 @@
 (compiled).
 
 Most cars have nothing around them and follow a lane or an arc. Of these only the offset from their line, and its
-direction, change from tick to tick. What they do stands in columns (`tables.Coasting`), and is found for several cars
+direction, change from tick to tick. What they do stands in columns (`kept.KeptCommands`), and is found for several cars
 in one go of the processor, which takes less time than for one after another.
 """
 
@@ -17,7 +17,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.choice import keeps_exit
-from dubins_traffic.policies.rules.kept import NOWHERE, Coasting
+from dubins_traffic.policies.rules.kept import NOWHERE, KeptCommands
 from dubins_traffic.policies.rules.path_cache import kept_way
 from dubins_traffic.policies.rules.right_of_way import (
     GOES_NOW,
@@ -46,7 +46,7 @@ from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import BLOCKED, LEFT, STOPPED
 
 IF_NOT_BEHIND_EGO = 2.0
-"""Value of `Coasting.holds` of an e-agent that drives on if the ego is not ahead in its lane."""
+"""Value of `KeptCommands.holds` of an e-agent that drives on if the ego is not ahead in its lane."""
 TINY = 1e-300
 """Metres that no car is from the centre of an arc."""
 
@@ -62,13 +62,13 @@ def look_who_coasts(b: int, traffic: Traffic) -> None:
     count = state.count[b]
     for first in range(0, count, BLOCK):
         here = min(count - first, BLOCK)
-        block = drivers.coasting[b, first // BLOCK]
+        block = drivers.command[b, first // BLOCK]
         _bring(b, first, here, state, block)
         _drive_on_as_before(block, (here + WIDE - 1) & -WIDE, vehicle.yaw_most, vehicle.period)
 
 
 @jit_inline
-def _bring(b: int, first: int, here: int, state: State, block: Coasting) -> None:
+def _bring(b: int, first: int, here: int, state: State, block: KeptCommands) -> None:
     """Put where the `here` cars from car `first` on are beside what they do."""
     x, y, c, s = state.x[b], state.y[b], state.c[b], state.s[b]
     here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
@@ -86,7 +86,7 @@ def _bring(b: int, first: int, here: int, state: State, block: Coasting) -> None
 
 
 @jit_inline
-def _drive_on_as_before(block: Coasting, last: int, limit: float, period: float) -> None:
+def _drive_on_as_before(block: KeptCommands, last: int, limit: float, period: float) -> None:
     """Find who of the first `last` cars of a block is where it just drives on, and the commands of all of them."""
     x, y, c, s = block.here_x, block.here_y, block.here_c, block.here_s
     low, high, past_most, minds, astray = block.low, block.high, block.past, block.minds, block.astray
@@ -121,7 +121,7 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
     Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
     """
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
-    block = drivers.coasting[b, n // BLOCK]
+    block = drivers.command[b, n // BLOCK]
     k = n & (BLOCK - 1)
     holds = block.holds[k]
     if holds == 0.0:
@@ -164,7 +164,7 @@ def still_meets_nobody(
 @jit_inline
 def stop_coasting(b: int, n: int, drivers: Drivers) -> None:
     """Forget what a car did."""
-    drivers.coasting[b, n // BLOCK].low[n & (BLOCK - 1)] = NOWHERE
+    drivers.command[b, n // BLOCK].low[n & (BLOCK - 1)] = NOWHERE
 
 
 @jit_inline
@@ -243,7 +243,7 @@ def keep_course(
     labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     row = drivers.way[b, n]
-    block = drivers.coasting[b, n // BLOCK]
+    block = drivers.command[b, n // BLOCK]
     k = n & (BLOCK - 1)
     bend = way.bend if part == THROUGH else 0.0
     high = NOWHERE if outside or part == THROUGH else 0.0

@@ -60,7 +60,7 @@ class KeptPath:
 
 
 @columns(BLOCK)
-class Coasting:
+class KeptCommands:
     """Of BLOCK cars, number by number: where a car just drives on as it did, and the command with which it does.
 
     The loop over the cars of `policies.rules.command_cache.look_who_coasts` reads and writes these columns several cars
@@ -104,8 +104,8 @@ class Coasting:
     """Its command in this tick, m/s and rad/s, if it does."""
 
 
-def coasting(trials: int, cars: int) -> Rows[Coasting]:
-    """Return `Drivers.coasting` of cars of which none drives yet, (trials, blocks of cars)."""
-    rows = table(Coasting, (trials, -(-cars // BLOCK)))
+def kept_commands(trials: int, cars: int) -> Rows[KeptCommands]:
+    """Return `Drivers.command` of cars of which none drives yet, (trials, blocks of cars)."""
+    rows = table(KeptCommands, (trials, -(-cars // BLOCK)))
     rows["low"] = NOWHERE
     return rows

@@ -13,7 +13,7 @@ from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.policies.rules.kept import Coasting, KeptPath
+from dubins_traffic.policies.rules.kept import KeptCommands, KeptPath
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import kinds_of
 from dubins_traffic.rules.parameters import RuleParameters
@@ -162,7 +162,7 @@ class Drivers(Tables):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
-    `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N), `way` (B, N) and `coasting` (B, ceil(N / BLOCK));
+    `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N), `way` (B, N) and `command` (B, ceil(N / BLOCK));
     `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from the beginning of each lane to
     the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
     """
@@ -174,7 +174,7 @@ class Drivers(Tables):
     vehicle: Rows[Vehicle]
     car: Rows[Driver]
     way: Rows[KeptPath]
-    coasting: Rows[Coasting]
+    command: Rows[KeptCommands]
     stage: Ints
     distance: Floats
 
