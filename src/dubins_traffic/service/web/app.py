@@ -29,6 +29,7 @@ from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.settings import Settings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
@@ -46,6 +47,8 @@ HEADERS = {
     "referrer-policy": "same-origin",
     "cross-origin-opener-policy": "same-origin",
 }
+WITHOUT_SESSION = [*(f"^{path}" for path in PROGRAMS), "^/static/"]
+"""Where no cookie is read: patterns of paths."""
 STATUS = {
     WrongEntryError: 400,
     UnknownError: 404,
@@ -65,53 +68,23 @@ def create_app(office: Office) -> Litestar:
     async def give_office() -> Office:
         return office
 
-    prefix = "__Host-" if settings.secure else ""  # which no other host can set
-    sessions = ServerSideSessionConfig(
-        key=f"{prefix}session",
-        secure=settings.secure,
-        samesite="lax",
-        max_age=14 * 86400,
-        exclude=[*PROGRAMS, "/static/"],
+    handlers = (pages.Pages, submitting.Submitting, login.Login, team.Teams, organisers.Organisers, api.Api)
+    files = create_static_files_router(
+        "/static", [Path(__file__).with_name("static")], include_in_schema=False
     )
-    csrf = CSRFConfig(
-        office.cookie_secret,
-        cookie_name=f"{prefix}csrf",
-        cookie_secure=settings.secure,
-        cookie_httponly=True,
-        exclude=[*(f"^{path}" for path in PROGRAMS), "^/static/"],
-    )
-    guessing = RateLimitConfig(
-        rate_limit=("minute", settings.logins), check_throttle_handler=_is_guess, set_rate_limit_headers=False
-    )
-    environment = Environment(
-        loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
-    )
-    environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
     kept = FileStore(office.folder / "sessions", create_directories=True)
     return Litestar(
-        route_handlers=[
-            *(
-                pages.Pages,
-                submitting.Submitting,
-                login.Login,
-                team.Teams,
-                organisers.Organisers,
-                api.Api,
-                doors.Doors,
-            ),
-            metrics.metrics,
-            create_static_files_router(
-                "/static", [Path(__file__).with_name("static")], include_in_schema=False
-            ),
-        ],
+        route_handlers=[*handlers, doors.Doors, metrics.metrics, files],
         dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},
-        middleware=[
-            guessing.middleware,
-            sessions.middleware,
-            DefineMiddleware(Recognition, exclude=["^/static/"]),
-        ],
-        csrf_config=csrf,
-        template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(environment)),
+        middleware=_middleware(settings),
+        csrf_config=CSRFConfig(
+            office.cookie_secret,
+            cookie_name=f"{_prefix(settings)}csrf",
+            cookie_secure=settings.secure,
+            cookie_httponly=True,
+            exclude=WITHOUT_SESSION,
+        ),
+        template_config=TemplateConfig(instance=_templates()),
         stores={"sessions": kept},
         on_startup=[kept.delete_expired],
         exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
@@ -121,6 +94,34 @@ def create_app(office: Office) -> Litestar:
         openapi_config=_described(settings.name),
         state=_state(office),
     )
+
+
+def _prefix(settings: Settings) -> str:
+    """Return what cookies are called by that no other host can set; without https there is no such name."""
+    return "__Host-" if settings.secure else ""
+
+
+def _middleware(settings: Settings) -> list[Any]:
+    guessing = RateLimitConfig(
+        rate_limit=("minute", settings.logins), check_throttle_handler=_is_guess, set_rate_limit_headers=False
+    )
+    sessions = ServerSideSessionConfig(
+        key=f"{_prefix(settings)}session",
+        secure=settings.secure,
+        samesite="lax",
+        max_age=14 * 86400,
+        exclude=WITHOUT_SESSION,
+    )
+    recognition = DefineMiddleware(Recognition, exclude=["^/static/"])
+    return [guessing.middleware, sessions.middleware, recognition]
+
+
+def _templates() -> JinjaTemplateEngine:
+    environment = Environment(
+        loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
+    )
+    environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
+    return JinjaTemplateEngine.from_environment(environment)
 
 
 def _state(office: Office) -> Any:
