@@ -74,11 +74,10 @@ def _bring(b: int, first: int, here: int, state: State, block: KeptCommands) -> 
     here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
     if state.x.shape[1] % TOGETHER == 0:
         for k in range(0, here, TOGETHER):
-            n = first + k
-            copy_together(x, n, here_x, k)
-            copy_together(y, n, here_y, k)
-            copy_together(c, n, here_c, k)
-            copy_together(s, n, here_s, k)
+            copy_together(c, first + k, here_c, k)
+            copy_together(s, first + k, here_s, k)
+            copy_together(x, first + k, here_x, k)
+            copy_together(y, first + k, here_y, k)
         return
     for k in range(here):
         n = first + k

@@ -47,16 +47,22 @@ class KeptPath:
     """Of the lane out, metres."""
     x: float = -1.0
     y: float = -1.0
+    """The intersection between them, metres."""
     tx: float = -1.0
     ty: float = -1.0
+    """Direction of the lane in."""
     ux: float = -1.0
     uy: float = -1.0
+    """Direction of the lane out."""
     cx: float = -1.0
     cy: float = -1.0
+    """Centre of the arc, metres."""
     radius: float = -1.0
     side: float = -1.0
+    """1 for an arc to the left, -1 to the right, 0 straight on."""
     middle: float = -1.0
     bend: float = -1.0
+    """The curvature of the arc, 1/m."""
 
 
 @columns(BLOCK)
