@@ -131,14 +131,15 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
     if changed or bits & (STOPPED | BLOCKED | LEFT) != row.coast_stopped or bits & GOES_NOW == GOES_NOW:
         return False
     x, y = state.x[b, n], state.y[b, n]
-    if row.coast_waits != 0 and (x != row.coast_x or y != row.coast_y):
-        return False
     if kind == ROUND and not keeps_to_road(b, n, x, y, kept_way(row), traffic.roads, drivers):
         return False
     if holds == IF_NOT_BEHIND_EGO and is_behind_ego(b, n, x, y, kept_way(row), traffic):
         return False
-    if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
-        return False
+    if row.coast_special != 0:
+        if row.coast_waits != 0 and (x != row.coast_x or y != row.coast_y):
+            return False
+        if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
+            return False
     if company != ALONE and not still_meets_nobody(b, n, block.bend[k], x, y, kept_way(row), traffic):
         return False
     if row.coast_chooses != 0:
@@ -210,6 +211,7 @@ def drive_on(
         speed = max(0.0, line) / vehicle.period
     row.coast_chooses = 1 if chooses else 0
     row.coast_waits = 1 if waits else 0
+    row.coast_special = 1 if chooses or waits else 0
     row.coast_stopped = int(bits & STOPPED) if waits else 0
     keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:

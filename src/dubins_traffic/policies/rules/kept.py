@@ -36,6 +36,8 @@ class KeptPath:
     """The disc that its body meets."""
     coast_waits: int = -1
     """1 if it waits at its line, and stays where it is."""
+    coast_special: int = -1
+    """1 if either of the two is."""
     coast_stopped: int = -1
     """STOPPED if it has, else 0."""
     coast_x: float = -1.0
