@@ -81,7 +81,7 @@ def _in_empty_cache(command: str, tree: str | None = None) -> float:
 
 def _drop(folder: Path) -> None:
     """Withdraw what is asked for, so that the companion ends."""
-    for note in folder.glob("*/asked/*.json"):
+    for note in folder.glob("*/asked-*/*.json"):
         note.unlink(missing_ok=True)
 
 

@@ -130,7 +130,11 @@ def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[
         }
     found: dict[str, np.ndarray] = {}
     for key, part in parts.items():
-        if key == "description":  # where arrays stand, of a table that kernels have been handed
+        if key in (
+            "description",
+            "pose_rows",
+            "label_rows",
+        ):  # where arrays stand, and views of those that stand beside
             continue
         found |= arrays_in(part, f"{name}.{key}", seen)
     return found

@@ -29,13 +29,13 @@ def kernels(cache: Path) -> set[str]:
 
 
 def asked(cache: Path) -> set[str]:
-    return {path.name for path in cache.rglob("asked/*")}
+    return {path.name for path in cache.rglob("asked-*/*.json")}
 
 
 def wait_for_companion(cache: Path) -> None:
     """Wait until all that has been asked for is compiled."""
     while asked(cache):
-        assert not [path.read_text() for path in cache.rglob("asked/*.failed")]
+        assert not [path.read_text() for path in cache.rglob("asked-*/*.failed")]
         sleep(0.1)
 
 

@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import subprocess
+import weakref
 from collections.abc import Generator, Sequence
 from typing import Final
 
@@ -62,6 +63,7 @@ class Processes:
         self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
         for each in own:
             os.set_blocking(each, False)
+        self._forgotten = weakref.finalize(self, _shut, self._process)
         self._others: list[int] = []
         self._first = 0
         self._clocks = ProcessClocks(self._process.pid)
@@ -147,11 +149,22 @@ class Processes:
             self._kill()
         while self._others:
             _see_off(self._others.pop())
-        for stream in filter(None, self._streams):
-            stream.close()
+        self._forgotten()
         if self._group is not None:
             self._group.close()
             self._group = self._timed = None
+
+
+def _shut(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process of a box that was forgotten, if it runs yet, and close what leads to it and from it.
+
+    Python collects a cycle of objects in any order: what a box has opened is held here until this is done.
+    """
+    if process.returncode is None:
+        process.kill()
+        process.wait()
+    for stream in filter(None, (process.stdin, process.stdout, process.stderr)):
+        stream.close()
 
 
 def _opened(processes: Sequence[int]) -> list[int]:
