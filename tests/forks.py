@@ -134,7 +134,7 @@ def arrays_in(value: Any, name: str = "", seen: set[int] | None = None) -> dict[
             "description",
             "pose_rows",
             "label_rows",
-        ):  # where arrays stand, and views of those that stand beside
+        ):  # places of arrays, and views of some
             continue
         found |= arrays_in(part, f"{name}.{key}", seen)
     return found
