@@ -96,7 +96,8 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
 def test_an_ego_elsewhere_drives_under_the_shield(tmp_path: Path) -> None:
     with running(*PYTHON) as peer:
         time.sleep(0.3)
-        options = ("--lockstep", "--trials", "1", "--records", str(tmp_path), "--shield", "--json")
+        patience = ("--silence", "60")
+        options = ("--lockstep", *patience, "--trials", "1", "--records", str(tmp_path), "--shield", "--json")
         with running(*lcm_run(*options)) as session:
             status, out, _ = ended(session)
         peer.send_signal(signal.SIGINT)
