@@ -171,8 +171,14 @@ def assert_well(out: str) -> None:
 def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("lcm")
     command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
-    main(["check-controller", command, "--over", "lcm"])
-    assert_well(capsys.readouterr().out)
+    for _ in range(
+        3
+    ):  # a message of LCM may be lost on a busy machine: the program then waits for ever, and is told so
+        main(["check-controller", command, "--over", "lcm"])
+        told = capsys.readouterr().out
+        if "no trial began or ended" not in told:
+            break
+    assert_well(told)
 
 
 def test_over_ros1_a_node_is_started_and_ended(tmp_path: Path) -> None:

@@ -94,15 +94,26 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
 
 
 def test_an_ego_elsewhere_drives_under_the_shield(tmp_path: Path) -> None:
-    with running(*PYTHON) as peer:
-        time.sleep(0.3)
-        patience = ("--silence", "60")
-        options = ("--lockstep", *patience, "--trials", "1", "--records", str(tmp_path), "--shield", "--json")
-        with running(*lcm_run(*options)) as session:
-            status, out, _ = ended(session)
-        peer.send_signal(signal.SIGINT)
-        ended(peer)
-    (score,) = json.loads(out)["trials"]
+    for _ in range(3):  # a message of LCM may be lost on a busy machine: the driver is silent then
+        with running(*PYTHON) as peer:
+            time.sleep(0.3)
+            options = (
+                "--lockstep",
+                "--trials",
+                "1",
+                "--records",
+                str(tmp_path),
+                "--shield",
+                "--json",
+                "--overwrite",
+            )
+            with running(*lcm_run(*options)) as session:
+                status, out, _ = ended(session)
+            peer.send_signal(signal.SIGINT)
+            ended(peer)
+        (score,) = json.loads(out)["trials"]
+        if score["end"] != "peer_silent":
+            break
     assert (status, score["end"], score["controller"]) == (0, "duration", "lcm+shield")
     assert score["interventions"] > 0
     assert score["off_road_s"] == 0.0
