@@ -5,36 +5,23 @@
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from dubins_traffic.competition.settings import CompetitionModel
-from dubins_traffic.problem.schema import DIALECT, ID, schema_text
+from dubins_traffic.problem.schema import shipped_schema, with_configurations, write_schema
 
 NAME = "competition"
 
 
 def competition_schema() -> dict[str, Any]:
-    """Return the schema of competition files; its configurations refer to the schema of configurations."""
-    schema = CompetitionModel.model_json_schema()
-    document = schema["$defs"]["ConfigurationEntry"]["properties"]["document"]
-    document["anyOf"][0] = {"$ref": ID + "configuration"}
-    schema["properties"]["version"] = {"const": 0, "description": "0"}
-    return {"$schema": DIALECT, "$id": ID + NAME, **schema, "title": "Competition"}
+    """Return the schema of competition files."""
+    return with_configurations(CompetitionModel, NAME)
 
 
 def shipped_competition_schema() -> dict[str, Any]:
     """Return the shipped schema."""
-    item = files("dubins_traffic.competition") / "schemas" / f"{NAME}.json"
-    return json.loads(item.read_text(encoding="utf-8"))
-
-
-def _write() -> None:
-    path = Path(__file__).parent / "schemas" / f"{NAME}.json"
-    path.write_text(schema_text(competition_schema()), encoding="utf-8")
+    return shipped_schema(NAME, NAME)
 
 
 if __name__ == "__main__":
-    _write()
+    write_schema(NAME, NAME, competition_schema())

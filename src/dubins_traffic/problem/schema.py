@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from dubins_traffic.problem.faults import Open, Strict
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, PROGRAM
@@ -50,9 +50,28 @@ def schema_text(schema: dict[str, Any]) -> str:
     return json.dumps(schema, indent=2, sort_keys=True) + "\n"
 
 
-def shipped_schema(name: str) -> dict[str, Any]:
-    """Return the shipped schema called `name`."""
-    item = files("dubins_traffic.problem") / "schemas" / f"{name}.json"
+def with_configurations(model: type[BaseModel], name: str) -> dict[str, Any]:
+    """Return the schema called `name` of a file that lists configurations; they refer to the schema of configurations.
+
+    `model` is the file's; its configurations are of a model called ``ConfigurationEntry``.
+    """
+    schema = model.model_json_schema()
+    document = schema["$defs"]["ConfigurationEntry"]["properties"]["document"]
+    document["anyOf"][0] = {"$ref": ID + "configuration"}
+    schema["properties"]["version"] = {"const": 0, "description": "0"}
+    return {"$schema": DIALECT, "$id": ID + name, **schema, "title": name.capitalize()}
+
+
+def write_schema(room: str, name: str, schema: dict[str, Any]) -> None:
+    """Write a schema beside the models of a room of the package."""
+    folder = Path(__file__).parents[1] / room / "schemas"
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.json").write_text(schema_text(schema), encoding="utf-8")
+
+
+def shipped_schema(name: str, room: str = "problem") -> dict[str, Any]:
+    """Return the schema called `name` that is shipped with a room of the package."""
+    item = files(f"dubins_traffic.{room}") / "schemas" / f"{name}.json"
     return json.loads(item.read_text(encoding="utf-8"))
 
 
@@ -154,12 +173,6 @@ _DOCUMENTS: Mapping[str, Callable[[], dict[str, Any]]] = {
 }
 
 
-def _write() -> None:
-    folder = Path(__file__).parent / "schemas"
-    folder.mkdir(exist_ok=True)
-    for name, schema in schemas().items():
-        (folder / f"{name}.json").write_text(schema_text(schema), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    _write()
+    for each, made in schemas().items():
+        write_schema("problem", each, made)
