@@ -7,7 +7,6 @@ import html
 import json
 import os
 import re
-import shutil
 import statistics
 from collections.abc import Iterator
 from dataclasses import replace
@@ -31,8 +30,8 @@ from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.scoring.columns import REPORTED, SCORES
+from tests.browser import CHROMIUM, DRIVER, browsing
 from tests.campaigns import campaign, written
-from tests.integration.test_replay_page import CHROMIUM, DRIVER, FLAGS
 
 TEN = {
     "version": 1,
@@ -254,14 +253,8 @@ def test_without_collisions_there_is_no_chart_of_faults(folder: Path) -> None:
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which("chromium") or ""
-    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+    with browsing(tmp_path / "profile") as driver:
+        yield driver
 
 
 def test_a_report_in_the_terminal(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,34 +18,24 @@ from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import write_replay
+from tests.browser import browsing, need_browser
 from tests.pages import ask, element, has_colour, press
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
-CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --window-size=1280,800"
 )
 NASTY = "</script><script>window.broken = true</script>"
-REASON = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
 PICTURE = "return document.getElementById('map').toDataURL()"
 
-if (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true":
-    pytest.skip(REASON, allow_module_level=True)
+need_browser()
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
-    if CHROMIUM is None or DRIVER is None:
-        pytest.fail(REASON)
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+    with browsing(tmp_path_factory.mktemp("profile")) as driver:
+        yield driver
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,21 +12,19 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
+from tests.browser import browsing, need_browser
 from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
 
-CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --window-size=1280,900"
 )
-REASON = "needs chromium and chromedriver; scripts/system-packages.sh installs them"
 AXE = Path(__file__).parents[1] / "vendor" / "axe.min.js"
 NASTY = "<img src=x onerror=window.broken=1>"
 WAIT_S = 120
 PHONE, DESKTOP = (390, 844), (1280, 900)
 
-if (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true":
-    pytest.skip(REASON, allow_module_level=True)
+need_browser()
 
 
 @pytest.fixture(scope="module")
@@ -41,16 +38,8 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
-    if CHROMIUM is None or DRIVER is None:
-        pytest.fail(REASON)
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+    with browsing(tmp_path_factory.mktemp("profile"), height=900) as driver:
+        yield driver
 
 
 def fill(browser: webdriver.Chrome, **fields: str) -> None:
