@@ -24,7 +24,7 @@ from tests.tools import program
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-PATIENT = ("--lockstep", "--deadline", "300", "--begin", "300")
+PATIENT = ("--lockstep", "--deadline", "600", "--begin", "600")
 """In lockstep what is not answered is sent again each second: a lost message ends no trial, a busy machine might."""
 PYTHON = [sys.executable, str(ROOT / "examples" / "lcm" / "controller.py")]
 
