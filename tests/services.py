@@ -230,6 +230,7 @@ def serving(
             process.terminate()
             process.wait(timeout=60)
         process.stdout.close()
+        assert "Fatal Python error" not in log.read_text(), log.read_text()[-5000:]
         assert "Traceback" not in log.read_text() or not clean, log.read_text()[-5000:]
 
 
