@@ -1,5 +1,12 @@
-"""Kernels are compiled before they run, as on a machine where all has been compiled: tests of other tiers say so."""
+"""What holds for all tests.
+
+Kernels are compiled before they run, as on a machine where all has been compiled: tests of other tiers say so. Programs
+that tests start keep their bytecode, whatever the surroundings say: else each of them compiles 300 files first.
+"""
 
 import os
+import sys
 
 os.environ.setdefault("DUBINS_TRAFFIC_KERNELS", "compiled")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False

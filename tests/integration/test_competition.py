@@ -11,13 +11,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from dubins_traffic import load_record
+from dubins_traffic.cli.main import main
 from dubins_traffic.competition.competition import Competition, load_competition
 from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evaluation
 from dubins_traffic.competition.frames_hash import FramesHash
@@ -48,20 +49,31 @@ def told(results: Sequence[Judged]) -> dict[int, object]:
     return {own.number: own.to_json() for own in results}
 
 
-def command(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-m", "dubins_traffic.cli", *map(str, words)]
-    return subprocess.run(line, cwd=cwd, capture_output=True, text=True, check=False, timeout=600)
+@pytest.fixture
+def command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run a command in this process, in the folder of the test."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+        capsys.readouterr()
+        status = main([str(word) for word in words])
+        out, err = capsys.readouterr()
+        return subprocess.CompletedProcess(words, status, out, err)
+
+    return run
 
 
 def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) -> None:
-    phase, submission = short(24).phase("practice"), entry("speaks_lines", tmp_path / "store")
+    phase, submission = short(8).phase("practice"), entry("speaks_lines", tmp_path / "store")
     first = evaluate(phase, submission, tmp_path / "one")
     evaluate(phase, submission, tmp_path / "two", workers=2)
     assert (tmp_path / "one" / RESULTS).read_bytes() == (tmp_path / "two" / RESULTS).read_bytes()
     order = list(phase.numbers)
     random.Random(1).shuffle(order)
     assert told(list(judge(phase, order, submission))) == told(first.results)
-    assert len({own.frames for own in first.results}) == 24
+    assert len({own.frames for own in first.results}) == 8
     assert {own.end for own in first.results} == {"duration"}
 
 
@@ -168,7 +180,9 @@ def test_other_seeds_of_a_test_phase_show_the_same(tmp_path: Path) -> None:
     assert seen[0] == seen[1]
 
 
-def test_a_season_on_the_command_line(tmp_path: Path) -> None:
+def test_a_season_on_the_command_line(
+    tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
+) -> None:
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
     file = tmp_path / "spring" / "competition.toml"
     dates = {"2027-02-15": "2026-01-01", "2027-03-01": "2026-02-01", "2027-01-01": "2025-12-01"}
@@ -179,7 +193,7 @@ def test_a_season_on_the_command_line(tmp_path: Path) -> None:
     key = tmp_path / "spring.key"
 
     def ours(*words: str | Path, status: int = 0) -> str:
-        done = command(*words, cwd=tmp_path)
+        done = command(*words)
         assert done.returncode == status, done.stderr
         return done.stdout if status == 0 else done.stderr
 
@@ -266,20 +280,24 @@ def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     }
 
 
-def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(tmp_path: Path) -> None:
+def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(
+    tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
+) -> None:
     (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     (tmp_path / "controller.toml").write_text('program = ["./entry"]')
     words = ("evaluate", ".", "--competition", ROOT / "examples" / "competition")
-    first, second = command(*words, cwd=tmp_path), command(*words, cwd=tmp_path)
+    first, second = command(*words), command(*words)
     assert (first.returncode, first.stdout) == (0, second.stdout), first.stderr
     assert len(list((tmp_path / "evaluations" / "submissions").iterdir())) == 1
     for place in ("out", "."):
-        refused = command(*words, "-o", place, cwd=tmp_path)
+        refused = command(*words, "-o", place)
         assert refused.returncode == 2
         assert "lies in what is evaluated" in refused.stderr
 
 
-def test_where_there_is_no_box_an_entry_runs_if_it_is_trusted_with_the_same_frames(tmp_path: Path) -> None:
+def test_where_there_is_no_box_an_entry_runs_if_it_is_trusted_with_the_same_frames(
+    tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
+) -> None:
     (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     words = ["evaluate", "entry", "--competition", str(ROOT / "examples" / "competition"), "-o"]
     (tmp_path / "bin").mkdir()
@@ -294,7 +312,7 @@ def test_where_there_is_no_box_an_entry_runs_if_it_is_trusted_with_the_same_fram
     assert "--trust-submissions" in refused.stderr
     trusted = without("out", "--trust-submissions")
     assert trusted.returncode == 0, trusted.stderr
-    assert command(*words, "boxed", cwd=tmp_path).returncode == 0
+    assert command(*words, "boxed").returncode == 0
     assert (tmp_path / "out" / RESULTS).read_bytes() == (tmp_path / "boxed" / RESULTS).read_bytes()
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 
-from dubins_traffic.cli.main import app
+from dubins_traffic.cli.main import app, main
 from dubins_traffic.competition.evaluating import load_evaluation
 
 ROOT = Path(__file__).parents[2]
@@ -42,29 +39,20 @@ def test_a_command_can_be_read(line: str) -> None:
     command.make_context(words[0] if words else "", words, parent=context)
 
 
-def test_the_first_blocks_work_as_typed(tmp_path: Path) -> None:
+def test_the_first_blocks_work_as_typed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
     organiser, participant = blocks("organisers.md")[0], blocks("participants.md")[0]
-    around = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "HOME": str(tmp_path)}
-    said = ""
     for line in [*organiser, *participant]:
         words = [word.replace("~", str(tmp_path)) for word in shlex.split(line)[1:]]
-        done = subprocess.run(
-            [sys.executable, "-m", "dubins_traffic.cli", *words],
-            cwd=tmp_path,
-            env=around,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
-        said += done.stdout
-    assert said.count("commitment ") == 2
+        assert main(words) == 0, f"{line}\n{capsys.readouterr().err}"
+    assert capsys.readouterr().out.count("commitment ") == 2
     text = (PAGES / "file.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=around, capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "1 ours 0.0 (0.0, 0.0) ()\n"
+    exec(code, {"__name__": "page"})
+    assert capsys.readouterr().out == "1 ours 0.0 (0.0, 0.0) ()\n"
     assert len(list((tmp_path / "records").glob("*.mcap"))) == 4
     (folder,) = (tmp_path / "evaluations").glob("practice-*")
     found = load_evaluation(folder)

@@ -4,6 +4,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,6 +25,7 @@ from dubins_traffic.record.reader import replay
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Scorer
 from dubins_traffic.simulators.gazebo import prefix
+from dubins_traffic.simulators.gazebo.folder import PREFIX, Folder
 from dubins_traffic.simulators.gazebo.link import Kind, LostError
 from dubins_traffic.simulators.gazebo.simulator import Gazebo
 from dubins_traffic.simulators.gazebo.vehicle import WHEEL_RADIUS
@@ -240,15 +242,29 @@ def test_no_display() -> None:
     assert "no display" in done.stderr
 
 
-def test_a_killed_run_leaves_no_server(tmp_path: Path) -> None:
+def test_a_killed_run_leaves_no_server_and_the_next_run_removes_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     file = tmp_path / "long.json"
     file.write_text(json.dumps(WANDERERS | {"duration": 3600, "rules": False}))
-    run = subprocess.Popen([*PROGRAM, "run", str(file), "--simulator", "gazebo"], stdout=subprocess.DEVNULL)
+    run = subprocess.Popen(
+        [*PROGRAM, "run", str(file), "--simulator", "gazebo"],
+        stdout=subprocess.DEVNULL,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    )
     while not servers_of(run.pid) and run.poll() is None:
         time.sleep(0.05)
+    living = Folder()
+    assert len(list(tmp_path.glob(f"{PREFIX}*"))) == 2
     run.kill()
     run.wait()
     assert gone_within(5.0, run.pid)
+    next_one = Folder()
+    assert set(tmp_path.glob(f"{PREFIX}*")) == {living.path, next_one.path}
+    for folder in (living, next_one):
+        folder.cleanup()
+    assert not list(tmp_path.glob(f"{PREFIX}*"))
 
 
 def test_two_workers_make_the_records_of_one(tmp_path: Path) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from threading import Event, Thread
@@ -17,6 +18,7 @@ from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Waited, ended, see_off
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.protocols import End, Transport
+from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.sessions.remote import Session, run_remote
 from dubins_traffic.sessions.ros2 import make_transport
 from dubins_traffic.transports.clocks import Lockstep
@@ -59,6 +61,8 @@ class NotingLink(Link):
 def run_over(over: str, command: str) -> tuple[Pass, Pass]:
     """Run the course twice in lockstep with a program that drives over a transport, started afresh each time.
 
+    What trials need is compiled before: the program's time is not spent with that.
+
     Parameters
     ----------
     over : str
@@ -73,18 +77,20 @@ def run_over(over: str, command: str) -> tuple[Pass, Pass]:
     TransportError
         If the transport can't be opened.
     """
+    words = _words(command)
+    rehearse(next(iter(scenarios().values())))
     maestro = Maestro()
     with _MEETINGS[over](maestro) as meeting:
         patience = Patience(begin=PATIENCE / 3)
         link = NotingLink(meeting.transport, Lockstep(DEADLINE), patience=patience)
-        first, second = (_run(link, maestro, command, meeting.environment) for _ in range(2))
+        first, second = (_run(link, maestro, words, meeting.environment) for _ in range(2))
     return first, second
 
 
-def _run(link: NotingLink, maestro: Maestro, command: str, environment: Mapping[str, str]) -> Pass:
+def _run(link: NotingLink, maestro: Maestro, words: Sequence[str], environment: Mapping[str, str]) -> Pass:
     instances = scenarios()
     names, drives, lost = list(instances), list[Drive](), ""
-    program = _start(command, environment)
+    program = _start(words, environment)
     watch = _Watch(program, link.inbox)
     try:
         session = Session(link, list(instances.values()).__getitem__, len(names), maestro)
@@ -111,7 +117,7 @@ class _Watch:
 
     def proceed(self) -> None:
         """A trial has ended: the program has its time again."""
-        self._waited = Waited(self._program.pid)
+        self._waited = Waited(self._program.pid, os.getpid())
 
     def end(self) -> None:
         """Look no longer."""
@@ -126,9 +132,22 @@ class _Watch:
                 self._inbox.stop(End.PEER_SILENT, f"no trial began or ended within {PATIENCE:g} s")
 
 
-def _start(command: str, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+def _words(command: str) -> list[str]:
     try:
         words = shlex.split(command)
+    except ValueError as error:
+        raise _no_program(str(error), command) from error
+    if not words or shutil.which(words[0]) is None:
+        raise _no_program("no such program", command)
+    return words
+
+
+def _no_program(why: str, command: str) -> InputError:
+    return InputError(f"can't be started: {why}", file="C", value=command, expected="a command line")
+
+
+def _start(words: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    try:
         return subprocess.Popen(
             words,
             env={**os.environ, **environment},
@@ -136,10 +155,8 @@ def _start(command: str, environment: Mapping[str, str]) -> subprocess.Popen[byt
             stdout=ERRORS,
             start_new_session=True,
         )
-    except (ValueError, IndexError, OSError) as error:
-        raise InputError(
-            f"can't be started: {error}", file="C", value=command, expected="a command line"
-        ) from error
+    except OSError as error:
+        raise _no_program(str(error), shlex.join(words)) from error
 
 
 def _dismiss(program: subprocess.Popen[bytes]) -> str:

@@ -65,13 +65,18 @@ class Place:
 
 
 class Waited:
-    """Seconds since this was made, without those in which a process wanted a processor and had none.
+    """Seconds since this was made, without those in which processes wanted a processor and had none.
 
     Where the system does not tell that, these are the seconds of the clock.
+
+    Parameters
+    ----------
+    pids : int
+        The processes: the one that is waited for, and those that must do something before it can go on.
     """
 
-    def __init__(self, pid: int) -> None:
-        self._tasks = Path(f"/proc/{pid}/task")
+    def __init__(self, *pids: int) -> None:
+        self._tasks = [Path(f"/proc/{pid}/task") for pid in pids]
         self._began = monotonic()
         self._queued = self._in_queue()
 
@@ -81,14 +86,19 @@ class Waited:
         return elapsed - min(elapsed, max(0.0, self._in_queue() - self._queued))
 
     def _in_queue(self) -> float:
-        """Return the seconds that the threads of the process have stood in a processor's queue, all together."""
-        queued = 0
-        try:
-            for task in list(self._tasks.iterdir()):
-                queued += int((task / "schedstat").read_text(encoding="ascii").split()[1])
-        except (OSError, ValueError, IndexError):
-            return queued * 1e-9  # it ended meanwhile, or this system does not tell
-        return queued * 1e-9
+        """Return the seconds that all threads of the processes have stood in a processor's queue, all together."""
+        return sum(map(_queued, self._tasks)) * 1e-9
+
+
+def _queued(tasks: Path) -> int:
+    """Return the nanoseconds that the threads of a process have stood in a queue."""
+    queued = 0
+    try:
+        for task in list(tasks.iterdir()):
+            queued += int((task / "schedstat").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return queued  # it ended meanwhile, or this system does not tell
+    return queued
 
 
 def see_off(pid: int, status: Callable[[], int | None], seconds: float = FAREWELL) -> str:

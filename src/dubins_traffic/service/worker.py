@@ -9,7 +9,6 @@ import contextlib
 import gzip
 import os
 import signal
-import sys
 import tempfile
 import threading
 from collections.abc import Generator
@@ -225,5 +224,6 @@ def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
 
 
 def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
+    while os.read(0, 4096):  # a thread that holds the lock of sys.stdin would abort the end of the process
+        pass
     os._exit(1)

@@ -19,6 +19,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.simulators.gazebo.folder import Folder
 from dubins_traffic.simulators.gazebo.link import PROTOCOL, Kind, Link, LostError
 from dubins_traffic.simulators.gazebo.prefix import Installation
 
@@ -77,14 +78,14 @@ class Server:
 
     def _start(self, installation: Installation, world: str, port: int, startup: float) -> None:
         folder = _folder()
-        self.log = Path(folder.name) / "gzserver.log"
+        self.log = folder.path / "gzserver.log"
         here, there = socket.socketpair()
         for end in (here, there):
             end.setblocking(True)  # libraries such as rospy set a default timeout now and then
         try:
-            path = Path(folder.name) / "trial.world"
+            path = folder.path / "trial.world"
             path.write_text(world, encoding="utf-8")
-            self._environment = self._surroundings(installation, port, folder.name)
+            self._environment = self._surroundings(installation, port, str(folder.path))
             private = {
                 SOCKET: str(there.fileno()),
                 PARENT: _guardian(),
@@ -190,7 +191,7 @@ class Server:
         return f": {said[-1].strip()[-300:]}" if said else ""
 
 
-def _end(process: subprocess.Popen[bytes], link: Link, folder: tempfile.TemporaryDirectory[str]) -> None:
+def _end(process: subprocess.Popen[bytes], link: Link, folder: Folder) -> None:
     link.quit()
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(GRACE)
@@ -205,9 +206,9 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def _folder() -> tempfile.TemporaryDirectory[str]:
+def _folder() -> Folder:
     try:
-        return tempfile.TemporaryDirectory(prefix="dubins-traffic-gazebo-")
+        return Folder()
     except OSError as error:
         raise InputError(
             f"no folder for Gazebo's files can be made ({error.strerror})",
