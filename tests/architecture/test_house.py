@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from dubins_traffic.kernels.sources import imported
 from tests.architecture import findings
-from tests.architecture.constants import defined, is_constant
+from tests.architecture.constants import compiled, defined, is_constant, read_by
 from tests.architecture.house import STILL, Module, modules, still
 from tests.architecture.kernels import is_said, public_kernels
 
@@ -85,3 +86,10 @@ def test_a_group_of_codes_counts_as_one_constant() -> None:
 
 def test_a_constant_is_one_wherever_it_is_imported() -> None:
     assert defined("agents.driving", "EGO") == defined("cars.state", "EGO") == ("cars.state", "EGO")
+
+
+def test_a_kernel_is_compiled_anew_when_a_constant_that_it_reads_changes() -> None:
+    files = {module.name: module.path for module in modules()}
+    for module, kernel in compiled():
+        sources = {files[name.rpartition(".")[0]] for name in read_by(module, kernel)}
+        assert sources <= imported(files[module]), kernel.name

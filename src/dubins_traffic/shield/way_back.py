@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.cars.state import Command, Pose, State
+from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -24,7 +24,6 @@ from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch
 from dubins_traffic.shield.tables import (
-    EGO,
     ShieldTables,
 )
 

@@ -17,7 +17,7 @@ from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import Work, list_moves
-from dubins_traffic.synthesis.queues import EGO, OTHER, RENEWED, Scene
+from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.sightings import NOWHERE, WAITS, Ground, Sighting
 
 EGO_CAR: Final = 0
@@ -311,9 +311,9 @@ class RoadPlay:
                 parked.append(slot)
                 continue
             renewed = kind.forfeits is Forfeits.ONCE and self._bits[car] & FORFEITED
-            waiting.append((slot, EGO if car == EGO_CAR else RENEWED if renewed else OTHER))
+            waiting.append((slot, WHO.EGO if car == EGO_CAR else WHO.RENEWED if renewed else WHO.OTHER))
         return Scene(
-            None if inside is None else EGO if inside == EGO_CAR else OTHER,
+            None if inside is None else WHO.EGO if inside == EGO_CAR else WHO.OTHER,
             tuple(waiting) if kind.ordered else tuple(sorted(waiting)),
             tuple(sorted(parked)),
         )
