@@ -28,7 +28,7 @@ class _Draw(NamedTuple):
     TURN: int = 1
     """Whether an e-agent whose patience ended turns round."""
     RULES: int = 20
-    """What cars by the rules do, eleven numbers: exits take four, moods six, places one."""
+    """What cars by the rules do, eleven numbers: exits take four, violations six, places one."""
     POSITION: int = 200
     """Noise of a sensed position, six numbers."""
     HEADING: int = 206

@@ -17,7 +17,7 @@ from dubins_traffic.roads.lookup import (
     nearest_vertex,
 )
 from dubins_traffic.rules.lane_state import along_lane, lane_here
-from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.tables import REASON, ShieldTables
 
@@ -93,7 +93,7 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     bits = np.int64(labels.bits[b, EGO])
     turns = yaw_rate != 0.0 and vehicle.half_length > 0.0
     if speed == 0.0 and not turns:
-        return REASON.RETURN if bits & LEFT != 0 else REASON.NOTHING
+        return REASON.RETURN if bits & FLAG.LEFT != 0 else REASON.NOTHING
     net = drivers.net[b]
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
@@ -138,11 +138,11 @@ def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
         return REASON.NOTHING
     bits = np.int64(labels.bits[b, EGO])
     lane = labels.lane[b, EGO]
-    if bits & STOPPED == 0 or lane < 0 or lane_end(roads, net, lane) != v:
+    if bits & FLAG.STOPPED == 0 or lane < 0 or lane_end(roads, net, lane) != v:
         return REASON.STOP
-    if bits & AHEAD != 0:
+    if bits & FLAG.AHEAD != 0:
         return REASON.ORDER
-    return REASON.CLEARANCE if bits & CLEAR == 0 else REASON.NOTHING
+    return REASON.CLEARANCE if bits & FLAG.CLEAR == 0 else REASON.NOTHING
 
 
 @jit
@@ -170,7 +170,7 @@ def _leaves_lane(
     tx, ty = lane_direction(roads, net, after)
     half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
-    if np.int64(labels.bits[b, EGO]) & LEFT != 0 and labels.at[b, EGO] < 0:
+    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
         return REASON.RETURN if reach >= guards.ego[b].left_release else REASON.NOTHING
     if reach <= vehicle.over - BRINK:
         return REASON.NOTHING

@@ -22,7 +22,7 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.routing.lane_graph import nearest_stage
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.shield.checks import bounded, gather_close, may_touch, refusal
 from dubins_traffic.shield.tables import MODE, REASON, ShieldTables
 from dubins_traffic.shield.way_back import copy_memory, drive_alone, drive_by_law, surely_returns
@@ -67,7 +67,7 @@ def shield_trial(
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
     _remember(b, tick, traffic, guards)
-    left = np.int64(labels.bits[b, EGO]) & LEFT != 0
+    left = np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0
     law = _lawful(b, tick, left, sight2, traffic, guards, commands)
     if not left:
         guards.ego[b].kept = 0
@@ -151,7 +151,7 @@ def _may_obey(
     drivers = traffic.drivers
     if may_touch(b, law.speed, law.yaw_rate, near, traffic, drivers.vehicle[b]):
         return False
-    if np.int64(traffic.labels.bits[b, EGO]) & LEFT != 0:
+    if np.int64(traffic.labels.bits[b, EGO]) & FLAG.LEFT != 0:
         return True
     found = refusal(b, law.speed, law.yaw_rate, near, traffic, guards)
     if found != REASON.LANE:

@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
-from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, Traffic, vehicles_of
+from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
@@ -187,7 +187,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
     distance = np.full((sum(len(own) for own, _ in rounds), lanes), np.inf)
     for b, ((own, far), problem) in enumerate(zip(rounds, problems, strict=True)):
         ego = rows[b, EGO]
-        ego.kind, ego.first, ego.last = ROUND, len(stage), len(stage) + len(own)
+        ego.kind, ego.first, ego.last = KIND.ROUND, len(stage), len(stage) + len(own)
         ego.speed = problem.car.bounds.speed
         distance[len(stage) : len(stage) + len(own), : far.shape[1]] = far
         stage += own.tolist()
