@@ -12,10 +12,10 @@ from typing import Final
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.rules.propositions import APPROACH, CLEAR, FIRST, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.shield.filter import ShieldFilter
 
-GOES: Final = STOPPED | FIRST | CLEAR
+GOES: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
 NEAR: Final = 2.5
 """What is farther away than this is not beside the ego, metres."""
 
@@ -136,7 +136,7 @@ class Swings(Odd):
             speed = self.dice.choice((0.1, 0.2, 0.4))
             return self.keep(observation, 0.2 / speed, (sign * speed, 0.0))
         seen = observation.propositions
-        if seen.lane < 0 or seen.bits & LEFT:
+        if seen.lane < 0 or seen.bits & FLAG.LEFT:
             return self.law
         followed = any(
             car.propositions.lane == seen.lane and self._is_behind(observation, car.pose)
@@ -203,7 +203,7 @@ class Refuses(Odd):
     def habit(self, observation: Observation) -> tuple[float, float]:
         """Stand once it has stopped."""
         bits = observation.propositions.bits
-        if bits & STOPPED and not self._bits & STOPPED and self.dice.random() < 0.8:
+        if bits & FLAG.STOPPED and not self._bits & FLAG.STOPPED and self.dice.random() < 0.8:
             return self.stand(observation, 2.0, 120.0)
         return self.law
 
@@ -216,12 +216,12 @@ class Retakes(Odd):
     def habit(self, observation: Observation) -> tuple[float, float]:
         """Stop as soon as it may, and back up until it has no ticket."""
         bits = observation.propositions.bits
-        if bits & APPROACH and not self._bits & (APPROACH | STOPPED):
+        if bits & FLAG.APPROACH and not self._bits & (FLAG.APPROACH | FLAG.STOPPED):
             if self._left <= 0:
                 self._left = self.dice.randrange(1, 12)
             self._left -= 1
             return self.keep(observation, 0.6)
-        if self._left > 0 and bits & STOPPED:
+        if self._left > 0 and bits & FLAG.STOPPED:
             return -0.2, 0.0
         return self.law
 
@@ -286,7 +286,7 @@ class Races(Odd):
         for car in observation.others:
             dx, dy = car.pose.x - x, car.pose.y - y
             ahead = dx * c + dy * s
-            if not car.propositions.bits & LEFT or dx * dx + dy * dy > 1.0:
+            if not car.propositions.bits & FLAG.LEFT or dx * dx + dy * dy > 1.0:
                 continue
             speed = car.twist.speed if abs(ahead) < 0.1 else 0.7 if ahead > 0.0 else 0.0
             return (speed, self.law.yaw_rate)

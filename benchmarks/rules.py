@@ -27,7 +27,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
 from dubins_traffic.routing.free_flow import free_flow
-from dubins_traffic.rules.propositions import STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 
 DURATION = 300.0
@@ -62,7 +62,7 @@ class Waiting:
         self._longest = 0
 
     def frames(self, frames: Frames) -> None:
-        for stopped in (frames.bits & STOPPED) != 0:
+        for stopped in (frames.bits & FLAG.STOPPED) != 0:
             self._run = np.where(stopped, self._run + 1, 0)
             self._longest = max(self._longest, int(self._run.max()))
 

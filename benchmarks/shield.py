@@ -34,7 +34,7 @@ from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.table import pack_distinct
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.shield.nearest_command import shield
@@ -139,7 +139,7 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         shield(tick, False, traffic, watch, group.commands)
         reasons[active, watch.ego["reason"][active]] += 1
         group.advance()
-        before, aside = aside, (group.labels.bits[:, EGO] & LEFT) != 0
+        before, aside = aside, (group.labels.bits[:, EGO] & FLAG.LEFT) != 0
         passed += aside & ~before
     for b, outcome in enumerate(group.outcomes(range(count), "shield")):
         told = {REASONS[k]: int(n) for k, n in enumerate(reasons[b]) if k and n}

@@ -13,7 +13,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 
 LAG = 15
 """By how many ticks `lags` drives late."""
@@ -205,7 +205,7 @@ class Hostile:
         pose = np.stack([array[:, EGO] for array in state[:4]], axis=1)
         scene = Scene(
             tick, law, own["fastest"].copy(), own["slowest"].copy(), own["yaw_most"].copy(), wild, dice, pose,
-            self._lane(pose, labels), np.where(labels.bits[:, EGO] & LEFT, 1.0, 0.0), _toward(state),
+            self._lane(pose, labels), np.where(labels.bits[:, EGO] & FLAG.LEFT, 1.0, 0.0), _toward(state),
             self._memory,
         )  # fmt: skip
         asked = law.copy()

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import grimp
 
+from tests.architecture.constants import constants
 from tests.architecture.house import Findings, Module, modules
 from tests.architecture.kernels import kernels_without_units, wide_kernels
 
@@ -196,6 +197,7 @@ def _is_apart(part: ast.AST) -> bool:
 
 CHECKS: Mapping[str, Callable[[], Findings]] = {
     "circles": circles,
+    "constants": constants,
     "duplicates": duplicates,
     "kernels without units": kernels_without_units,
     "long modules": long_modules,

@@ -7,15 +7,20 @@ is what stands in one and has been mended (`python -m tests.architecture.house` 
 from __future__ import annotations
 
 import ast
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 
+from dubins_traffic.kernels.sources import imported
 from tests.architecture import findings
+from tests.architecture.constants import compiled, defined, is_constant, read_by
 from tests.architecture.house import STILL, Module, modules, still
 from tests.architecture.kernels import is_said, public_kernels
 
 MOST_STILL = {
     "circles": 0,
+    "constants": 62,
     "duplicates": 6,
     "kernels without units": 105,
     "long modules": 0,
@@ -65,3 +70,26 @@ def test_what_is_the_same_is_found_whatever_its_variables_are_called() -> None:
 def test_every_module_is_read() -> None:
     assert len(modules()) > 300
     assert sum(1 for module in modules() for _ in public_kernels(module)) > 200
+
+
+def test_a_group_of_codes_counts_as_one_constant() -> None:
+    class Stage(NamedTuple):
+        BEGINS: int = 0
+        ENDS: int = 1
+
+    assert is_constant(3)
+    assert is_constant(np.uint64(3))
+    assert is_constant(Stage())
+    assert not is_constant(0.5)
+    assert not is_constant(Stage)
+
+
+def test_a_constant_is_one_wherever_it_is_imported() -> None:
+    assert defined("agents.driving", "EGO") == defined("cars.state", "EGO") == ("cars.state", "EGO")
+
+
+def test_a_kernel_is_compiled_anew_when_a_constant_that_it_reads_changes() -> None:
+    files = {module.name: module.path for module in modules()}
+    for module, kernel in compiled():
+        sources = {files[name.rpartition(".")[0]] for name in read_by(module, kernel)}
+        assert sources <= imported(files[module]), kernel.name

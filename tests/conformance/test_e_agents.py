@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.agents.kinds import PACKS, PLAYS, Lists
+from dubins_traffic.agents.kinds import DOES, PACKS, Lists
 from dubins_traffic.agents.script import script_rows
 from dubins_traffic.agents.tables import Agent
 from dubins_traffic.campaign.results import load_results
@@ -54,7 +54,7 @@ def pack_shuttle(instance: Instance, given: Mapping[str, Any], agent: Agent, lis
     seconds, first = given["leg"] / given["speed"], len(lists.script)
     commands = [[seconds, given["speed"], 0.0], [seconds, -given["speed"], 0.0]]
     lists.script += script_rows(commands, instance.problem.rate)
-    agent.does, agent.first, agent.last, agent.repeat = PLAYS, first, len(lists.script), 1
+    agent.does, agent.first, agent.last, agent.repeat = DOES.PLAYS, first, len(lists.script), 1
 
 
 @pytest.fixture(params=TYPES, ids=lambda kind: str(kind).rpartition("/")[2])

@@ -14,7 +14,7 @@ from benchmarks.synthesis import request
 
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.queues import EGO, OTHER, Scene
+from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import solve
 from tests.games import ALL, board, pan
 from tests.tools import interpreter_with
@@ -41,12 +41,12 @@ def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
     count = len(some.arena.nodes)
     scenes: list[Scene] = []
     for n, node in enumerate(some.arena.nodes):
-        inside = (OTHER if cells.index(n) else EGO) if n in cells else None
+        inside = (WHO.OTHER if cells.index(n) else WHO.EGO) if n in cells else None
         lanes = [count + lane for lane in node.inbound]
         waiting = [car for car, cell in enumerate(cells) if cell in lanes]
         if some.scenery(n).kind.ordered:
             waiting = sorted(waiting, key=lambda car: sum((other, car) in before for other in waiting))
-        queue = [(lanes.index(cells[car]), OTHER if car else EGO) for car in waiting]
+        queue = [(lanes.index(cells[car]), WHO.OTHER if car else WHO.EGO) for car in waiting]
         scenes.append(Scene(inside, tuple(queue if some.scenery(n).kind.ordered else sorted(queue))))
     return some.number(scenes)
 

@@ -13,7 +13,7 @@ from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.queues import EGO, OTHER, RENEWED, Scene
+from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import Solution, solve
 from tests.game_reference import Arrays, Reference
 
@@ -98,11 +98,11 @@ def position(board: Board, game: Reference, state: Any) -> int:
         slots: dict[int, int] = {}
         for car, cell in enumerate(cells):
             if cell[0] == "node" and cell[1] == point and (len(cell) == 2 or cell[2] == starts[0]):
-                inside = OTHER if car else EGO
+                inside = WHO.OTHER if car else WHO.EGO
             if cell[0] == "lane" and cell[2] == point and cell[1] in starts:
                 slots[car] = starts.index(cell[1])
         order = list(dict(orders).get(point, ())) if game.crossing(point) else sorted(slots)
-        kinds = {car: RENEWED if car in renewed else OTHER if car else EGO for car in order}
+        kinds = {car: WHO.RENEWED if car in renewed else WHO.OTHER if car else WHO.EGO for car in order}
         queue = [(slots[car], kinds[car]) for car in order if car in slots]
         ordered = node.crossing and game.order != "none"
         parked = tuple(sorted(slot for car, slot in slots.items() if car not in order))

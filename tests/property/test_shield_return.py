@@ -17,7 +17,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Frames
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.shield.tables import Overtakes
 from dubins_traffic.simulators.embedded import Embedded
@@ -42,7 +42,7 @@ class Adversary:
 
     def decide(self, _tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands."""
-        left = int(labels.bits[0, EGO]) & LEFT
+        left = int(labels.bits[0, EGO]) & FLAG.LEFT
         for n in range(1, state.x.shape[1]):
             commands[0, n] = self._chooses(n, state) if left else (0.0, 0.0)
 
@@ -78,7 +78,7 @@ class Sides:
 
     def frames(self, frames: Frames) -> None:
         for bits in frames.bits[:, EGO]:
-            left = int(bits) & LEFT != 0
+            left = int(bits) & FLAG.LEFT != 0
             if left and not self._left:
                 self.spans.append(0)
             if left:

@@ -8,7 +8,7 @@ import pytest
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.rules.fault import with_fault
 from dubins_traffic.rules.labeller import Labeller
-from dubins_traffic.rules.propositions import BREACH3, LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.rules.propositions import FLAG
 from tests.rules_scripts import STAR, fill, instance, on_lane
 
 
@@ -33,22 +33,24 @@ def test_all_that_closed_without_a_breach(closing: tuple[float, float]) -> None:
 
 def test_not_who_stood_or_moved_away() -> None:
     assert fault((0.5, 0.0), (True, False)) == (True, False)
-    assert fault((0.5, 0.0), (True, False), (0, LEFT)) == (True, False)
+    assert fault((0.5, 0.0), (True, False), (0, FLAG.LEFT)) == (True, False)
     assert fault((0.5, -0.2)) == (True, False)
-    assert fault((0.5, -0.2), bits=(0, LEFT)) == (True, False)
-    assert fault((0.0, 0.5), (False, True), (BREACH3, 0)) == (False, True)
+    assert fault((0.5, -0.2), bits=(0, FLAG.LEFT)) == (True, False)
+    assert fault((0.0, 0.5), (False, True), (FLAG.BREACH3, 0)) == (False, True)
 
 
-@pytest.mark.parametrize("breach", [LEFT, BREACH3, LEFT | BREACH3, LEFT | OVERTAKING | BREACH3])
+@pytest.mark.parametrize(
+    "breach", [FLAG.LEFT, FLAG.BREACH3, FLAG.LEFT | FLAG.BREACH3, FLAG.LEFT | FLAG.OVERTAKING | FLAG.BREACH3]
+)
 def test_of_those_that_closed_those_in_breach(breach: int) -> None:
-    assert fault(bits=(breach, ON_ROAD)) == (True, False)
-    assert fault(bits=(ON_ROAD, breach)) == (False, True)
+    assert fault(bits=(breach, FLAG.ON_ROAD)) == (True, False)
+    assert fault(bits=(FLAG.ON_ROAD, breach)) == (False, True)
     assert fault(bits=(breach, breach)) == (True, True)
 
 
 def test_overtaking_is_no_breach() -> None:
-    assert fault(bits=(LEFT | OVERTAKING, 0)) == (True, True)
-    assert fault(bits=(LEFT | OVERTAKING, LEFT)) == (False, True)
+    assert fault(bits=(FLAG.LEFT | FLAG.OVERTAKING, 0)) == (True, True)
+    assert fault(bits=(FLAG.LEFT | FLAG.OVERTAKING, FLAG.LEFT)) == (False, True)
 
 
 def test_who_hits_an_obstacle_is_at_fault() -> None:

@@ -16,7 +16,7 @@ import pytest
 from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers.rules import Rules
-from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_way, way_between
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way, way_between
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -87,7 +87,7 @@ def march(way: ReferencePath) -> list[tuple[int, float, float]]:
         part, _, left, px, py = on_way(way, x, y)
         assert abs(left) < 1e-3
         found.append((part, x, y))
-        if part == AFTER and math.hypot(x - way.x, y - way.y) > 1.5:
+        if part == PART.AFTER and math.hypot(x - way.x, y - way.y) > 1.5:
             break
         x, y = x + 0.01 * px + left * py, y + 0.01 * py - left * px
     return found
@@ -103,9 +103,9 @@ def test_ways_lead_into_the_right_lane_within_the_disc_and_on_the_road(network: 
             points = march(way)
             parts = [part for part, _, _ in points]
             assert parts == sorted(parts)
-            assert set(parts) >= {BEFORE, AFTER}
+            assert set(parts) >= {PART.BEFORE, PART.AFTER}
             assert all(bool(network.on_road((x, y), 2.0 * W)) for _, x, y in points)
-            turning = [(x, y) for part, x, y in points if part == THROUGH]
+            turning = [(x, y) for part, x, y in points if part == PART.THROUGH]
             assert all(math.hypot(x - way.x, y - way.y) < R for x, y in turning)
             s, left = network.lane_coordinates(out, points[-1][1:])
             assert (float(left), float(s) > R) == (pytest.approx(-W, abs=1e-3), True)

@@ -20,7 +20,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
-from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import Margins
 from dubins_traffic.scoring.score import score
@@ -82,15 +82,15 @@ def test_against_the_robustness_of_the_formulas(seed: int) -> None:
     left = np.cumsum(draws.normal(0.0, 0.04, count)) - 0.2
     script = [[on_lane(GRID, lane, 1.5 + 0.01 * k, float(left[k]))] for k in range(count)]
     frames = frames_of(script, made.problem.rate)
-    bits = np.where(left + RHO > 0.05, LEFT, 0) | ON_ROAD
-    bits |= np.where(draws.random(count) < 0.3, OVERTAKING, 0)
+    bits = np.where(left + RHO > 0.05, FLAG.LEFT, 0) | FLAG.ON_ROAD
+    bits |= np.where(draws.random(count) < 0.3, FLAG.OVERTAKING, 0)
     lanes = np.where(draws.random(count) < 0.1, -1, lane)
     frames = replace(frames, lane=lanes[:, None], bits=bits[:, None].astype(np.uint32))
     found = of(made, frames, 11)
-    beyond = left + RHO - np.where(bits & LEFT, 0.0, 0.05)
+    beyond = left + RHO - np.where(bits & FLAG.LEFT, 0.0, 0.05)
     signals = {
         "left": np.where(lanes >= 0, beyond, -np.inf),
-        "overtaking": np.where(bits & OVERTAKING, np.inf, -np.inf),
+        "overtaking": np.where(bits & FLAG.OVERTAKING, np.inf, -np.inf),
     }
     line, period = prop("left"), made.problem.period
     for rule, then in (

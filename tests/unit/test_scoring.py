@@ -10,7 +10,7 @@ from dubins_traffic.cars.body import Body, Disc, DiscObstacle, PolygonObstacle, 
 from dubins_traffic.cars.state import Contact, Frames
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.wall import measured
-from dubins_traffic.rules.propositions import LEFT, ON_ROAD, STILL
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
@@ -87,7 +87,7 @@ def drive(frames: Frames, instance=None) -> Driven:
 
 
 def bits(frames: Frames, ego: list[int]) -> Frames:
-    flags = np.full(frames.bits.shape, ON_ROAD, dtype=np.uint32)
+    flags = np.full(frames.bits.shape, FLAG.ON_ROAD, dtype=np.uint32)
     flags[:, 0] = ego
     return replace(frames, bits=flags)
 
@@ -95,17 +95,17 @@ def bits(frames: Frames, ego: list[int]) -> Frames:
 def test_distance_and_standing() -> None:
     step = 0.5 / 30
     ego = [(step * k, 0.0) for k in range(46)] + [(step * 45, 0.0)] * 45
-    found = drive(bits(make_frames(make_instance(), ego), [ON_ROAD] * 91))
+    found = drive(bits(make_frames(make_instance(), ego), [FLAG.ON_ROAD] * 91))
     assert found.distance_m == pytest.approx(0.75, rel=1e-12)
     assert found.standing_share == 0.5
     assert found.off_road_s == 0.0
     creep = [(0.04 / 30 * k, 0.0) for k in range(61)]
-    assert drive(bits(make_frames(make_instance(), creep), [ON_ROAD] * 61)).standing_share == 1.0
+    assert drive(bits(make_frames(make_instance(), creep), [FLAG.ON_ROAD] * 61)).standing_share == 1.0
 
 
 def test_time_off_the_road_is_that_of_the_ticks_that_end_there() -> None:
     frames = make_frames(make_instance(), [ROAD] * 61)
-    found = drive(bits(frames, [0] + [ON_ROAD] * 30 + [STILL] * 15 + [ON_ROAD] * 15))
+    found = drive(bits(frames, [0] + [FLAG.ON_ROAD] * 30 + [FLAG.STILL] * 15 + [FLAG.ON_ROAD] * 15))
     assert (found.off_road_s, found.off_road_share) == (0.5, 0.25)
 
 
@@ -113,7 +113,10 @@ def test_departures_from_the_lane_count_while_others_move() -> None:
     instance = make_instance()
     moving = [(9.0 + 0.01 * k, 9.0) for k in range(31)] + [(9.3, 9.0)] * 30
     frames = make_frames(instance, [ROAD] * 61, moving)
-    left = [ON_ROAD | LEFT if k in (0, 1, 5, 6, 7, 20, 29, 30, 40, 50) else ON_ROAD for k in range(61)]
+    left = [
+        FLAG.ON_ROAD | FLAG.LEFT if k in (0, 1, 5, 6, 7, 20, 29, 30, 40, 50) else FLAG.ON_ROAD
+        for k in range(61)
+    ]
     assert drive(bits(frames, left)).lane_departures == 3, "those at frames 5, 20 and 29"
 
 

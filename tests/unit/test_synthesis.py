@@ -22,7 +22,7 @@ from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.export import save_game
 from dubins_traffic.synthesis.game import build, estimate
 from dubins_traffic.synthesis.play import Environment, play
-from dubins_traffic.synthesis.queues import OTHER
+from dubins_traffic.synthesis.queues import WHO
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.story import story_of
 from dubins_traffic.synthesis.strategy import Strategy
@@ -91,9 +91,11 @@ def test_whom_the_ego_blocks_at_a_bend_owes_nothing() -> None:
         owed = game.owed[game.owed_at[position] : game.owed_at[position + 1]].tolist()
         scenes = some.scenes(position)
         ego = int(game.ego_cell[position])
-        inside = [n for n, scene in enumerate(scenes) if scene.inside == OTHER]
+        inside = [n for n, scene in enumerate(scenes) if scene.inside == WHO.OTHER]
         waits = [
-            nodes + arena.nodes[n].inbound[0] for n, scene in enumerate(scenes) if (0, OTHER) in scene.queue
+            nodes + arena.nodes[n].inbound[0]
+            for n, scene in enumerate(scenes)
+            if (0, WHO.OTHER) in scene.queue
         ]
         for n in inside:
             excused = ego == arena.opposite(n) or ego in arena.following(n)
@@ -129,7 +131,7 @@ def test_a_place_may_be_given_up_at_any_time_but_once_in_a_wait() -> None:
     kind = some.scenery(0)
     for scene, row in zip(kind.scenes, kind.removed().tolist(), strict=True):
         for slot, who in scene.queue:
-            assert (row[slot] >= 0) is (who == OTHER)
+            assert (row[slot] >= 0) is (who == WHO.OTHER)
 
 
 def test_one_forfeit_a_wait_does_no_harm_and_any_number_does() -> None:

@@ -24,7 +24,7 @@ from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.schema import shipped_schema
 from dubins_traffic.record.reader import read
-from dubins_traffic.rules.propositions import STILL
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.vocabulary import Proposition, Vocabulary
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.formulas import FormulaVerdicts
@@ -224,7 +224,7 @@ def test_verdicts_of_a_trial(record: Path) -> None:
     assert said["goals"] == (least, None)
     assert said["never"] == ("false", 0.0)
     assert said["moves"][0] == "true"
-    still = kept.frames.bits[:, 0] & STILL != 0
+    still = kept.frames.bits[:, 0] & FLAG.STILL != 0
     assert said["moves"][1] == int(np.argmin(still)) / 30
     assert said["empty centre"][0] == "true"
 

@@ -17,11 +17,11 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.room import MARGIN
-from dubins_traffic.policies.rules.tables import ROLLING, ROUND, Driver, Drivers, Traffic, scratch
+from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Traffic, scratch
 from dubins_traffic.problem.kinds import COUNTER
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.propositions import CLEAR
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy
@@ -142,8 +142,8 @@ class CounterTeam:
         """Let the cars that are sent into an intersection enter it when it is clear, in whatever order."""
         for car in cars[1:]:
             enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
-            clear = car.propositions.bits & CLEAR != 0
-            self._drivers.car[0, car.car].violations = ROLLING if enters and clear else 0
+            clear = car.propositions.bits & FLAG.CLEAR != 0
+            self._drivers.car[0, car.car].violations = VIOLATION.ROLLING if enters and clear else 0
 
     def _send(self, car: Sighting) -> None:
         """Let the law take a car to its target."""
@@ -228,7 +228,7 @@ def _drivers(instance: Instance) -> Drivers:
     rows = table(Driver, (1, cars))
     for n, agent in enumerate(instance.e_agents, start=1):
         car = rows[0, n]
-        car.kind, car.first, car.last, car.place = ROUND, n, n + 1, n
+        car.kind, car.first, car.last, car.place = KIND.ROUND, n, n + 1, n
         car.speed = min(agent.parameters["speed"], problem.car.bounds.speed)
     net, goals = np.zeros(1, dtype=np.int64), np.full(cars, NO_GOAL, dtype=np.int64)
     prices = np.zeros((cars, problem.network.lanes))

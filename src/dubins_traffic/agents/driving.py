@@ -7,14 +7,13 @@ from dubins_traffic.agents.tables import Agent, Scene, Team
 from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.random import below
+from dubins_traffic.kernels.random import DRAW, below
 from dubins_traffic.policies.waypoint import pursue, turn_then_drive
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
 
 AIM = 0.6
 """How far along the lane's line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""
-TURN_DRAW = 1
 TIRES = 4.0
 """Mean time for which a car whose patience ended waits for its way to be clear before it turns round, seconds."""
 BACK = -0.99
@@ -53,7 +52,7 @@ def pose_of(state: State, b: int, n: int) -> Pose:
 def tires(tick: int, n: int, team: Team) -> bool:
     """Return whether a car that is barred turns round in this tick: at random, so that not all do at once."""
     bound = min(int(TIRES / team.period) + 1, 1 << 16)
-    return below(team.seed, team.trial, n, tick, TURN_DRAW, bound) == 0
+    return below(team.seed, team.trial, n, tick, DRAW.TURN, bound) == 0
 
 
 @jit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dubins_traffic.agents.driving import pose_of
 from dubins_traffic.agents.kinds import act
 from dubins_traffic.agents.sight import look
-from dubins_traffic.agents.tables import BARRED, SEES, TIGHT, WEARY, Agent, Scene
+from dubins_traffic.agents.tables import HELD, Agent, Scene
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit
@@ -35,8 +35,8 @@ def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
     for n in range(1, state.count[b]):
         held = hold(tick, pose_of(state, b, n), ego, work.held[n], agents.agent[b, n])
         speed, yaw_rate = act(b, n, tick, held, scene)
-        commands[b, n, 0] = speed if held & BARRED == 0 else 0.0
-        commands[b, n, 1] = yaw_rate if held & TIGHT == 0 else 0.0
+        commands[b, n, 0] = speed if held & HELD.BARRED == 0 else 0.0
+        commands[b, n, 1] = yaw_rate if held & HELD.TIGHT == 0 else 0.0
     return True
 
 
@@ -59,5 +59,5 @@ def hold(tick: int, pose: Pose, ego: Pose, held: int, agent: Agent) -> int:
     if agent.since < 0:
         agent.since = tick
     if agent.patience >= 0 and tick - agent.since >= agent.patience:
-        return held & (BARRED | TIGHT) | (WEARY if held & BARRED != 0 else 0)
-    return held & SEES | (BARRED if beside else 0)
+        return held & (HELD.BARRED | HELD.TIGHT) | (HELD.WEARY if held & HELD.BARRED != 0 else 0)
+    return held & HELD.SEES | (HELD.BARRED if beside else 0)

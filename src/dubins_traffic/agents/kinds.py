@@ -10,11 +10,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from dubins_traffic.agents.driving import drive, pose_of
 from dubins_traffic.agents.script import play, script_rows
-from dubins_traffic.agents.tables import SEES, WEARY, Agent, Scene
+from dubins_traffic.agents.tables import HELD, Agent, Scene
 from dubins_traffic.agents.trail import follow
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
@@ -26,8 +26,19 @@ from dubins_traffic.problem.kinds import parameters_of
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import EAgent, Instance
 
-DRIVES, FOLLOWS, PLAYS = range(3)
-"""What a car does, `Agent.does`: drives on lanes, follows the ego while that leads it, plays a script."""
+
+class _Does(NamedTuple):
+    """What a car does, `Agent.does`."""
+
+    DRIVES: int = 0
+    """On lanes."""
+    FOLLOWS: int = 1
+    """The ego while that leads it."""
+    PLAYS: int = 2
+    """A script."""
+
+
+DOES: Final = _Does()
 AS_FAR_AS_2016 = 3.5
 """Up to this far from its waypoint (metres, for w = 0.3 m) a car keeps the bearing tolerance of 2016."""
 WIDEST = 1.5
@@ -39,18 +50,18 @@ NEVER = 2**62
 
 @jit
 def act(b: int, n: int, tick: int, held: int, scene: Scene) -> tuple[float, float]:
-    """Return speed and yaw rate of an e-agent that `held` (bits of `tables.SEES` ...) does not hold."""
+    """Return speed and yaw rate of an e-agent that `held` (bits of `tables.HELD`) does not hold."""
     agent = scene.agents.agent[b, n]
-    free, seen = tick >= agent.begin and held & SEES == 0, False
-    if agent.does == PLAYS:
+    free, seen = tick >= agent.begin and held & HELD.SEES == 0, False
+    if agent.does == DOES.PLAYS:
         return play(tick, agent, scene.agents.script)
     pose = pose_of(scene.state, b, n)
-    if agent.does == FOLLOWS:
+    if agent.does == DOES.FOLLOWS:
         ego = pose_of(scene.state, b, EGO)
         seen, free, speed, yaw_rate = follow(tick, b, n, pose, ego, free, scene.agents)
         if not free:
             return speed, yaw_rate
-    return drive(b, n, tick, pose, seen, held & WEARY != 0, scene) if free else (0.0, 0.0)
+    return drive(b, n, tick, pose, seen, held & HELD.WEARY != 0, scene) if free else (0.0, 0.0)
 
 
 @dataclass
@@ -77,7 +88,7 @@ def _loop(instance: Instance, given: Parameters, agent: Agent, lists: Lists) -> 
 
 
 def _follow(instance: Instance, given: Parameters, agent: Agent, lists: Lists) -> None:  # noqa: ARG001
-    agent.does, agent.trail, agent.gap = FOLLOWS, 0, given["gap"]
+    agent.does, agent.trail, agent.gap = DOES.FOLLOWS, 0, given["gap"]
     if given["sensing_only"]:
         agent.sight = instance.problem.sensing_radius
 
@@ -89,7 +100,7 @@ def _parked(instance: Instance, given: Parameters, agent: Agent, lists: Lists) -
 
 
 def _scripted(instance: Instance, given: Parameters, agent: Agent, lists: Lists) -> None:
-    agent.does, agent.stop = PLAYS, 0.0
+    agent.does, agent.stop = DOES.PLAYS, 0.0
     agent.first = len(lists.script)
     lists.script += script_rows(given["commands"], instance.problem.rate)
     agent.last = len(lists.script)
@@ -123,7 +134,7 @@ def fill(instance: Instance, own: EAgent, agent: Agent, lists: Lists) -> None:
     stop = given["stop_range"]
     if stop > 0.0:
         stop = max(stop, car.body.reach + speed * instance.problem.period + MARGIN)
-    agent.does = DRIVES
+    agent.does = DOES.DRIVES
     agent.patience = -1 if patience is None else math.ceil(patience * rate - 1e-9)
     agent.offset = given["offset"] * car.lane_width
     agent.reached = given["waypoint_radius"]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dubins_traffic.agents.tables import Team
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.random import below
+from dubins_traffic.kernels.random import DRAW, below
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import FAR
-
-CHOICE_DRAW = 0
 
 
 @jit
@@ -21,7 +19,7 @@ def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick:
     arms, degree = roads.arms, roads.degree
     if degree[v] < 2:
         return lane ^ 1
-    pick = below(team.seed, team.trial, car, tick, CHOICE_DRAW, degree[v] - 1)
+    pick = below(team.seed, team.trial, car, tick, DRAW.LANE, degree[v] - 1)
     for k in range(degree[v]):
         if arms[v, k] != lane ^ 1:
             if pick == 0:

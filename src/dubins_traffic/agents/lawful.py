@@ -16,18 +16,7 @@ from dubins_traffic.kernels.records import Rows, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import (
-    ABSENT,
-    GOES,
-    LOOP,
-    NEMESIS,
-    ROUND,
-    Driver,
-    Drivers,
-    Traffic,
-    scratch,
-    vehicles_of,
-)
+from dubins_traffic.policies.rules.tables import GOES, KIND, Driver, Drivers, Traffic, scratch, vehicles_of
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
@@ -93,7 +82,7 @@ def pack_drivers(
     for b, (own, _) in enumerate(rounds):
         if len(own):
             ego = drivers[b, EGO]
-            ego.kind, ego.first, ego.last = ROUND, first, first + len(own)
+            ego.kind, ego.first, ego.last = KIND.ROUND, first, first + len(own)
             ego.speed = instances[b].problem.car.bounds.speed
             first += len(own)
     stage: list[int] = []
@@ -119,7 +108,7 @@ def drivers_of(
 ) -> Drivers:
     """Return the drivers of a batch, `cars` (B, N), on no way yet."""
     return Drivers(
-        active=(cars["kind"] != ABSENT).any(axis=1).astype(np.int64),
+        active=(cars["kind"] != KIND.ABSENT).any(axis=1).astype(np.int64),
         net=net,
         seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
         trial=np.array([instance.trial for instance in instances], dtype=np.int64),
@@ -146,7 +135,7 @@ def _fleet(instance: Instance, cars: int) -> _Fleet:
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
             _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])
-            if own.cars[n].kind == LOOP:
+            if own.cars[n].kind == KIND.LOOP:
                 own.loops.append((n, given["cycle"]))
             else:
                 own.goers.append(n)
@@ -161,7 +150,7 @@ def _defaults(kind: str) -> Mapping[str, Any]:
 def _describe(kind: str, given: Mapping[str, Any], fastest: float, car: Driver) -> None:
     """Fill the row of a car but for its stages."""
     car.speed = min(given["speed"], fastest)
-    car.kind = NEMESIS if kind == "nemesis" else GOES[given["goes"]]
+    car.kind = KIND.NEMESIS if kind == "nemesis" else GOES[given["goes"]]
     if kind == "lawful":
         car.departs = given["departs_after"]
         car.rolls, car.lefts, car.blocks = given["rolls"], given["left"], given["blocks"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.agents.tables import BARRED, SEES, TIGHT, Agent, Scene, Team
+from dubins_traffic.agents.tables import HELD, Agent, Scene, Team
 from dubins_traffic.cars.near import candidates
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.cars.tables import box_of
@@ -65,18 +65,18 @@ def consider(pose: Pose, team: Team, agent: Agent, box: Box) -> int:
     if not sees(x, y, c, s, stop, box):
         return 0
     if agent.patience < 0:
-        return SEES
-    bits = SEES
+        return HELD.SEES
+    bits = HELD.SEES
     half_length, rounding = team.half_length, team.rounding
     front = half_length + rounding + ELBOW + agent.speed * team.period
     side = team.half_width + rounding + SHOULDER
     if in_way(pose, front, side, box):
-        bits |= BARRED
+        bits |= HELD.BARRED
     if half_length > 0.0:
         px, py = nearest_in_box(x, y, box)
         room = team.span - stop + SHOULDER + box.rounding
         if (px - x) * (px - x) + (py - y) * (py - y) < room * room:
-            bits |= TIGHT
+            bits |= HELD.TIGHT
     return bits
 
 

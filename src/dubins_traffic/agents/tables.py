@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,21 @@ from dubins_traffic.roads.table import RoadTable
 
 NOBODY: Final = -1
 
-SEES, BARRED, TIGHT, WEARY = 1, 2, 4, 8
-"""What holds a car, bits of `Workspace.held`: something is nearer than the car stops at; in its way; too near to turn
-in place. BARRED and TIGHT are looked at only for cars whose patience can end; WEARY: it ended, and the car is barred.
-"""
+
+class _Held(NamedTuple):
+    """What holds a car, bits of `Workspace.held`. For cars whose patience can't end only SEES is looked at."""
+
+    SEES: int = 1
+    """Something is nearer than the car stops at."""
+    BARRED: int = 2
+    """Something is in its way."""
+    TIGHT: int = 4
+    """Something is too near to turn in place."""
+    WEARY: int = 8
+    """Its patience ended, and it is barred."""
+
+
+HELD: Final = _Held()
 
 STEP: Final = 0.1
 """Metres between two remembered points of the ego's path (for w = 0.3 m)."""

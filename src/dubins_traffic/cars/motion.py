@@ -5,6 +5,8 @@ Loops over trials and cars; the element functions are in `kernels.trig` and `ker
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 from dubins_traffic.cars.near import FEW, candidates
 from dubins_traffic.cars.partners import PARTNERS, VACANT, Meeting, Workspace, part
 from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
@@ -25,8 +27,19 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
-MOVED, FULL, CROWDED = range(3)
-"""What became of a trial: it has moved; there is no room for its contacts; there is none for its pairs."""
+
+class _Outcome(NamedTuple):
+    """What became of a trial in a tick."""
+
+    MOVED: int = 0
+    """It has moved."""
+    FULL: int = 1
+    """There is no room for its contacts."""
+    CROWDED: int = 2
+    """There is none for its pairs."""
+
+
+OUTCOME: Final = _Outcome()
 
 
 class Motion(Tables):
@@ -85,12 +98,12 @@ def step_trial(b: int, dt: float, least: float, commands: Floats, motion: Motion
     """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
 
     No two cars are nearer to each other than `least` (m), or nothing is known of that (0).
-    Returns MOVED, or what is too small, FULL for the buffer of contacts or CROWDED for that of pairs: then nothing
+    Returns what became of it, an `OUTCOME`. If the buffer of contacts or that of pairs is too small, nothing
     has moved.
     """
     state, work = motion.state, motion.work
     if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
-        return FULL
+        return OUTCOME.FULL
     clip(motion.rows, b, commands[b], state.speed[b], state.yaw_rate[b], 0, state.count[b])
     return _move_trial(b, dt, least, motion)
 
@@ -104,7 +117,7 @@ def step_part(dt: float, arcs: Floats, stands: Ints, motion: Motion) -> int:
     """
     state, work = motion.state, motion.work
     if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
-        return FULL
+        return OUTCOME.FULL
     clip(motion.rows, 0, arcs[0], state.speed[0], state.yaw_rate[0], 0, state.count[0])
     for n in range(state.count[0]):
         work.until[n] = NEVER
@@ -127,11 +140,11 @@ def _move_trial(b: int, dt: float, least: float, motion: Motion) -> int:
     if close:
         pairs = candidates(b, 2.0 * r.far[b], r.far[b], state, obstacles, work.search)
         if pairs > work.search.pair.shape[0]:
-            return CROWDED
+            return OUTCOME.CROWDED
     if pairs > 0:
         _resolve(b, pairs, dt, motion)
         part(state, motion.cars, obstacles, work, b)
-        return MOVED
+        return OUTCOME.MOVED
     x, y, c, s, speed, yaw = state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b]
     if n % TOGETHER == 0:
         move_fours(x, y, c, s, speed, yaw, dt)
@@ -140,7 +153,7 @@ def _move_trial(b: int, dt: float, least: float, motion: Motion) -> int:
         move(x[:k], y[:k], c[:k], s[:k], speed[:k], yaw[:k], dt)
     if work.touching[b] > 0:
         part(state, motion.cars, obstacles, work, b)
-    return MOVED
+    return OUTCOME.MOVED
 
 
 @jit

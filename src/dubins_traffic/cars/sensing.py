@@ -14,13 +14,10 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.random import bell
+from dubins_traffic.kernels.random import DRAW, bell
 from dubins_traffic.kernels.records import Rows, numbers, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import sincos
-
-POSITION_DRAW = 200
-HEADING_DRAW = 206
 
 
 @record
@@ -150,9 +147,9 @@ def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: flo
     for k in range(count):
         pose = seen.poses[k]
         car = seen.labels[k].car
-        pose.x += position * bell(seed, trial, car, tick, POSITION_DRAW)
-        pose.y += position * bell(seed, trial, car, tick, POSITION_DRAW + 3)
-        c, s = sincos(heading * bell(seed, trial, car, tick, HEADING_DRAW))
+        pose.x += position * bell(seed, trial, car, tick, DRAW.POSITION)
+        pose.y += position * bell(seed, trial, car, tick, DRAW.POSITION + 3)
+        c, s = sincos(heading * bell(seed, trial, car, tick, DRAW.HEADING))
         pose.c, pose.s = pose.c * c - pose.s * s, pose.s * c + pose.c * s
 
 

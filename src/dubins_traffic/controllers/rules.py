@@ -11,15 +11,7 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import (
-    ROUND,
-    Driver,
-    Drivers,
-    Scratch,
-    Traffic,
-    scratch,
-    vehicles_of,
-)
+from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Scratch, Traffic, scratch, vehicles_of
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.routing.lane_graph import nearest_stage
@@ -57,7 +49,7 @@ class Rules:
             return
         rows = table(Driver, (1, cars))
         ego = rows[0, EGO]
-        ego.kind, ego.first, ego.last = ROUND, 0, len(stage)
+        ego.kind, ego.first, ego.last = KIND.ROUND, 0, len(stage)
         ego.speed = problem.car.bounds.speed
         self._drivers = Drivers(
             active=np.ones(1, dtype=np.int64),

@@ -6,11 +6,13 @@ memory. The order of events in a tick is that of `docs/semantics.md`.
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.tables import Scene
-from dubins_traffic.cars.motion import FULL, MOVED, Motion, step_trial
+from dubins_traffic.cars.motion import OUTCOME, Motion, step_trial
 from dubins_traffic.cars.near import keep_apart, lost
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -28,9 +30,29 @@ from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
 from dubins_traffic.scoring.tally import count_frame
 from dubins_traffic.scoring.tally_tables import Counted
 
-RUNNING, ENDED, COLLIDED, FAULTY, NO_CONTACTS, NO_PAIRS, NO_SIGHT, NO_DOCKET = range(8)
-"""Why a trial stands still: for nothing; its time is up; the ego collided; an e-agent asked for a command that is not
-finite; there is no room for contacts, for pairs that may meet, for pairs that may see each other, for breaches."""
+
+class _Status(NamedTuple):
+    """Why a trial stands still, `Progress.status`."""
+
+    RUNNING: int = 0
+    """It does not."""
+    ENDED: int = 1
+    """Its time is up."""
+    COLLIDED: int = 2
+    """The ego collided."""
+    FAULTY: int = 3
+    """An e-agent asked for a command that is not finite."""
+    NO_CONTACTS: int = 4
+    """There is no room for contacts."""
+    NO_PAIRS: int = 5
+    """There is none for pairs that may meet."""
+    NO_SIGHT: int = 6
+    """There is none for pairs that may see each other."""
+    NO_BREACHES: int = 7
+    """There is none for breaches."""
+
+
+STATUS: Final = _Status()
 
 
 @record
@@ -42,7 +64,7 @@ class TrialProgress:
     last: int
     """The last one."""
     status: int
-    """RUNNING, or why it stands still."""
+    """`STATUS`: why it stands still, if it does."""
     decided: int
     """1 if the commands for the next tick are chosen already."""
     lawful: int
@@ -125,9 +147,9 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
     for k in range(active.shape[0]):
         b: int = active[k]
         own = world.progress.trial[b]
-        own.status = RUNNING
+        own.status = STATUS.RUNNING
         for _ in range(most):
-            if own.status != RUNNING:
+            if own.status != STATUS.RUNNING:
                 break
             _advance(b, dt, commands, own, world)
 
@@ -137,18 +159,18 @@ def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: Wor
     """Take trial b from its present frame to the next one, or say why not in `own.status`."""
     tick = own.tick
     if world.breach_log.filled[0] + _room(b, world) > world.breach_log.row.shape[0]:
-        own.status = NO_DOCKET
+        own.status = STATUS.NO_BREACHES
         return
     ego_hit = False
     if tick >= 0:
         _decide(b, tick, commands, own, world)
-        if own.status != RUNNING:
+        if own.status != STATUS.RUNNING:
             return
         before = world.work.found[0]
         least = world.spacing.least[b] - lost(world.spacing, b, tick)
         moved = step_trial(b, dt, least, commands, world)
-        if moved != MOVED:
-            own.status = NO_CONTACTS if moved == FULL else NO_PAIRS
+        if moved != OUTCOME.MOVED:
+            own.status = STATUS.NO_CONTACTS if moved == OUTCOME.FULL else STATUS.NO_PAIRS
             return
         own.decided = 0
         if world.work.found[0] > before:
@@ -160,9 +182,9 @@ def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: Wor
     if ego_hit:
         world.tally.trial[b].sealed = 1
     if tick + 1 >= own.last:
-        own.status = ENDED
+        own.status = STATUS.ENDED
     elif ego_hit and own.ends != 0:
-        own.status = COLLIDED
+        own.status = STATUS.COLLIDED
 
 
 @jit_inline
@@ -178,10 +200,10 @@ def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: Worl
         return
     if own.others != 0:
         if not decide_others(b, tick, world, commands):
-            own.status = NO_SIGHT
+            own.status = STATUS.NO_SIGHT
             return
         if not _are_finite(b, commands):
-            own.status = FAULTY
+            own.status = STATUS.FAULTY
     if own.lawful != 0:
         spacing = world.spacing
         decide_lawful(

@@ -17,11 +17,7 @@ from dubins_traffic.cars.partners import enlarged
 from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
-    COLLIDED,
-    ENDED,
-    FAULTY,
-    NO_PAIRS,
-    NO_SIGHT,
+    STATUS,
     BreachPlace,
     ContactNote,
     Progress,
@@ -36,7 +32,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.kernels.records import table
-from dubins_traffic.policies.rules.tables import ROUND, scratch
+from dubins_traffic.policies.rules.tables import KIND, scratch
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
@@ -278,7 +274,7 @@ class Group:
         world = self._world
         drivers, labels = world.drivers, world.labels
         world.progress.trial["lawful"] = drivers.active
-        for b in np.flatnonzero(drivers.car["kind"][:, EGO] == ROUND).tolist():
+        for b in np.flatnonzero(drivers.car["kind"][:, EGO] == KIND.ROUND).tolist():
             own = drivers.car[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
             own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
@@ -308,16 +304,16 @@ class Group:
     def _mind(self, active: Ints) -> None:
         """Enlarge what was too small, and write down how trials ended."""
         status = self._world.progress.trial["status"][active]
-        if (status == NO_PAIRS).any():
+        if (status == STATUS.NO_PAIRS).any():
             self._world = self._world.replace(work=enlarged(self._world.work))
-        if (status == NO_SIGHT).any():
+        if (status == STATUS.NO_SIGHT).any():
             self._world = self._world.replace(space=wider(self._world.space))
         for b, why in zip(map(int, active), status.tolist(), strict=True):
-            if why == ENDED:
+            if why == STATUS.ENDED:
                 self.end(b, End.DURATION)
-            elif why == FAULTY:
+            elif why == STATUS.FAULTY:
                 self.end(b, End.AGENT_FAULT, agent_fault(self.instances[b], self.commands[b]))
-            elif why == COLLIDED:
+            elif why == STATUS.COLLIDED:
                 tick = int(self.ticks[b])
                 mine = [own for own in self._contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
                 self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))

@@ -28,15 +28,14 @@ from numba.core import codegen, config, targetconfig, types  # pyright: ignore[r
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
+from dubins_traffic.kernels.codes import take_as_numbers
 from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of, is_place
 from dubins_traffic.kernels.pointers import TablesType
 
 OURS = "dubins_traffic"
 """Part of the names of our compiled functions."""
-
 RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""
-
 FOREIGN = ("numba", "NRT", "Py", "_Py")
 """How the names of functions begin that only a process with Numba or for Python has."""
 
@@ -76,6 +75,7 @@ class Compiler:
         self._codegen.set_env = _leave
         _index_plainly()
         _compare_quickly()
+        take_as_numbers()
         gc.set_threshold(SELDOM)
 
     def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:

@@ -1,25 +1,45 @@
 """Random numbers inside kernels: functions of (seed, trial, car, tick, draw) and of nothing else.
 
-`draw` numbers the purposes within one car and tick; each room that draws keeps its own range of them
-(agents 0-99, controllers 100-199, disturbances 200-299).
+`draw` numbers the purposes within one car and tick: `DRAW`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.philox import HALF, LOW
 from dubins_traffic.kernels.philox import philox4x32 as _plain_philox
 
 philox4x32 = jit(_plain_philox)
 
-LOW = np.uint64(0xFFFFFFFF)
-HALF = np.uint64(32)
 UP = np.uint64(21)
 DOWN = np.uint64(11)
 GRID = 2.0**-53
+
+
+class _Draw(NamedTuple):
+    """The first number that is drawn for each purpose; those of e-agents are below 100, of disturbances from 200."""
+
+    LANE: int = 0
+    """The lane in which an e-agent that wanders leaves an intersection."""
+    TURN: int = 1
+    """Whether an e-agent whose patience ended turns round."""
+    RULES: int = 20
+    """What cars by the rules do, eleven numbers: exits take four, violations six, places one."""
+    POSITION: int = 200
+    """Noise of a sensed position, six numbers."""
+    HEADING: int = 206
+    """Noise of a sensed heading, three numbers."""
+    LOSS: int = 250
+    """Whether a command is lost."""
+    PLAY: int = 300
+    """What the environment of a game does."""
+
+
+DRAW: Final = _Draw()
 
 
 @jit

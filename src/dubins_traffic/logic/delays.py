@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import record
 from dubins_traffic.logic.formula import (
     FUTURE,
     Formula,
@@ -51,6 +52,18 @@ class Delayed:
     strong: bool
     name: str
     formula: Formula
+
+
+@record
+class Requests:
+    """What a delay line holds."""
+
+    state: int
+    """Of its table."""
+    place: int
+    """In its ring."""
+    waiting: int
+    """How many requests wait."""
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,8 @@ from typing import NamedTuple
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-
-STATE = 0
-PLACE = 1
-WAITING = 2
+from dubins_traffic.kernels.records import Grid
+from dubins_traffic.logic.delays import Requests
 
 
 class Tables(NamedTuple):
@@ -81,7 +79,7 @@ class Lines(NamedTuple):
 
 
 @jit
-def delay(values: Ints, lines: Lines, memory: Ints, rings: Ints) -> None:
+def delay(values: Ints, lines: Lines, memory: Grid[Requests], rings: Ints) -> None:
     """Take one frame of every trial into the delay lines.
 
     Parameters
@@ -90,8 +88,8 @@ def delay(values: Ints, lines: Lines, memory: Ints, rings: Ints) -> None:
         The propositions, 0 or 1; the last D columns are set: the requests that come out.
     lines : Lines
         The delay lines.
-    memory : (B, D, 3) int64
-        State of the table, place in the ring, how many requests wait; updated.
+    memory : (B, D) Requests
+        Updated.
     rings : (B, R) int64
         The requests that wait; updated.
     """
@@ -103,20 +101,23 @@ def delay(values: Ints, lines: Lines, memory: Ints, rings: Ints) -> None:
             for i in range(first, lines.names_off[d + 1]):
                 valuation |= (values[b, lines.names[i]] & 1) << (i - first)
             letter = lines.letter[lines.letter_at[d] + valuation]
-            cell = memory[b, d, STATE] * lines.letters[d] + letter + lines.cell_at[d]
-            memory[b, d, STATE] = lines.target[cell]
-            place = lines.ring_off[d] + memory[b, d, PLACE]
+            own = memory[b, d]
+            cell = own.state * lines.letters[d] + letter + lines.cell_at[d]
+            own.state = int(lines.target[cell])
+            place = lines.ring_off[d] + own.place
             out = rings[b, place]
             rings[b, place] = lines.value[cell]
-            memory[b, d, WAITING] += lines.value[cell] - out
-            memory[b, d, PLACE] += 1
+            own.waiting += lines.value[cell] - out
+            own.place += 1
             if place + 1 == lines.ring_off[d + 1]:
-                memory[b, d, PLACE] = 0
+                own.place = 0
             values[b, values.shape[1] - count + d] = out
 
 
 @jit
-def advance(values: Ints, tables: Tables, memory: Ints, state: Ints, clocks: Ints, verdicts: Ints) -> None:
+def advance(
+    values: Ints, tables: Tables, memory: Grid[Requests], state: Ints, clocks: Ints, verdicts: Ints
+) -> None:
     """Take one frame of every trial into account.
 
     Parameters
@@ -125,7 +126,7 @@ def advance(values: Ints, tables: Tables, memory: Ints, state: Ints, clocks: Int
         The propositions, 0 or 1, and the delayed requests.
     tables : Tables
         The monitors.
-    memory : (B, D, 3) int64
+    memory : (B, D) Requests
         Of the delay lines (`delay`).
     state : (B, M) int64
         Updated.
@@ -160,7 +161,7 @@ def advance(values: Ints, tables: Tables, memory: Ints, state: Ints, clocks: Int
             state[b, m] = target
             verdict = tables.verdict[tables.verdict_at[m] + target]
             watch = tables.watch[m]
-            if verdict == 2 and watch >= 0 and memory[b, watch, WAITING] > 0:
+            if verdict == 2 and watch >= 0 and memory[b, watch].waiting > 0:
                 verdict = 1
             formula = tables.part_of[m]
             verdicts[b, formula] = min(verdicts[b, formula], verdict)

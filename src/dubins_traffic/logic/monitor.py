@@ -25,8 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.records import table
 from dubins_traffic.logic.automaton import Automaton, Limits, automaton
-from dubins_traffic.logic.delays import Line, delayed, line
+from dubins_traffic.logic.delays import Line, Requests, delayed, line
 from dubins_traffic.logic.formula import (
     FUTURE,
     PAST,
@@ -292,7 +293,7 @@ class Monitors:
         tables = self._tables
         self._state = np.zeros((trials, self.tables), dtype=np.int64)
         self._clocks = np.zeros((trials, len(tables["clock_length"])), dtype=np.int64)
-        self._memory = np.zeros((trials, len(self._delays), 3), dtype=np.int64)
+        self._memory = table(Requests, (trials, len(self._delays)))
         self._rings = np.zeros((trials, sum(length for _, length in self._delays)), dtype=np.int64)
         self._frame = np.zeros((trials, len(self._column) + len(self._delays)), dtype=np.int64)
         first = np.full(len(self.formulas), 3, dtype=np.int64)

@@ -12,14 +12,12 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.random import GRID, block
+from dubins_traffic.kernels.random import DOWN, GRID, UP, block
 from dubins_traffic.problem.places import SLACK, Places
 from dubins_traffic.problem.starts import Ground, Wish, gap_radius
 
 NO_CAR = np.uint64(0xFFFFFFFF)
 """Stands where a running trial's random numbers have a car (`kernels.philox.Draws`)."""
-UP = np.uint64(21)
-DOWN = np.uint64(11)
 CUTS = 24
 """Room for so many more intervals for each car; where more are cut the trial is drawn without compiled code."""
 

@@ -15,8 +15,7 @@ PAIRS_AT_ONCE = 1 << 21
 class RoadRaster(NamedTuple):
     """Cells over the box of `Surface.cells`: cell (cx, cy) has the number cy * nx + cx.
 
-    ``pave`` holds OFF where no point of the cell is on the road, ON where all are, else the number of the only
-    segment whose road meets the cell, or MIXED where there are several.
+    ``pave`` holds the number of the only segment whose road meets the cell, or a `road_raster.CELL`.
     """
 
     scale: float

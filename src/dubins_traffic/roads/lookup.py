@@ -11,7 +11,7 @@ from math import sqrt
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import record
-from dubins_traffic.roads.road_raster import MIXED, ON
+from dubins_traffic.roads.road_raster import CELL
 from dubins_traffic.roads.table import RoadTable
 
 CERTAIN = 1e-6
@@ -72,15 +72,15 @@ def on_road(t: RoadTable, net: int, x: float, y: float) -> bool:
     grid = t.grid[net]
     u = (x - grid.x0) * grid.pave_scale
     v = (y - grid.y0) * grid.pave_scale
-    pave: int = MIXED
+    pave: int = CELL.MIXED
     if u >= 0.0 and v >= 0.0 and u < grid.pave_nx and v < grid.pave_ny:
         pave = int(t.pave[grid.pave_first + int(v) * grid.pave_nx + int(u)])
     least = INFINITE
-    if pave == ON:
+    if pave == CELL.ON:
         least = 0.0
     elif pave >= 0:
         least = distance2(t, net, pave, x, y)
-    elif pave == MIXED:
+    elif pave == CELL.MIXED:
         _, least = nearest_segment(t, net, x, y)
     return least <= t.half_width[net] * t.half_width[net]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, sqrt
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 import numpy as np
 
@@ -11,10 +11,21 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.cells import RoadRaster, covered
 from dubins_traffic.roads.surface import Surface
 
-OFF: Final = -1
-ON: Final = -2
-MIXED: Final = -3
 CELLS_PER_SEGMENT: Final = 256.0
+
+
+class _Cell(NamedTuple):
+    """What stands in a cell of `RoadRaster.pave` in place of the number of a segment."""
+
+    OFF: int = -1
+    """No point of it is on the road."""
+    ON: int = -2
+    """All are."""
+    MIXED: int = -3
+    """The roads of several segments meet it."""
+
+
+CELL: Final = _Cell()
 
 
 def road_raster(surface: Surface, half_width: float) -> RoadRaster:
@@ -42,13 +53,13 @@ def _drawn(surface: Surface, half_width: float) -> RoadRaster:
     reach = sqrt(0.5) * side + slack
     keep = distance <= half_width + reach
     number, item, x, y = (cy * nx + cx)[keep], item[keep], x[keep], y[keep]
-    paved = np.full(nx * ny, OFF, dtype=np.int64)
+    paved = np.full(nx * ny, CELL.OFF, dtype=np.int64)
     paved[number] = item
-    paved[np.bincount(number, minlength=nx * ny) > 1] = MIXED
+    paved[np.bincount(number, minlength=nx * ny) > 1] = CELL.MIXED
     whole = np.ones(len(number), dtype=np.bool_)
     inner = max(0.0, half_width - slack)
     for dx in (-0.5, 0.5):
         for dy in (-0.5, 0.5):
             whole &= surface.distance2(x + dx * side, y + dy * side, item) < inner * inner
-    paved[number[whole]] = ON
+    paved[number[whole]] = CELL.ON
     return RoadRaster(1.0 / side, nx, ny, paved)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -20,25 +20,32 @@ from dubins_traffic.rules.tables import GRAIN, Memory, TrialRules, ticks
 if TYPE_CHECKING:
     from dubins_traffic.rules.parameters import RuleParameters
 
-COLLISION: Final = 0
-ROAD: Final = 1
-LEFT_UNBLOCKED: Final = 2
-RETURN: Final = 3
-STOP: Final = 4
-ORDER: Final = 5
-CLEARANCE: Final = 6
-FAULT: Final = 7
-ENTER: Final = 8
-TICKETS: Final = 9
-EXIT: Final = 10
-REST: Final = 11
-GOAL: Final = 12
+
+class _Rule(NamedTuple):
+    """The rules by number; `RULES` has their names. Rules 2 and 3 of an e-agent are E1."""
+
+    COLLISION: int = 0
+    ROAD: int = 1
+    LEFT_UNBLOCKED: int = 2
+    RETURN: int = 3
+    STOP: int = 4
+    ORDER: int = 5
+    CLEARANCE: int = 6
+    FAULT: int = 7
+    ENTER: int = 8
+    TICKETS: int = 9
+    EXIT: int = 10
+    REST: int = 11
+    GOAL: int = 12
+
+
+RULE: Final = _Rule()
 
 RULES: Final[tuple[str, ...]] = (
     "1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear",
     "E2", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 )  # fmt: skip
-"""Names of the rules, by number. Rules 2 and 3 of an e-agent are E1."""
+"""Names of the rules, by number."""
 
 MOST: Final = 10
 """Most breaches that one car can begin in one frame."""

@@ -9,29 +9,16 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
-    CLEARANCE,
-    ENTER,
-    LEFT_UNBLOCKED,
     NEVER_DUE,
-    ORDER,
-    RETURN,
-    ROAD,
-    STOP,
-    TICKETS,
+    RULE,
     BreachLog,
     JudgedCar,
     RefereeParameters,
     RefereeTables,
 )
-from dubins_traffic.rules.propositions import (
-    AHEAD,
-    CLEAR,
-    FIRST,
-    LEFT,
-    OVERTAKING,
-)
+from dubins_traffic.rules.propositions import FLAG
 
-GOES = FIRST | CLEAR
+GOES = FLAG.FIRST | FLAG.CLEAR
 
 
 @jit
@@ -73,12 +60,12 @@ def judge_lane(
     car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
 ) -> None:
     """Rule 2: left only while overtaking, and for a while. `bits` and `lane` are the car's in this frame."""
-    car.left_since = run(bits & LEFT != 0, tick, car.left_since)
-    car.unblocked_since = run(bits & (LEFT | OVERTAKING) == LEFT, tick, car.unblocked_since)
+    car.left_since = run(bits & FLAG.LEFT != 0, tick, car.left_since)
+    car.unblocked_since = run(bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT, tick, car.unblocked_since)
     if lasted(tick, car.unblocked_since) == 0:
-        add(log, car, LEFT_UNBLOCKED, tick, car.left_since, -1, lane)
+        add(log, car, RULE.LEFT_UNBLOCKED, tick, car.left_since, -1, lane)
     if lasted(tick, car.left_since) == terms.return_ticks:
-        add(log, car, RETURN, tick, car.left_since, -1, lane)
+        add(log, car, RULE.RETURN, tick, car.left_since, -1, lane)
 
 
 @jit
@@ -90,13 +77,13 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
     log, near = tables.log, tables.spacing.near
     car = log.car[b, n]
     if not stopped:
-        add(log, car, STOP, tick, tick, v, car.lane)
-    elif car.bits & AHEAD != 0:
-        add(log, car, ORDER, tick, tick, v, car.lane)
+        add(log, car, RULE.STOP, tick, tick, v, car.lane)
+    elif car.bits & FLAG.AHEAD != 0:
+        add(log, car, RULE.ORDER, tick, tick, v, car.lane)
     for i in range(count):
         k = near[i]
         if k != n and log.car[b, k].crosses == v:
-            add(log, car, CLEARANCE, tick, tick, v, car.lane)
+            add(log, car, RULE.CLEARANCE, tick, tick, v, car.lane)
             return
 
 
@@ -107,7 +94,7 @@ def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -
         car.off_road = -1
     elif car.off_road == -1:
         car.off_road = tick
-        add(log, car, ROAD, tick, tick, -1, lane)
+        add(log, car, RULE.ROAD, tick, tick, -1, lane)
 
 
 @jit
@@ -120,9 +107,9 @@ def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> Non
     car, lane = log.car[b, n], tables.labels.lane[b, n]
     car.first_since = run(tables.labels.bits[b, n] & GOES == GOES, tick, car.first_since)
     if lasted(tick, car.first_since) == terms.enter_ticks:
-        add(log, car, ENTER, tick, car.first_since, v, lane)
+        add(log, car, RULE.ENTER, tick, car.first_since, v, lane)
     if kept.forfeits == terms.most_tickets + 1 and kept.ticket == tick:
-        add(log, car, TICKETS, tick, kept.wait_since, v, lane)
+        add(log, car, RULE.TICKETS, tick, kept.wait_since, v, lane)
 
 
 @jit_inline

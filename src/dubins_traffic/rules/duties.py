@@ -12,13 +12,13 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
-from dubins_traffic.rules.breach_log import EXIT, GOAL, NEVER_DUE, REST, RefereeTables
+from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, RefereeTables
 from dubins_traffic.rules.breaches import GOES, add, at_goal, judge_queue, lasted, run, when_due
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
-from dubins_traffic.rules.propositions import BLOCKED, EXCUSED, LINGERS, STANDS, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
 
-WAITS = STANDS | LINGERS | EXCUSED | STOPPED
+WAITS = FLAG.STANDS | FLAG.LINGERS | FLAG.EXCUSED | FLAG.STOPPED
 """Flags of a car that is no reason to expect the one behind it to go on."""
 
 
@@ -31,7 +31,7 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     log, terms, labels = tables.log, tables.terms[b], tables.labels
     car, lane, v = log.car[b, n], labels.lane[b, n], labels.crosses[b, n]
     bits = np.int64(labels.bits[b, n])
-    if bits & STOPPED != 0:
+    if bits & FLAG.STOPPED != 0:
         judge_queue(b, n, tick, lane_end(tables.roads, tables.rules[b].net, lane), tables)
     else:
         car.first_since = -1
@@ -41,13 +41,13 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     due = when_due(tick, car.first_since, terms.enter_ticks)
     if v >= 0:
         due = min(due, _judge_exit(b, n, tick, v, tables))
-    free = bits & LINGERS != 0
+    free = bits & FLAG.LINGERS != 0
     if free:
         due = tick + 1
         free = has_way(b, n, tick, tables)
     car.rest_since = run(free, tick, car.rest_since)
     if lasted(tick, car.rest_since) == terms.rest_ticks:
-        add(log, car, REST, tick, car.rest_since, -1, lane)
+        add(log, car, RULE.REST, tick, car.rest_since, -1, lane)
     return due
 
 
@@ -74,7 +74,7 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
         car.exit_paused += 1
     ago = terms.exit_ticks + car.exit_paused
     if long >= 0 and long == ago and (long == 0 or not paused):
-        add(log, car, EXIT, tick, car.exit_since, v, tables.labels.lane[b, n])
+        add(log, car, RULE.EXIT, tick, car.exit_since, v, tables.labels.lane[b, n])
     car.exit_counts = -1 if paused else car.exit_since
     if paused:
         return tick + 1
@@ -88,7 +88,7 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
-    if lane < 0 or bits & BLOCKED != 0 or (bits & STOPPED != 0 and bits & GOES != GOES):
+    if lane < 0 or bits & FLAG.BLOCKED != 0 or (bits & FLAG.STOPPED != 0 and bits & GOES != GOES):
         return False
     here = row[n].progress
     for k in range(state.count[b]):
@@ -137,7 +137,7 @@ def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
             goal.paused += 1
         ago = terms.goal_ticks + goal.paused
         if long == ago and (long == 0 or not paused):
-            add(log, log.car[b, who], GOAL, tick, goal.since, goal.vertex, -1)
+            add(log, log.car[b, who], RULE.GOAL, tick, goal.since, goal.vertex, -1)
         due = min(due, again, when_due(tick, goal.since, ago))
     log.goal_due[b] = due
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from dubins_traffic.cars.state import Contact
 from dubins_traffic.kernels.arrays import Bits
-from dubins_traffic.rules.propositions import BREACH3, LEFT, OVERTAKING
+from dubins_traffic.rules.propositions import FLAG
 
 
 def in_breach(bits: int) -> bool:
     """Tell whether a car breaks rule 2 or 3: left and not overtaking, or in a disc entered against rule 3."""
-    return bits & (LEFT | OVERTAKING) == LEFT or bits & BREACH3 != 0
+    return bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT or bits & FLAG.BREACH3 != 0
 
 
 def with_fault(contact: Contact, bits: Bits) -> Contact:

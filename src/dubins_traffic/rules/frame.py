@@ -19,29 +19,13 @@ from dubins_traffic.roads.lookup import (
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.label_cache import holds_on, look_who_holds
 from dubins_traffic.rules.location import locate, moved2, put_in_order
-from dubins_traffic.rules.propositions import (
-    AHEAD,
-    APPROACH,
-    BLOCKED,
-    CLEAR,
-    ENTERED,
-    EXCUSED,
-    FIRST,
-    FORFEITED,
-    IN_CROSSING,
-    LEFT,
-    LINGERS,
-    OVERTAKING,
-    STANDS,
-    STILL,
-    STOPPED,
-)
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.queue import Queue, foremost, gather, keep_order
 from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.rules.tables import CarMemory, LabelTables
 
-LONG = STILL | LINGERS
-BESIDE = LONG | LEFT | OVERTAKING
+LONG = FLAG.STILL | FLAG.LINGERS
+BESIDE = LONG | FLAG.LEFT | FLAG.OVERTAKING
 """Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
 
 
@@ -76,7 +60,7 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
     for k in range(cars if stirred else count):
         n = k if stirred else due[k]
         some |= _stop(b, n, tick, tables)
-    if some & STOPPED != 0:
+    if some & FLAG.STOPPED != 0:
         _queue_up(b, tick, tables)
     elif some & LONG != 0:
         for n in range(cars):
@@ -93,7 +77,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
     bits, lanes = labels.bits[b], labels.lane[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
-        if bits[n] & STOPPED == 0:
+        if bits[n] & FLAG.STOPPED == 0:
             continue
         v = lane_end(t, own.net, lanes[n])
         if head[v].queue == n:
@@ -111,7 +95,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
         elif head[lane].lane == n:
             _excuse(n, own.excuse, row, bits)
     for n in range(cars):
-        if bits[n] & STOPPED != 0:
+        if bits[n] & FLAG.STOPPED != 0:
             head[lane_end(t, own.net, lanes[n])].queue = -1
 
 
@@ -144,38 +128,38 @@ def _stop(b: int, n: int, tick: int, tables: LabelTables) -> Any:
     gap2 = car.gap2
     lane: int = labels.lane[b, n]
     crosses: int = labels.crosses[b, n]
-    bits = np.int64(labels.bits[b, n]) & ~CLEAR
+    bits = np.int64(labels.bits[b, n]) & ~FLAG.CLEAR
     car.rank = -1
-    left = LEFT if car.reach > own.left_set else 0
+    left = FLAG.LEFT if car.reach > own.left_set else 0
     if gap2 < 0.0:
-        if bits & IN_CROSSING != 0 and head[crosses].crossers == 1:
-            bits |= CLEAR
-        bits &= ~STOPPED
+        if bits & FLAG.IN_CROSSING != 0 and head[crosses].crossers == 1:
+            bits |= FLAG.CLEAR
+        bits &= ~FLAG.STOPPED
         labels.bits[b, n] = bits
         return bits | left
     v = lane_end(tables.roads, own.net, lane)
     ahead = head[v]
     if ahead.crossers == (1 if crosses == v else 0):
-        bits |= CLEAR
+        bits |= FLAG.CLEAR
     outside = gap2 >= own.cross2
     if not outside:
         car.wait_since = -1
     if not outside or gap2 > own.queue2:
-        bits &= ~STOPPED
+        bits &= ~FLAG.STOPPED
     if outside and gap2 <= own.stop2 and foremost(n, head[lane].lane, row, own):
         if gap2 <= own.approach2:
-            bits |= APPROACH
+            bits |= FLAG.APPROACH
         if car.approach_since < 0:
             car.approach_since = tick
         ago = own.stop_ticks
-        if bits & STOPPED == 0 and tick - car.approach_since >= ago:
+        if bits & FLAG.STOPPED == 0 and tick - car.approach_since >= ago:
             x, y = tables.state.x[b, n], tables.state.y[b, n]
             if moved2(b, n, tick, ago, x, y, memory) <= own.stop_move2:
-                bits |= STOPPED
+                bits |= FLAG.STOPPED
                 _give_ticket(car, tick)
     else:
         car.approach_since = -1
-    if bits & STOPPED != 0:
+    if bits & FLAG.STOPPED != 0:
         car.next_in_queue = ahead.queue
         ahead.queue = n
     labels.bits[b, n] = bits
@@ -200,8 +184,8 @@ def _flag_queue(first: int, cars: Rows[CarMemory], bits: Any) -> None:
     n = first
     while n >= 0:
         car = cars[n]
-        flags = FIRST if car.rank == 0 else AHEAD
-        flags |= FORFEITED if car.forfeits > 0 else EXCUSED
+        flags = FLAG.FIRST if car.rank == 0 else FLAG.AHEAD
+        flags |= FLAG.FORFEITED if car.forfeits > 0 else FLAG.EXCUSED
         bits[n] = np.int64(bits[n]) | flags
         n = car.next_in_queue
 
@@ -222,8 +206,8 @@ def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
             start = cars[start].next_in_lane
         other = start
         while other != n and cars[other].progress > progress:
-            if bits[other] & EXCUSED != 0:
-                bits[n] = np.int64(bits[n]) | EXCUSED
+            if bits[other] & FLAG.EXCUSED != 0:
+                bits[n] = np.int64(bits[n]) | FLAG.EXCUSED
                 break
             other = cars[other].next_in_lane
         bits[n] = _who_stands(np.int64(bits[n]))
@@ -233,7 +217,7 @@ def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
 @jit_inline
 def _who_stands(bits: Any) -> Any:
     """Return the flags of a car with STANDS, if it does."""
-    return bits | STANDS if bits & EXCUSED == 0 and bits & LONG != 0 else bits
+    return bits | FLAG.STANDS if bits & FLAG.EXCUSED == 0 and bits & LONG != 0 else bits
 
 
 @jit
@@ -244,7 +228,7 @@ def _block(b: int, n: int, tables: LabelTables) -> None:
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0:
-        labels.bits[b, n] = bits & ~(OVERTAKING | LEFT)
+        labels.bits[b, n] = bits & ~(FLAG.OVERTAKING | FLAG.LEFT)
         return
     blocked, beside = _cars_beside(b, n, lane, tables)
     if tables.obstacles.base[b] >= 0:
@@ -261,15 +245,15 @@ def _block(b: int, n: int, tables: LabelTables) -> None:
             own.free_needed,
         )
     if blocked:
-        bits |= BLOCKED | OVERTAKING
-    elif not beside and bits & LEFT == 0:
-        bits &= ~OVERTAKING
-    if bits & ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
-        bits &= ~OVERTAKING
+        bits |= FLAG.BLOCKED | FLAG.OVERTAKING
+    elif not beside and bits & FLAG.LEFT == 0:
+        bits &= ~FLAG.OVERTAKING
+    if bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
+        bits &= ~FLAG.OVERTAKING
     if car.reach > own.left_set:
-        bits |= LEFT
+        bits |= FLAG.LEFT
     elif car.reach < own.left_release:
-        bits &= ~LEFT
+        bits &= ~FLAG.LEFT
     labels.bits[b, n] = bits
 
 
@@ -284,7 +268,7 @@ def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, 
     beside = False
     other = tables.memory.head[b, lane // 2].segment
     while other >= 0:
-        if other != n and tables.labels.bits[b, other] & STANDS != 0:
+        if other != n and tables.labels.bits[b, other] & FLAG.STANDS != 0:
             progress, lateral = lane_coordinates(t, own.net, lane, state.x[b, other], state.y[b, other])
             half = half_extent(
                 tx, ty, state.c[b, other], state.s[b, other], own.half_length, own.half_width, own.rounding

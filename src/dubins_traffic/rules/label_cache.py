@@ -18,21 +18,11 @@ from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.roads.lookup import CERTAIN, ValidCell, nearest_arm
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.propositions import (
-    BREACH3,
-    CLEAR,
-    IN_CROSSING,
-    LEFT,
-    LINGERS,
-    ON_ROAD,
-    OVERTAKING,
-    STILL,
-    STOPPED,
-)
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Kept, Memory, TrialRules
 
-KEPT = LEFT | OVERTAKING | STOPPED | BREACH3
-CALMLY = KEPT | ON_ROAD | IN_CROSSING | CLEAR
+KEPT = FLAG.LEFT | FLAG.OVERTAKING | FLAG.STOPPED | FLAG.BREACH3
+CALMLY = KEPT | FLAG.ON_ROAD | FLAG.IN_CROSSING | FLAG.CLEAR
 """Flags of a car that holds on to its labels, except those that others bring about."""
 IF_NEAREST = 2.0
 """Value of `Kept.holds` of a car that holds on to its labels if the nearest of the roads that meet is the same."""
@@ -168,7 +158,7 @@ def growth_row(tick: int, own: TrialRules) -> int:
 @jit_inline
 def still(block: Kept, n: int) -> int:
     """Return STILL if car n, of this block, is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
-    return STILL if block.was_still[n & (BLOCK - 1)] != 0.0 else 0
+    return FLAG.STILL if block.was_still[n & (BLOCK - 1)] != 0.0 else 0
 
 
 @jit_inline
@@ -177,7 +167,7 @@ def lingers(block: Kept, n: int) -> int:
 
     After `look_who_holds`, or `note_growth` for who doesn't hold on.
     """
-    return LINGERS if block.was_lingering[n & (BLOCK - 1)] != 0.0 else 0
+    return FLAG.LINGERS if block.was_lingering[n & (BLOCK - 1)] != 0.0 else 0
 
 
 @jit_inline

@@ -18,7 +18,7 @@ from dubins_traffic.rules.frame import label_frame
 from dubins_traffic.rules.judged import Judged, Posed, kinds_of
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.propositions import STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules, pack_rules, spread
 
 SLACK = 1e-9
@@ -130,12 +130,12 @@ class Labeller:
     @property
     def tickets(self) -> Ints:
         """Ticks of the cars' tickets, (B, N); -1 for a car that has not stopped at a crossing."""
-        return np.where(self.labels.bits & STOPPED, self.memory.car["ticket"], NONE)
+        return np.where(self.labels.bits & FLAG.STOPPED, self.memory.car["ticket"], NONE)
 
     @property
     def forfeits(self) -> Ints:
         """New tickets of the cars in their present wait, (B, N)."""
-        return np.where(self.labels.bits & STOPPED, self.memory.car["forfeits"], 0)
+        return np.where(self.labels.bits & FLAG.STOPPED, self.memory.car["forfeits"], 0)
 
     @property
     def places(self) -> Ints:

@@ -36,21 +36,11 @@ from dubins_traffic.rules.label_cache import (
 )
 from dubins_traffic.rules.lane_cache import keep_arm, keep_road
 from dubins_traffic.rules.lane_state import along_lane, lane_here
-from dubins_traffic.rules.propositions import (
-    AHEAD,
-    BREACH3,
-    CLEAR,
-    ENTERED,
-    IN_CROSSING,
-    LEFT,
-    ON_ROAD,
-    STOPPED,
-    TURNED,
-)
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.rules.tables import CarMemory, Heads, LabelTables, Memory, TrialRules
 
-RULE3 = STOPPED | CLEAR | AHEAD
+RULE3 = FLAG.STOPPED | FLAG.CLEAR | FLAG.AHEAD
 
 
 @jit_inline
@@ -86,11 +76,11 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
         )
     bits = _entry(tick, t, own, crosses, crossed, lane_before, before)
     if off2 <= half_road * half_road:
-        bits |= ON_ROAD
+        bits |= FLAG.ON_ROAD
     if turned:
-        bits |= TURNED
+        bits |= FLAG.TURNED
     if lane != lane_before:
-        bits &= ~STOPPED
+        bits &= ~FLAG.STOPPED
         car.approach_since = -1
         car.wait_since = -1
         _change_lists(n, lane_before, lane, memory.car[b], memory.head[b])
@@ -103,7 +93,7 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     labels.bits[b, n] = bits | still(block, n) | lingers(block, n)
 
     spare, outside = _reach(car, pose, v, lane, t, own)
-    if not round_body or bits & LEFT != 0 or (lane >= 0 and segment != lane // 2):
+    if not round_body or bits & FLAG.LEFT != 0 or (lane >= 0 and segment != lane // 2):
         spare = 0.0
     if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
         spare = min(spare, abs(sqrt(off2) - half_road))
@@ -187,18 +177,18 @@ def _entry(
     """
     bits = before & KEPT
     if crosses < 0:
-        return bits & ~BREACH3
+        return bits & ~FLAG.BREACH3
     crossing = t.degree[t.vert_off[own.net] + crosses] >= own.crossing_degree
     if crosses != crossed:
-        bits &= ~BREACH3
+        bits &= ~FLAG.BREACH3
         if tick > 0:
-            bits |= ENTERED
+            bits |= FLAG.ENTERED
         if crossing and tick > 0 and own.judged3 != 0:
-            rightly = before & RULE3 == STOPPED | CLEAR
+            rightly = before & RULE3 == FLAG.STOPPED | FLAG.CLEAR
             if not (rightly and lane_end(t, own.net, lane_before) == crosses):
-                bits |= BREACH3
+                bits |= FLAG.BREACH3
     if crossing:
-        bits |= IN_CROSSING
+        bits |= FLAG.IN_CROSSING
     return bits
 
 

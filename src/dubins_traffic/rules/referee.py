@@ -17,8 +17,7 @@ from dubins_traffic.kernels.arrays import Bits, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
-    COLLISION,
-    FAULT,
+    RULE,
     RULES,
     BreachLog,
     FoundBreach,
@@ -318,10 +317,10 @@ def accused(contacts: Sequence[Contact]) -> list[Breach]:
     for contact in contacts:
         place = (contact.tick, contact.tick, contact.x, contact.y, NONE, NONE)
         if EGO in (contact.car, contact.other):
-            breaches.append(Breach(RULES[COLLISION], EGO, *place))
+            breaches.append(Breach(RULES[RULE.COLLISION], EGO, *place))
         for car, guilty in zip((contact.car, contact.other), contact.at_fault, strict=True):
             if guilty and car > EGO:
-                breaches.append(Breach(RULES[FAULT], car, *place))
+                breaches.append(Breach(RULES[RULE.FAULT], car, *place))
     return breaches
 
 

@@ -15,16 +15,10 @@ from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, RefereeTables
 from dubins_traffic.rules.breaches import judge_entry, judge_lane, judge_road
 from dubins_traffic.rules.duties import judge_agent, judge_goals
 from dubins_traffic.rules.frame import label_trial
-from dubins_traffic.rules.propositions import (
-    ENTERED,
-    IN_CROSSING,
-    LEFT,
-    ON_ROAD,
-    STOPPED,
-)
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN, LabelTables, Memory, TrialRules
 
-ENTERS = ENTERED | IN_CROSSING
+ENTERS = FLAG.ENTERED | FLAG.IN_CROSSING
 
 
 @jit
@@ -93,7 +87,7 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
     bits = np.int64(labels.bits[b, n])
     lane = labels.lane[b, n]
     v = labels.crosses[b, n]
-    due = tick + 1 if bits & LEFT != 0 else NEVER_DUE
+    due = tick + 1 if bits & FLAG.LEFT != 0 else NEVER_DUE
     if _surely_left(bits, tables.memory.car[b, n].reach, car.left_since >= 0, own):
         judge_lane(car, bits, lane, tick, tables.terms[b], log)
     else:
@@ -101,11 +95,11 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
         car.unblocked_since = -1
     if bits & ENTERS == ENTERS:
         stopped = False
-        if car.bits & STOPPED != 0:
+        if car.bits & FLAG.STOPPED != 0:
             stopped = lane_end(tables.roads, own.net, car.lane) == v
         _judge_entry(b, n, tick, v, stopped, tables)
     if n == EGO:
-        on = bits & ON_ROAD != 0
+        on = bits & FLAG.ON_ROAD != 0
         if not on and car.off_road == -1 and _by_the_road(b, tables):
             on, due = True, tick + 1
         judge_road(car, on, lane, tick, log)
@@ -120,7 +114,7 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
 def _surely_left(bits: Any, reach: float, was: bool, own: TrialRules) -> bool:
     """Tell whether a car is left, and was or not before, by limits that are eased for it."""
     limit = own.left_release if was else own.left_set
-    return bits & LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
+    return bits & FLAG.LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
 
 
 @jit

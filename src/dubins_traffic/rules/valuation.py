@@ -13,7 +13,7 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.propositions import ENTERED, NAMES
+from dubins_traffic.rules.propositions import FLAG, NAMES
 from dubins_traffic.rules.referee import Arraigned, Breach, Referee
 from dubins_traffic.rules.vocabulary import (
     AT,
@@ -202,7 +202,7 @@ class Valuation:
         if word == "clear":
             return ~np.delete(crosses, car, axis=1).any(axis=1)
         if word == "enter":
-            return crosses[:, car] & (scene.bits[:, car] & ENTERED != 0)
+            return crosses[:, car] & (scene.bits[:, car] & FLAG.ENTERED != 0)
         return crosses[:, car]
 
 

@@ -10,7 +10,7 @@ from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.propositions import LEFT, ON_ROAD
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
@@ -65,11 +65,11 @@ class Driving:
         dx, dy = np.diff(x, axis=0), np.diff(y, axis=0)
         moved = np.sqrt(dx * dx + dy * dy)
         moves = moved >= self._still
-        left = (bits & LEFT) != 0
+        left = (bits & FLAG.LEFT) != 0
         self._ticks += len(moved)
         self._distance = float(np.cumsum(np.concatenate([[self._distance], moved[:, EGO]]))[-1])
         self._standing += int(np.count_nonzero(~moves[:, EGO]))
-        self._off_road += int(np.count_nonzero((bits[1:] & ON_ROAD) == 0))
+        self._off_road += int(np.count_nonzero((bits[1:] & FLAG.ON_ROAD) == 0))
         self._departures += int(np.count_nonzero(left[1:] & ~left[:-1] & moves[:, 1:].any(axis=1)))
 
     def end(self, ending: Ending) -> None:

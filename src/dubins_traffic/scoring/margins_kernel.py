@@ -13,7 +13,7 @@ from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.propositions import LEFT, ON_ROAD, OVERTAKING
+from dubins_traffic.rules.propositions import FLAG
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,7 +121,7 @@ def _find_margin(
     for f in range(frames):
         own = ego[f]
         x, y, bits = own.x, own.y, own.bits
-        if bits & ON_ROAD != 0:
+        if bits & FLAG.ON_ROAD != 0:
             begun = True
         # No segment is farther than the one that was nearest before, so often none need be looked for.
         if begun and distance2(roads, net, segment, x, y) > farthest:
@@ -129,7 +129,7 @@ def _find_margin(
             farthest = max(farthest, square)
         right = -_beyond(b, own, net, tables)
         signal[f] = right
-        if bits & OVERTAKING == 0:
+        if bits & FLAG.OVERTAKING == 0:
             line = min(line, right)
     found.road = float(half_road) - sqrt(farthest) if begun else INFINITE
     found.line = line
@@ -147,7 +147,7 @@ def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     c, s = ego.c, ego.s
     half = abs(c * ty - s * tx) * cars.half_length[b] + abs(c * tx + s * ty) * cars.half_width[b]
     _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)
-    risen = ego.bits & LEFT != 0
+    risen = ego.bits & FLAG.LEFT != 0
     return lateral + (half + cars.rounding[b]) - (own.left_release if risen else own.left_set)
 
 

@@ -12,7 +12,7 @@ from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.propositions import LEFT, ON_ROAD
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.box_gap import box_gap
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
 
@@ -34,7 +34,7 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
     own = tally.trial[b]
     x, y = state.x[b, EGO], state.y[b, EGO]
     bits = np.int64(labels.bits[b, EGO])
-    left = 1 if bits & LEFT != 0 else 0
+    left = 1 if bits & FLAG.LEFT != 0 else 0
     ego = tally.ego[b, tick]
     ego.x, ego.y, ego.c, ego.s = x, y, state.c[b, EGO], state.s[b, EGO]
     ego.bits, ego.lane = int(bits), labels.lane[b, EGO]
@@ -42,7 +42,7 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
         moved = _moved(b, EGO, state, tally)
         own.distance += moved
         own.standing += 0 if moved >= own.still else 1
-        own.off_road += 1 if bits & ON_ROAD == 0 else 0
+        own.off_road += 1 if bits & FLAG.ON_ROAD == 0 else 0
         if left > own.left and _others_move(b, state, tally):
             own.departures += 1
     own.left = left

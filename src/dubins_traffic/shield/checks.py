@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.state import Command, Pose, State
+from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
@@ -17,21 +17,9 @@ from dubins_traffic.roads.lookup import (
     nearest_vertex,
 )
 from dubins_traffic.rules.lane_state import along_lane, lane_here
-from dubins_traffic.rules.propositions import AHEAD, CLEAR, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
-from dubins_traffic.shield.tables import (
-    CLEARANCE,
-    CONTACT,
-    EGO,
-    LANE,
-    NOTHING,
-    ORDER,
-    RETURN,
-    ROAD,
-    STOP,
-    TURN,
-    ShieldTables,
-)
+from dubins_traffic.shield.tables import REASON, ShieldTables
 
 VERGE = 0.005
 """What the centre keeps from the edge of the road, metres."""
@@ -97,15 +85,15 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
 
     `near` (count) is how many cars `gather_close` has listed.
 
-    NOTHING if it breaks none: then the ego is not left in the next frame, has entered no crossing against rule 3, is on
-    the road, and has touched nothing, whatever the others did.
+    `REASON.NOTHING` if it breaks none: then the ego is not left in the next frame, has entered no crossing against
+    rule 3, is on the road, and has touched nothing, whatever the others did.
     """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, EGO])
     turns = yaw_rate != 0.0 and vehicle.half_length > 0.0
     if speed == 0.0 and not turns:
-        return RETURN if bits & LEFT != 0 else NOTHING
+        return REASON.RETURN if bits & FLAG.LEFT != 0 else REASON.NOTHING
     net = drivers.net[b]
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
@@ -115,16 +103,16 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     if off2 > edge * edge:
         _, before2 = nearest_segment(roads, net, x, y)
         if off2 >= before2:
-            return ROAD
+            return REASON.ROAD
     v, away2 = nearest_vertex(roads, net, nx, ny)
     found = _enters(b, v, after, traffic)
-    if found != NOTHING:
+    if found != REASON.NOTHING:
         return found
     at = v if away2 < vehicle.disc * vehicle.disc else -1
     found = _leaves_lane(b, at, segment, off2, after, traffic, guards)
-    if found != NOTHING:
+    if found != REASON.NOTHING:
         return found
-    return CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else NOTHING
+    return REASON.CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else REASON.NOTHING
 
 
 @jit
@@ -135,26 +123,26 @@ def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
     net = drivers.net[b]
     row = int(roads.vert_off[net]) + v
     if labels.crosses[b, EGO] == v or roads.degree[row] < vehicle.degree:
-        return NOTHING
+        return REASON.NOTHING
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
     half_length, half_width = vehicle.half_length, vehicle.half_width
     edge = vehicle.disc + vehicle.rounding + BRINK
     x, y, c, s = pose
     after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)
     if after2 >= edge * edge:
-        return NOTHING
+        return REASON.NOTHING
     before2 = distance2_to_body(
         vx, vy, state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO], half_length, half_width
     )
     if after2 >= before2:
-        return NOTHING
+        return REASON.NOTHING
     bits = np.int64(labels.bits[b, EGO])
     lane = labels.lane[b, EGO]
-    if bits & STOPPED == 0 or lane < 0 or lane_end(roads, net, lane) != v:
-        return STOP
-    if bits & AHEAD != 0:
-        return ORDER
-    return CLEARANCE if bits & CLEAR == 0 else NOTHING
+    if bits & FLAG.STOPPED == 0 or lane < 0 or lane_end(roads, net, lane) != v:
+        return REASON.STOP
+    if bits & FLAG.AHEAD != 0:
+        return REASON.ORDER
+    return REASON.CLEARANCE if bits & FLAG.CLEAR == 0 else REASON.NOTHING
 
 
 @jit
@@ -168,25 +156,27 @@ def _leaves_lane(
     lane = labels.lane[b, EGO]
     back = guards.ego[b].turn_back
     if at >= 0:
-        return NOTHING
+        return REASON.NOTHING
     after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
     after, top, progress, lateral, turned = along_lane(
         roads, net, after, fresh, guards.ego[b].top, back, pose
     )
     if turned:
-        return TURN
+        return REASON.TURN
     if after == lane and top - progress > back - TURNING:
         before, _ = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
         if progress < before:
-            return TURN
+            return REASON.TURN
     tx, ty = lane_direction(roads, net, after)
     half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
-    if np.int64(labels.bits[b, EGO]) & LEFT != 0 and labels.at[b, EGO] < 0:
-        return RETURN if reach >= guards.ego[b].left_release else NOTHING
+    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
+        return REASON.RETURN if reach >= guards.ego[b].left_release else REASON.NOTHING
     if reach <= vehicle.over - BRINK:
-        return NOTHING
-    return NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else LANE
+        return REASON.NOTHING
+    return (
+        REASON.NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else REASON.LANE
+    )
 
 
 @jit

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Command, Pose
+from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.lists import list_cars, unlist_cars
@@ -22,17 +22,9 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.routing.lane_graph import nearest_stage
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.shield.checks import bounded, gather_close, may_touch, refusal
-from dubins_traffic.shield.tables import (
-    EGO,
-    LAW,
-    NEVER,
-    NOTHING,
-    NUMBER,
-    ShieldTables,
-)
-from dubins_traffic.shield.tables import LANE as LEAVES_LANE
+from dubins_traffic.shield.tables import MODE, REASON, ShieldTables
 from dubins_traffic.shield.way_back import copy_memory, drive_alone, drive_by_law, surely_returns
 
 HALVINGS = 6
@@ -75,7 +67,7 @@ def shield_trial(
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
     _remember(b, tick, traffic, guards)
-    left = np.int64(labels.bits[b, EGO]) & LEFT != 0
+    left = np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0
     law = _lawful(b, tick, left, sight2, traffic, guards, commands)
     if not left:
         guards.ego[b].kept = 0
@@ -84,11 +76,11 @@ def shield_trial(
     near = gather_close(b, state, sight2, vehicle, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
     wanted = bounded(asked, asked_yaw, vehicle) if finite else Command(0.0, 0.0)
-    reason = NOTHING if finite else NUMBER
+    reason = REASON.NOTHING if finite else REASON.NUMBER
     if finite and not (obeys and _same(wanted, law)):
         reason = refusal(b, wanted.speed, wanted.yaw_rate, near, traffic, guards)
     guards.ego[b].reason = reason
-    if reason == NOTHING:
+    if reason == REASON.NOTHING:
         commands[b, EGO, 0] = asked
         commands[b, EGO, 1] = asked_yaw
     else:
@@ -159,15 +151,15 @@ def _may_obey(
     drivers = traffic.drivers
     if may_touch(b, law.speed, law.yaw_rate, near, traffic, drivers.vehicle[b]):
         return False
-    if np.int64(traffic.labels.bits[b, EGO]) & LEFT != 0:
+    if np.int64(traffic.labels.bits[b, EGO]) & FLAG.LEFT != 0:
         return True
     found = refusal(b, law.speed, law.yaw_rate, near, traffic, guards)
-    if found != LEAVES_LANE:
-        return found == NOTHING
+    if found != REASON.LANE:
+        return found == REASON.NOTHING
     mode = guards.ego[b].mode
-    if drivers.car[b, EGO].aside == 0.0 or mode == NEVER:
+    if drivers.car[b, EGO].aside == 0.0 or mode == MODE.NEVER:
         return False
-    if mode == LAW:
+    if mode == MODE.LAW:
         return _has_way_back(b, sight2, traffic, guards)
     sure = surely_returns(b, tick, law.speed, law.yaw_rate, sight2, traffic, guards)
     guards.ego[b].kept = 1 if sure else 0
@@ -219,7 +211,7 @@ def _nearest(
                 far = _apart(refused, tried, vehicle)
                 if far >= least:
                     break
-                if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == NOTHING:
+                if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == REASON.NOTHING:
                     best, least = tried, far
                     break
     return best
@@ -235,7 +227,7 @@ def _slower(b: int, refused: Command, near: int, traffic: Traffic, guards: Shiel
     share = 0.0
     for _ in range(HALVINGS + 1):
         tried = bounded(share * refused.speed, refused.yaw_rate, vehicle)
-        if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == NOTHING:
+        if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == REASON.NOTHING:
             best = tried
             low = share
         else:

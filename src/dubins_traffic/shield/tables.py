@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
-from dubins_traffic.policies.rules.tables import ROUND, Driver, Drivers, Traffic, vehicles_of
+from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
@@ -22,9 +22,23 @@ from dubins_traffic.rules.parameters import RuleParameters
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
-EGO: Final = 0
 
-NOTHING, NUMBER, CONTACT, ROAD, TURN, LANE, RETURN, STOP, ORDER, CLEARANCE = range(10)
+class _Reason(NamedTuple):
+    """Why a command was not let through: what it would have broken; `REASONS` says it in words."""
+
+    NOTHING: int = 0
+    NUMBER: int = 1
+    CONTACT: int = 2
+    ROAD: int = 3
+    TURN: int = 4
+    LANE: int = 5
+    RETURN: int = 6
+    STOP: int = 7
+    ORDER: int = 8
+    CLEARANCE: int = 9
+
+
+REASON: Final = _Reason()
 REASONS: Final = (
     "",
     "not finite numbers",
@@ -42,7 +56,17 @@ turning round outside a disc."""
 
 Overtakes = Literal["sure", "law", "never"]
 """When the ego may cross the centre line: where its return is sure, where the law of the road would, or never."""
-SURE, LAW, NEVER = range(3)
+
+
+class _Mode(NamedTuple):
+    """The same for kernels, in the order of `Overtakes`."""
+
+    SURE: int = 0
+    LAW: int = 1
+    NEVER: int = 2
+
+
+MODE: Final = _Mode()
 
 
 @record
@@ -50,7 +74,7 @@ class Ego:
     """What the shield knows of the ego of a trial, and what it remembers."""
 
     mode: int
-    """SURE, LAW or NEVER."""
+    """When the ego may cross the centre line: `MODE`."""
     cars: int
     """How many cars there are in the trial."""
     left_release: float
@@ -76,7 +100,7 @@ class Ego:
     aimed: int
     """1 once the law knows its first goal."""
     reason: int
-    """Why the shield stepped in in this tick, NOTHING if it did not."""
+    """Why the shield stepped in in this tick: `REASON`."""
     kept: int
     """1 if the ego, while it is left, does what has been rehearsed."""
 
@@ -163,7 +187,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
     distance = np.full((sum(len(own) for own, _ in rounds), lanes), np.inf)
     for b, ((own, far), problem) in enumerate(zip(rounds, problems, strict=True)):
         ego = rows[b, EGO]
-        ego.kind, ego.first, ego.last = ROUND, len(stage), len(stage) + len(own)
+        ego.kind, ego.first, ego.last = KIND.ROUND, len(stage), len(stage) + len(own)
         ego.speed = problem.car.bounds.speed
         distance[len(stage) : len(stage) + len(own), : far.shape[1]] = far
         stage += own.tolist()

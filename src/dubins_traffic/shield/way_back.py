@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.cars.state import Command, Pose, State
+from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -20,11 +20,10 @@ from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
-from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch
 from dubins_traffic.shield.tables import (
-    EGO,
     ShieldTables,
 )
 
@@ -50,10 +49,10 @@ def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, guar
     roads, drivers = traffic.roads, traffic.drivers
     alone, commands = guards.alone.traffic, guards.alone.commands
     alone.state.x[b, EGO], alone.state.y[b, EGO], alone.state.c[b, EGO], alone.state.s[b, EGO] = pose
-    bits = LEFT | OVERTAKING
+    bits = FLAG.LEFT | FLAG.OVERTAKING
     own, _ = lane_coordinates(roads, drivers.net[b], lane, pose.x, pose.y)
     if _blocks(b, lane, own, own + guards.ego[b].blocked_ahead, roads, drivers, guards):
-        bits |= BLOCKED
+        bits |= FLAG.BLOCKED
     alone.labels.bits[b, EGO] = bits
     alone.labels.lane[b, EGO] = lane
     alone.labels.segment[b, EGO] = lane >> 1
@@ -116,7 +115,7 @@ def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: Shi
     vehicle = drivers.vehicle[b]
     if _blocks(b, lane, progress, progress + guards.ego[b].blocked_ahead, roads, drivers, guards):
         return True
-    return labels.bits[b, EGO] & OVERTAKING != 0 and _blocks(
+    return labels.bits[b, EGO] & FLAG.OVERTAKING != 0 and _blocks(
         b, lane, progress - vehicle.behind, progress + vehicle.fore, roads, drivers, guards
     )
 

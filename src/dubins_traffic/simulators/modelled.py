@@ -17,7 +17,7 @@ import numpy as np
 
 from dubins_traffic import outside
 from dubins_traffic.cars.dynamics import MOST_ARCS, Arc, MotionModel, Stops, begun
-from dubins_traffic.cars.motion import CROWDED, Motion, step_part
+from dubins_traffic.cars.motion import OUTCOME, Motion, step_part
 from dubins_traffic.cars.partners import Meeting, enlarged
 from dubins_traffic.cars.rows import clip
 from dubins_traffic.cars.state import EGO, Contact
@@ -123,7 +123,7 @@ class ModelledCars:
     def _part(self, seconds: float) -> None:
         """Move all cars along their arcs, with as much room for pairs as that takes."""
         self.motion.work.found[0] = 0
-        while self._move(seconds, self._arcs, self._stands, self.motion) == CROWDED:
+        while self._move(seconds, self._arcs, self._stands, self.motion) == OUTCOME.CROWDED:
             self.motion = self.motion.replace(work=enlarged(self.motion.work))
 
     def _moves(self) -> Any:

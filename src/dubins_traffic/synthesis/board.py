@@ -18,17 +18,7 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving
-from dubins_traffic.synthesis.queues import (
-    IMPOSSIBLE,
-    OTHER,
-    PARKED,
-    RENEWED,
-    SLOTS,
-    Kind,
-    Scene,
-    Scenery,
-    scenery,
-)
+from dubins_traffic.synthesis.queues import IMPOSSIBLE, SLOTS, WHO, Kind, Scene, Scenery, scenery
 
 MOST_OTHERS: Final = 62
 """E-agents of the largest game; their moves are bits of a number."""
@@ -227,8 +217,10 @@ class Board:
             lane_slot=ends[:, 1].copy(),
             **self._changes(),
             sorts=_ints(kind.ordered for kind in self._kinds),
-            newcomer=_ints(PARKED if kind.parks else OTHER for kind in self._kinds),
-            renewed=_ints(RENEWED if kind.forfeits is Forfeits.ONCE else OTHER for kind in self._kinds),
+            newcomer=_ints(WHO.PARKED if kind.parks else WHO.OTHER for kind in self._kinds),
+            renewed=_ints(
+                WHO.RENEWED if kind.forfeits is Forfeits.ONCE else WHO.OTHER for kind in self._kinds
+            ),
             goal=_ints(self._goal_of(node.vertex) for node in nodes),
             goal_nodes=_ints(len(own) for own in self.arena.goal_nodes),
             crossing=_ints(node.crossing for node in nodes),

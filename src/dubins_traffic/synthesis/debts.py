@@ -8,7 +8,7 @@ from __future__ import annotations
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.positions import Moves, Work
-from dubins_traffic.synthesis.queues import EGO, SLOTS
+from dubins_traffic.synthesis.queues import SLOTS, WHO
 
 
 @jit
@@ -23,7 +23,7 @@ def _in_lane(t: Tables, work: Work, lane: int) -> int:
     end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
     if (t.taken[end] >> t.lane_slot[lane] & 1) == 0:
         return 0
-    return 1 if t.others_slots[end] >> t.lane_slot[lane] & 1 else EGO + 1
+    return 1 if t.others_slots[end] >> t.lane_slot[lane] & 1 else WHO.EGO + 1
 
 
 @jit
@@ -40,9 +40,9 @@ def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
         lane = t.exits[k]
         inside = _in_lane(t, work, lane)
         left -= 1 if inside == 0 else 0
-        if inside == EGO + 1:
+        if inside == WHO.EGO + 1:
             ego = 2
-        elif _in_lane(t, work, lane ^ 1) == EGO + 1:
+        elif _in_lane(t, work, lane ^ 1) == WHO.EGO + 1:
             ego = max(ego, 1)
     return left <= 0, ego
 
@@ -52,7 +52,7 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
     """E5: say whether who waits before a bend or dead end that is clear has no excuse to wait there."""
     free, ego = _ways_out(t, work, node)
     opposite = _inside(t, work, t.opposite[node])
-    if opposite == EGO + 1:
+    if opposite == WHO.EGO + 1:
         return False
     if t.settings[0].moves_up:
         return free or ego != 2
@@ -64,7 +64,7 @@ def _may_leave(t: Tables, work: Work, node: int) -> bool:
     """E4: say whether who is in a node has no excuse to stay there."""
     free, _ = _ways_out(t, work, node)
     opposite = _inside(t, work, t.opposite[node])
-    return free and opposite != EGO + 1 and not (t.settings[0].unmet and opposite)
+    return free and opposite != WHO.EGO + 1 and not (t.settings[0].unmet and opposite)
 
 
 @jit
@@ -78,7 +78,7 @@ def _to_free(t: Tables, work: Work, goal: int) -> int:
             found = v
             out, near = _ways_out(t, work, v)
             free = free or out
-            ego = ego or near > 0 or _inside(t, work, t.opposite[v]) == EGO + 1
+            ego = ego or near > 0 or _inside(t, work, t.opposite[v]) == WHO.EGO + 1
     return -1 if ego and not free else found
 
 

@@ -17,11 +17,11 @@ from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import Game
 from dubins_traffic.synthesis.positions import list_scenes
-from dubins_traffic.synthesis.queues import EGO
+from dubins_traffic.synthesis.queues import WHO
 
 FORMAT: Final = "dubins-traffic game"
 VERSION: Final = 2
-WHO: Final = ("e-agent", "ego", "e-agent that has forfeited")
+WHO_NAMES: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 
 def scene_numbers(board: Board) -> Numbers:
@@ -58,8 +58,8 @@ def header(board: Board) -> dict[str, Any]:
         "kinds": [
             [
                 {
-                    "inside": None if scene.inside is None else WHO[scene.inside == EGO],
-                    "queue": [[slot, WHO[who]] for slot, who in scene.queue],
+                    "inside": None if scene.inside is None else WHO_NAMES[scene.inside == WHO.EGO],
+                    "queue": [[slot, WHO_NAMES[who]] for slot, who in scene.queue],
                     "parked": list(scene.parked),
                 }
                 for scene in board.sceneries[kind].scenes

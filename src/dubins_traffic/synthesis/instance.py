@@ -14,7 +14,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.queues import EGO, OTHER, Scene
+from dubins_traffic.synthesis.queues import WHO, Scene
 
 PARTS = ("E1", "E2", "E3", "E4", "E5", "E6")
 
@@ -84,15 +84,15 @@ def _scenes(board: Board, node: int, cells: list[int]) -> Iterator[Scene]:
     """Yield the scenes that a node may have with the cars in these cells, the ego's first."""
     arena = board.arena
     kind = board.scenery(node).kind
-    inside = (EGO if cells[0] == node else OTHER) if node in cells else None
+    inside = (WHO.EGO if cells[0] == node else WHO.OTHER) if node in cells else None
     waiting = [
-        (slot, EGO if cells[0] == len(arena.nodes) + lane else OTHER)
+        (slot, WHO.EGO if cells[0] == len(arena.nodes) + lane else WHO.OTHER)
         for slot, lane in enumerate(arena.nodes[node].inbound)
         if len(arena.nodes) + lane in cells
     ]
     parked: tuple[int, ...] = ()
     if kind.parks:
-        parked = tuple(slot for slot, who in waiting if who == OTHER)
-        waiting = [(slot, who) for slot, who in waiting if who == EGO]
+        parked = tuple(slot for slot, who in waiting if who == WHO.OTHER)
+        waiting = [(slot, who) for slot, who in waiting if who == WHO.EGO]
     for queue in permutations(waiting) if kind.ordered else (tuple(sorted(waiting)),):
         yield Scene(inside, queue, parked)

@@ -7,6 +7,8 @@ one turn take their places in an order that the environment chooses.
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.synthesis.board import Tables
@@ -18,12 +20,18 @@ from dubins_traffic.synthesis.positions import (
     rank,
     unrank,
 )
-from dubins_traffic.synthesis.queues import EGO, IMPOSSIBLE, SLOTS
+from dubins_traffic.synthesis.queues import IMPOSSIBLE, SLOTS, WHO
 
-STAY = -1
-RENEW = -2
-ENTER = -3
-"""Choices of an e-agent; what is not negative is the lane into which it leaves."""
+
+class _Choice(NamedTuple):
+    """Choices of an e-agent; what is not negative is the lane into which it leaves."""
+
+    STAY: int = -1
+    RENEW: int = -2
+    ENTER: int = -3
+
+
+CHOICE: Final = _Choice()
 INSIDE = -1
 """The slot of a car in a node."""
 
@@ -53,10 +61,10 @@ def _units(t: Tables, work: Work) -> None:
             if movable & bit:
                 choices = 1
                 if t.open[scene] & bit:
-                    work.choice[count, choices] = ENTER
+                    work.choice[count, choices] = CHOICE.ENTER
                     choices += 1
                 if (t.may_forfeit[scene] | t.parked[scene]) & bit:
-                    work.choice[count, choices] = RENEW
+                    work.choice[count, choices] = CHOICE.RENEW
                     choices += 1
                 count = _unit(work, count, v, slot, choices)
     work.total[0].units = count
@@ -65,7 +73,7 @@ def _units(t: Tables, work: Work) -> None:
 @jit
 def _unit(work: Work, count: int, node: int, slot: int, choices: int) -> int:
     """Note an e-agent with more choices than to stay; return how many there are."""
-    work.choice[count, 0] = STAY
+    work.choice[count, 0] = CHOICE.STAY
     work.node[count] = node
     work.slot[count] = slot
     work.choices[count] = choices
@@ -93,14 +101,14 @@ def _depart(t: Tables, work: Work) -> int:
         work.moved_scenes[v] = work.scenes[v]
     for u in range(work.total[0].units):
         choice = work.choice[u, work.chosen[u]]
-        if choice == STAY:
+        if choice == CHOICE.STAY:
             continue
         v = work.node[u]
         scene = t.base[v] + work.moved_scenes[v]
-        if choice == ENTER:
+        if choice == CHOICE.ENTER:
             work.moved_scenes[v] = t.entered[scene, work.slot[u]]
             moved |= 1 << u
-        elif choice == RENEW:
+        elif choice == CHOICE.RENEW:
             work.moved_scenes[v] = t.removed[scene, work.slot[u]]
             arrivals = _arrival(work, arrivals, v, work.slot[u], int(t.renewed[v]))
         else:
@@ -230,13 +238,13 @@ def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
         if t.egos[scene] == 0:
             continue
         old = work.scenes[v]
-        if t.inside[scene] == EGO + 1:
+        if t.inside[scene] == WHO.EGO + 1:
             cell = v
             work.scenes[v] = t.left[scene]
             for k in range(t.exit_at[v], t.exit_at[v + 1]):
                 to = t.lane_node[t.exits[k]]
                 before = work.scenes[to]
-                after = t.arrived[t.base[to] + before, t.lane_slot[t.exits[k]], EGO]
+                after = t.arrived[t.base[to] + before, t.lane_slot[t.exits[k]], WHO.EGO]
                 if after != IMPOSSIBLE:
                     work.scenes[to] = after
                     out.ego_to[used] = rank(t, work.scenes)

@@ -11,7 +11,7 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
-from dubins_traffic.kernels.random import below
+from dubins_traffic.kernels.random import DRAW, below
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Tables
@@ -19,9 +19,6 @@ from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import list_moves
 from dubins_traffic.synthesis.positions import Moves, Work
 from dubins_traffic.synthesis.strategy import Strategy
-
-DRAW: Final = 300
-"""The first of the random draws of this room (`kernels.random`)."""
 
 
 class Environment(IntEnum):
@@ -235,7 +232,7 @@ def play_turns(t: Tables, turns: int, room: Room, table: Table) -> None:
         list_moves(t, now.position, room.work, room.others)
         goal = _visited(table)
         oldest = _grow(room.others, table)
-        picked = below(now.seed, 0, 0, now.turn, DRAW, room.others.used[0].to)
+        picked = below(now.seed, 0, 0, now.turn, DRAW.PLAY, room.others.used[0].to)
         if now.environment == GREEDY:
             must = 0
             if oldest >= 0 and table.age[room.others.owed[oldest]] > PATIENCE:

@@ -51,7 +51,7 @@ class Work(NamedTuple):
     node, slot, choices, chosen : (n,) int64
         The e-agents that may move: where they are, how many choices they have, which is taken.
     choice : (n, 5) int64
-        STAY, RENEW, ENTER or a lane.
+        A `moves.CHOICE` or a lane.
     to_node, to_slot, to_who, turn : (n,) int64
         Those who arrive, by node; `turn` is the order in which they do.
     total : (1,)

@@ -10,20 +10,28 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, permutations, product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Order
 
-OTHER: Final = 0
-EGO: Final = 1
-RENEWED: Final = 2
-"""Who waits: an e-agent, the ego, an e-agent that has given up its place once in this wait."""
-PARKED: Final = 3
-"""An e-agent in a lane that has not come to its end (only where E5 is left out)."""
 
+class _Who(NamedTuple):
+    """Who waits, or is in a node."""
+
+    OTHER: int = 0
+    """An e-agent."""
+    EGO: int = 1
+    """The ego."""
+    RENEWED: int = 2
+    """An e-agent that has given up its place once in this wait."""
+    PARKED: int = 3
+    """An e-agent in a lane that has not come to its end (only where E5 is left out)."""
+
+
+WHO: Final = _Who()
 SLOTS: Final = 4
 """At most four roads meet."""
 IMPOSSIBLE: Final = -1
@@ -77,7 +85,7 @@ class Scene:
     Attributes
     ----------
     inside : int or None
-        OTHER or EGO.
+        `WHO.OTHER` or `WHO.EGO`.
     queue : tuple of (slot, who)
         Who waits, first in order first; without an order, sorted.
     parked : tuple of int
@@ -96,7 +104,7 @@ class Scene:
     @property
     def egos(self) -> int:
         """How often the ego is here: 0 or 1."""
-        return (self.inside == EGO) + sum(who == EGO for _, who in self.queue)
+        return (self.inside == WHO.EGO) + sum(who == WHO.EGO for _, who in self.queue)
 
     @property
     def others(self) -> int:
@@ -115,14 +123,14 @@ class Scene:
 def scenes(kind: Kind, others: int) -> list[Scene]:
     """Return all scenes of a kind with at most so many e-agents, the empty one first."""
     found: list[Scene] = []
-    whos = (OTHER, EGO, RENEWED) if kind.forfeits is Forfeits.ONCE else (OTHER, EGO)
+    whos = (WHO.OTHER, WHO.EGO, WHO.RENEWED) if kind.forfeits is Forfeits.ONCE else (WHO.OTHER, WHO.EGO)
     for count in range(min(kind.slots, others + 1) + 1):
         for taken in (permutations if kind.ordered else combinations)(range(kind.slots), count):
             for queue in product(whos, repeat=count):
                 rest = [slot for slot in range(kind.slots) if slot not in taken] if kind.parks else []
                 for parking in range(len(rest) + 1):
                     for parked in combinations(rest, parking):
-                        for inside in (None, OTHER, EGO):
+                        for inside in (None, WHO.OTHER, WHO.EGO):
                             scene = Scene(inside, tuple(zip(taken, queue, strict=True)), parked)
                             if scene.egos <= 1 and scene.others <= others:
                                 found.append(scene)
@@ -175,7 +183,7 @@ class Scenery:
 
     @staticmethod
     def _of_others(scene: Scene) -> int:
-        return scene.taken - sum(1 << slot for slot, who in scene.queue if who == EGO)
+        return scene.taken - sum(1 << slot for slot, who in scene.queue if who == WHO.EGO)
 
     def _open(self, scene: Scene) -> int:
         if scene.inside is not None:
@@ -186,19 +194,19 @@ class Scenery:
 
     @staticmethod
     def _first(scene: Scene) -> int:
-        return 1 << scene.queue[0][0] if scene.queue and scene.queue[0][1] != EGO else 0
+        return 1 << scene.queue[0][0] if scene.queue and scene.queue[0][1] != WHO.EGO else 0
 
     def _owing(self, scene: Scene) -> int:
         if not self.kind.owed or scene.inside is not None:
             return 0
         if self.kind.ordered:
             return self._first(scene)
-        return sum(1 << slot for slot, who in scene.queue if who != EGO)
+        return sum(1 << slot for slot, who in scene.queue if who != WHO.EGO)
 
     def _may_forfeit(self, scene: Scene) -> int:
         if self.kind.forfeits is Forfeits.NEVER:
             return 0
-        return sum(1 << slot for slot, who in scene.queue if who == OTHER)
+        return sum(1 << slot for slot, who in scene.queue if who == WHO.OTHER)
 
     def left(self) -> Ints:
         """Return the scene (C,) after whoever is in the node has left it."""
@@ -210,7 +218,7 @@ class Scenery:
         """Return the scene (C, slots) after the e-agent in a slot has entered."""
         return self._by_slot(
             lambda scene, slot: (
-                replace(scene.without(slot), inside=OTHER) if self._open(scene) >> slot & 1 else None
+                replace(scene.without(slot), inside=WHO.OTHER) if self._open(scene) >> slot & 1 else None
             )
         )
 
@@ -232,26 +240,26 @@ class Scenery:
         """Return the scene (C,) after the ego has entered from its lane."""
         found: list[Scene | None] = []
         for scene in self.scenes:
-            places = [place for place, (_, who) in enumerate(scene.queue) if who == EGO]
+            places = [place for place, (_, who) in enumerate(scene.queue) if who == WHO.EGO]
             may = scene.inside is None and bool(places) and (places[0] == 0 or not self.kind.ordered)
             slot = scene.queue[places[0]][0] if may else 0
-            found.append(replace(scene.without(slot), inside=EGO) if may else None)
+            found.append(replace(scene.without(slot), inside=WHO.EGO) if may else None)
         return self._numbers(found)
 
     def arrived(self) -> Ints:
-        """Return the scene (C, slots, 4) after one of OTHER, EGO, RENEWED, PARKED has come into a slot."""
+        """Return the scene (C, slots, 4) after each of `WHO` has come into a slot."""
         rows = [
             self._arrival(scene, slot, who)
             for scene in self.scenes
             for slot in range(self.kind.slots)
-            for who in (OTHER, EGO, RENEWED, PARKED)
+            for who in (WHO.OTHER, WHO.EGO, WHO.RENEWED, WHO.PARKED)
         ]
         return self._numbers(rows).reshape(len(self.scenes), self.kind.slots, 4)
 
     def _arrival(self, scene: Scene, slot: int, who: int) -> Scene | None:
-        if scene.taken >> slot & 1 or (who == EGO and scene.egos):
+        if scene.taken >> slot & 1 or (who == WHO.EGO and scene.egos):
             return None
-        if who == PARKED:
+        if who == WHO.PARKED:
             return replace(scene, parked=tuple(sorted((*scene.parked, slot))))
         queue = (*scene.queue, (slot, who))
         return replace(scene, queue=queue if self.kind.ordered else tuple(sorted(queue)))

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dubins_traffic.rules.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import Work, list_moves
-from dubins_traffic.synthesis.queues import EGO, OTHER, RENEWED, Scene
+from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.sightings import NOWHERE, WAITS, Ground, Sighting
 
 EGO_CAR: Final = 0
@@ -264,17 +264,19 @@ class RoadPlay:
             return (3, place, 0)
         if self._ticket[car] == NO_TICKET:
             return (2, place, 0)
-        return (0 if self._bits[car] & FIRST else 1, self._ticket[car], place)
+        return (0 if self._bits[car] & FLAG.FIRST else 1, self._ticket[car], place)
 
     def _update_ticket(self, car: int, tick: int) -> None:
         seen = self._seen.get(car)
         bits = 0 if seen is None else seen.propositions.bits & WAITS
         before, self._bits[car] = self._bits[car], bits
-        if not bits & STOPPED:
+        if not bits & FLAG.STOPPED:
             self._ticket[car] = NO_TICKET
         elif self._ticket[car] == NO_TICKET:
             self._ticket[car] = tick
-        elif bits & FORFEITED and (not before & FORFEITED or (before & FIRST and not bits & FIRST)):
+        elif bits & FLAG.FORFEITED and (
+            not before & FLAG.FORFEITED or (before & FLAG.FIRST and not bits & FLAG.FIRST)
+        ):
             self._ticket[car] = tick
             self.noted.append(
                 (NEW_TICKET, f"{self._names[car]} in {self._board.arena.name(self.cells[car])}")
@@ -310,10 +312,10 @@ class RoadPlay:
             if kind.parks and car != EGO_CAR and self._ticket[car] == NO_TICKET:
                 parked.append(slot)
                 continue
-            renewed = kind.forfeits is Forfeits.ONCE and self._bits[car] & FORFEITED
-            waiting.append((slot, EGO if car == EGO_CAR else RENEWED if renewed else OTHER))
+            renewed = kind.forfeits is Forfeits.ONCE and self._bits[car] & FLAG.FORFEITED
+            waiting.append((slot, WHO.EGO if car == EGO_CAR else WHO.RENEWED if renewed else WHO.OTHER))
         return Scene(
-            None if inside is None else EGO if inside == EGO_CAR else OTHER,
+            None if inside is None else WHO.EGO if inside == EGO_CAR else WHO.OTHER,
             tuple(waiting) if kind.ordered else tuple(sorted(waiting)),
             tuple(sorted(parked)),
         )

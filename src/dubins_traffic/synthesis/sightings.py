@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
 from dubins_traffic.cars.state import Pose, Propositions
-from dubins_traffic.rules.propositions import FIRST, FORFEITED, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.arena import Arena
 
-WAITS: Final = STOPPED | FIRST | FORFEITED
+WAITS: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.FORFEITED
 """The flags that say where in the order a car is."""
 NOWHERE: Final = -1
 

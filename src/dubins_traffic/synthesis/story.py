@@ -9,7 +9,7 @@ from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy
-from dubins_traffic.synthesis.queues import EGO
+from dubins_traffic.synthesis.queues import WHO
 from dubins_traffic.synthesis.routes import distances
 
 EGO_CAR = 0
@@ -112,7 +112,7 @@ def moment_of(board: Board, position: int) -> Moment:
         parked = [(count + arena.nodes[n].inbound[slot], -1) for slot in scene.parked]
         inside = [(n, scene.inside)] if scene.inside is not None else []
         for cell, who in lanes + parked + inside:
-            if who == EGO:
+            if who == WHO.EGO:
                 ego = cell
             else:
                 others.append(cell)

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.kernels.random import uniform
+from dubins_traffic.kernels.random import DRAW, uniform
 from dubins_traffic.trial.endings import checked_command
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
-
-LOSS_DRAW = 250
 
 
 class CommandLine:
@@ -51,4 +49,4 @@ class CommandLine:
 
     def _draw(self, tick: int) -> float:
         seed = np.uint64(self._instance.seed)
-        return uniform(seed, self._instance.trial, EGO, tick, LOSS_DRAW)
+        return uniform(seed, self._instance.trial, EGO, tick, DRAW.LOSS)

@@ -8,7 +8,7 @@ from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, t
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import has_room, is_clear, is_free, is_open, room_in
 from dubins_traffic.policies.rules.tables import Traffic
-from dubins_traffic.policies.rules.turn_arcs import BEFORE
+from dubins_traffic.policies.rules.turn_arcs import PART
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 
 STUCK = 2.0
@@ -151,7 +151,7 @@ def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None
     car = drivers.car[b, n]
     vehicle = drivers.vehicle[b]
     crossing = drivers.way[b, n].crossing != 0
-    if not crossing and (part == BEFORE or car.waited <= ticks_of(STUCK, vehicle)):
+    if not crossing and (part == PART.BEFORE or car.waited <= ticks_of(STUCK, vehicle)):
         return
     if crossing:
         car.within += 1

@@ -29,21 +29,12 @@ from dubins_traffic.policies.rules.right_of_way import (
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.seeing import meets_nobody, way_to_go
 from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, follow_line, slowed, steer
-from dubins_traffic.policies.rules.tables import (
-    ALONE,
-    LEFT_SIDE,
-    ROLLING,
-    ROUND,
-    Driver,
-    Drivers,
-    Traffic,
-    Vehicle,
-)
-from dubins_traffic.policies.rules.turn_arcs import AFTER, THROUGH, ReferencePath, in_arc, on_lane
+from dubins_traffic.policies.rules.tables import COMPANY, KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, in_arc, on_lane
 from dubins_traffic.policies.safety import VERGE
 from dubins_traffic.roads.lookup import CERTAIN
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.propositions import BLOCKED, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 
 IF_NOT_BEHIND_EGO = 2.0
 """Value of `KeptCommands.holds` of an e-agent that drives on if the ego is not ahead in its lane."""
@@ -128,10 +119,14 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
     row = drivers.way[b, n]
     changed = labels.lane[b, n] != row.coast_lane or labels.crosses[b, n] != row.coast_crosses
     bits = np.int64(labels.bits[b, n])
-    if changed or bits & (STOPPED | BLOCKED | LEFT) != row.coast_stopped or bits & GOES_NOW == GOES_NOW:
+    if (
+        changed
+        or bits & (FLAG.STOPPED | FLAG.BLOCKED | FLAG.LEFT) != row.coast_stopped
+        or bits & GOES_NOW == GOES_NOW
+    ):
         return False
     x, y = state.x[b, n], state.y[b, n]
-    if kind == ROUND and not keeps_to_road(b, n, x, y, kept_way(row), traffic.roads, drivers):
+    if kind == KIND.ROUND and not keeps_to_road(b, n, x, y, kept_way(row), traffic.roads, drivers):
         return False
     if holds == IF_NOT_BEHIND_EGO and is_behind_ego(b, n, x, y, kept_way(row), traffic):
         return False
@@ -140,7 +135,7 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
             return False
         if row.coast_chooses != 0 and not keeps_exit(b, n, tick, row, traffic):
             return False
-    if company != ALONE and not still_meets_nobody(b, n, block.bend[k], x, y, kept_way(row), traffic):
+    if company != COMPANY.ALONE and not still_meets_nobody(b, n, block.bend[k], x, y, kept_way(row), traffic):
         return False
     if row.coast_chooses != 0:
         drivers.car[b, n].within += 1
@@ -191,28 +186,28 @@ def drive_on(
     row = drivers.way[b, n]
     x, y = state.x[b, n], state.y[b, n]
     bits = np.int64(labels.bits[b, n])
-    special = bits & (BLOCKED | LEFT) != 0 or car.violations & LEFT_SIDE != 0
-    if special or drivers.car[b, n].hold > 0.0 or vehicle.tightest > 0.0 or part == AFTER:
+    special = bits & (FLAG.BLOCKED | FLAG.LEFT) != 0 or car.violations & VIOLATION.LEFT_SIDE != 0
+    if special or drivers.car[b, n].hold > 0.0 or vehicle.tightest > 0.0 or part == PART.AFTER:
         return False
-    if car.kind == ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
+    if car.kind == KIND.ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
         return False
     speed = cruise(False, labels.crosses[b, n] >= 0, vehicle, drivers.car[b, n])
-    bend = way.bend if part == THROUGH else 0.0
+    bend = way.bend if part == PART.THROUGH else 0.0
     gated = faces_gate(b, n, part, traffic)
     if labels.lane[b, n] < 0 and left > ASTRAY:
         return False
-    if gated and car.kind != ROUND and is_behind_ego(b, n, x, y, way, traffic):
+    if gated and car.kind != KIND.ROUND and is_behind_ego(b, n, x, y, way, traffic):
         return False
     line = to_line(left, x, y, way, vehicle) if gated else NOWHERE
     waits = line < speed * vehicle.period
     if waits:
-        if row.crossing == 0 or bits & GOES_NOW == GOES_NOW or car.violations & ROLLING != 0:
+        if row.crossing == 0 or bits & GOES_NOW == GOES_NOW or car.violations & VIOLATION.ROLLING != 0:
             return False
         speed = max(0.0, line) / vehicle.period
     row.coast_chooses = 1 if chooses else 0
     row.coast_waits = 1 if waits else 0
     row.coast_special = 1 if chooses or waits else 0
-    row.coast_stopped = int(bits & STOPPED) if waits else 0
+    row.coast_stopped = int(bits & FLAG.STOPPED) if waits else 0
     keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:
         count_turn(bits, row, car)
@@ -246,19 +241,19 @@ def keep_course(
     row = drivers.way[b, n]
     block = drivers.command[b, n // BLOCK]
     k = n & (BLOCK - 1)
-    bend = way.bend if part == THROUGH else 0.0
-    high = NOWHERE if outside or part == THROUGH else 0.0
+    bend = way.bend if part == PART.THROUGH else 0.0
+    high = NOWHERE if outside or part == PART.THROUGH else 0.0
     minds = NOWHERE
     if gated:
         along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
         edge = vehicle.disc + vehicle.reach + MARGIN
         spare = -way_to_go(way, x, y) - edge - speed * vehicle.period - CERTAIN
         high = min(high, along + spare)
-        if drivers.car[b, n].kind != ROUND:
+        if drivers.car[b, n].kind != KIND.ROUND:
             minds = along + spare - vehicle.approaches
         if row.coast_waits != 0:
             high = NOWHERE
-    block.low[k] = 0.0 if part == THROUGH else -NOWHERE
+    block.low[k] = 0.0 if part == PART.THROUGH else -NOWHERE
     block.high[k] = high
     block.past[k] = NOWHERE if outside else 0.0
     block.minds[k] = minds

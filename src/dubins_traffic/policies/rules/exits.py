@@ -6,28 +6,13 @@ from typing import Any
 
 from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.kernels.random import below, uniform
+from dubins_traffic.kernels.random import DRAW, below, uniform
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
-from dubins_traffic.policies.rules.tables import (
-    LEFT_SIDE,
-    LOOP,
-    NEMESIS,
-    PLACES,
-    ROLLING,
-    ROUND,
-    TAILGATING,
-    Driver,
-    Drivers,
-    Scratch,
-    Traffic,
-    Vehicle,
-)
+from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Scratch, Traffic, Vehicle
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import FAR, aim_for, place_of, spread
 
-DRAW = 20
-"""First of the draws of the law: exits take four, moods five, places one."""
 BACK = 30.0
 """What turning round at a crossing counts, metres (for a nemesis STEP)."""
 UNREACHABLE = 1e6
@@ -54,7 +39,7 @@ def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
     car.kept_out = 0
     car.within = 0
     car.aside = 0.0
-    if car.kind == LOOP:
+    if car.kind == KIND.LOOP:
         following = car.place + 1 if car.place + 1 < car.last else car.first
         if car.place < 0 or before < 0 or drivers.stage[following] != lane:
             following = place_of(lane, car.first, car.last, drivers.stage)
@@ -62,16 +47,20 @@ def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
     v = lane_end(roads, drivers.net[b], lane)
     violations = 0
     car.hold = 0.0
-    if car.rolls > 0.0 and uniform(seed, trial, n, tick, DRAW + 4) < car.rolls:
-        violations |= ROLLING
-    if car.lefts > 0.0 and uniform(seed, trial, n, tick, DRAW + 5) < car.lefts:
-        violations |= LEFT_SIDE
-    if car.tailgates > 0.0 and uniform(seed, trial, n, tick, DRAW + 6) < car.tailgates:
-        violations |= TAILGATING
-    if car.blocks > 0.0 and uniform(seed, trial, n, tick, DRAW + 7) < car.blocks:
+    if car.rolls > 0.0 and uniform(seed, trial, n, tick, DRAW.RULES + 4) < car.rolls:
+        violations |= VIOLATION.ROLLING
+    if car.lefts > 0.0 and uniform(seed, trial, n, tick, DRAW.RULES + 5) < car.lefts:
+        violations |= VIOLATION.LEFT_SIDE
+    if car.tailgates > 0.0 and uniform(seed, trial, n, tick, DRAW.RULES + 6) < car.tailgates:
+        violations |= VIOLATION.TAILGATING
+    if car.blocks > 0.0 and uniform(seed, trial, n, tick, DRAW.RULES + 7) < car.blocks:
         car.hold = BLOCK_TIME
-    if car.parks > 0.0 and is_goal(v, car, drivers) and uniform(seed, trial, n, tick, DRAW + 8) < car.parks:
-        car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW + 9)
+    if (
+        car.parks > 0.0
+        and is_goal(v, car, drivers)
+        and uniform(seed, trial, n, tick, DRAW.RULES + 8) < car.parks
+    ):
+        car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW.RULES + 9)
     car.violations = violations
     price_exits(b, n, tick, traffic)
     car.next_lane = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
@@ -80,7 +69,7 @@ def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
 @jit_inline
 def is_goal(v: int, car: Driver, drivers: Drivers) -> bool:
     """Tell whether v is among the goals that the car knows."""
-    if car.kind == LOOP:
+    if car.kind == KIND.LOOP:
         return False
     found = False
     for k in range(car.first, car.last):
@@ -108,15 +97,15 @@ def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
     v = lane_end(roads, net, lane)
     row = int(roads.vert_off[net]) + v
     kind = car.kind
-    on_loop = kind == LOOP and car.place >= 0
+    on_loop = kind == KIND.LOOP and car.place >= 0
     follow = -1
     if on_loop:
         follow = drivers.stage[car.place + 1 if car.place + 1 < car.last else car.first]
     known = aim(b, n, tick, v, traffic)
     for k in range(roads.degree[row]):
         out = roads.arms[row, k]
-        cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW + k)
-        if kind == ROUND and car.place >= 0:
+        cost = uniform(drivers.seed[b], drivers.trial[b], n, tick, DRAW.RULES + k)
+        if kind == KIND.ROUND and car.place >= 0:
             place = car.place
             if drivers.stage[place] == v:
                 place = place + 1 if place + 1 < car.last else car.first
@@ -126,7 +115,7 @@ def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
         elif known:
             cost += STEP * scratch.hops[out] if scratch.hops[out] != FAR else UNREACHABLE
         if out == lane ^ 1 and roads.degree[row] > 1:
-            at_crossing = STEP if kind == NEMESIS else BACK
+            at_crossing = STEP if kind == KIND.NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
         if obstacles.off[b] != obstacles.off[b + 1] and (
             is_shut(b, lane, int(out), traffic) or leads_nowhere(b, int(out), traffic)
@@ -142,13 +131,13 @@ def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
     net = drivers.net[b]
     car = drivers.car[b, n]
     kind = car.kind
-    if kind == PLACES and (car.goal < 0 or car.goal == v):
+    if kind == KIND.PLACES and (car.goal < 0 or car.goal == v):
         count = roads.vert_off[net + 1] - roads.vert_off[net]
-        car.goal = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW + 10, min(count, 1 << 16))
-    elif kind == NEMESIS:
+        car.goal = below(drivers.seed[b], drivers.trial[b], n, tick, DRAW.RULES + 10, min(count, 1 << 16))
+    elif kind == KIND.NEMESIS:
         car.goal = foreseen(b, traffic, car)
-    seeks_loop = kind == LOOP and car.place < 0 and car.last > car.first
-    if not seeks_loop and (kind not in (PLACES, NEMESIS) or car.goal < 0):
+    seeks_loop = kind == KIND.LOOP and car.place < 0 and car.last > car.first
+    if not seeks_loop and (kind not in (KIND.PLACES, KIND.NEMESIS) or car.goal < 0):
         return False
     if seeks_loop:
         forget(net, roads, scratch)
@@ -158,7 +147,7 @@ def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
         spread(roads, net, scratch.hops, scratch.queue, found)
         return True
     seek(net, car.goal, roads, scratch)
-    if kind == NEMESIS:
+    if kind == KIND.NEMESIS:
         seek_ego(b, net, traffic)
     return True
 

@@ -39,7 +39,7 @@ class KeptPath:
     coast_special: int = -1
     """1 if either of the two is."""
     coast_stopped: int = -1
-    """STOPPED if it has, else 0."""
+    """`FLAG.STOPPED` if it has, else 0."""
     coast_x: float = -1.0
     coast_y: float = -1.0
     """Where it waits."""

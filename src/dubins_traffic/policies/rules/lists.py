@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.tables import Traffic
 
-NOBODY, SEEN, ALL = range(3)
-"""Who is in the lists of the segments: nobody, all whom the ego sees, all."""
+
+class _Listed(NamedTuple):
+    """Who is in the lists of the segments."""
+
+    NOBODY: int = 0
+    SEEN: int = 1
+    """All whom the ego sees."""
+    ALL: int = 2
+
+
+LISTED: Final = _Listed()
 
 
 @jit_inline
@@ -16,12 +27,12 @@ def enlist(b: int, n: int, sight2: float, traffic: Traffic) -> None:
     `sight2` (m^2) is the square of how far the ego sees, negative if that is everywhere.
     """
     scratch = traffic.scratch
-    if n > 0 and scratch.listed[0] == SEEN:
+    if n > 0 and scratch.listed[0] == LISTED.SEEN:
         unlist_cars(b, traffic)
-        scratch.listed[0] = NOBODY
-    if scratch.listed[0] == NOBODY:
+        scratch.listed[0] = LISTED.NOBODY
+    if scratch.listed[0] == LISTED.NOBODY:
         hidden = list_cars(b, sight2 if n == 0 else -1.0, traffic)
-        scratch.listed[0] = SEEN if hidden > 0 else ALL
+        scratch.listed[0] = LISTED.SEEN if hidden > 0 else LISTED.ALL
 
 
 @jit_inline

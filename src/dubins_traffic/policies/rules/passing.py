@@ -12,7 +12,7 @@ from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, wi
 from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.rules.propositions import BLOCKED, LEFT, OVERTAKING, STANDS
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_extent
 
 PASSING_WAIT = 2.0
@@ -99,7 +99,7 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     length = roads.segment[int(roads.seg_off[net]) + (drivers.car[b, n].lane >> 1)].length
     if length + own < vehicle.disc + reach + EDGE:
         return
-    if labels.bits[b, n] & BLOCKED == 0 and not within_lane(offset, vehicle):
+    if labels.bits[b, n] & FLAG.BLOCKED == 0 and not within_lane(offset, vehicle):
         return
     if stands_beside(b, own, back, offset, way, obstacles, vehicle):
         return
@@ -119,8 +119,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     while j >= 0:
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-        stands = labels.bits[b, j] & STANDS != 0
-        passes = labels.bits[b, j] & LEFT != 0 and not stands
+        stands = labels.bits[b, j] & FLAG.STANDS != 0
+        passes = labels.bits[b, j] & FLAG.LEFT != 0 and not stands
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > vehicle.middle
             wide = half_width(b, j, way, state, vehicle) + vehicle.half_width + vehicle.rounding + 0.1
@@ -226,7 +226,12 @@ def extent(
         while j >= 0:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-            if j != n and labels.bits[b, j] & STANDS != 0 and own < key <= horizon and left < vehicle.middle:
+            if (
+                j != n
+                and labels.bits[b, j] & FLAG.STANDS != 0
+                and own < key <= horizon
+                and left < vehicle.middle
+            ):
                 end = max(end, key)
                 offset = max(offset, left + half_width(b, j, way, state, vehicle))
                 low = -INFINITE
@@ -281,10 +286,10 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
     if own >= car.until:
         if abs(left) < 0.05:
             car.aside = 0.0
-        elif labels.bits[b, n] & LEFT != 0:
+        elif labels.bits[b, n] & FLAG.LEFT != 0:
             pass_again(b, own, way, near, traffic, car, vehicle)
         return speed
-    if labels.bits[b, n] & (OVERTAKING | LEFT) == 0 and not within_lane(car.aside, vehicle):
+    if labels.bits[b, n] & (FLAG.OVERTAKING | FLAG.LEFT) == 0 and not within_lane(car.aside, vehicle):
         car.aside = 0.0
         return speed
     length = 2.0 * vehicle.reach
@@ -304,7 +309,7 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
         its = aside(way, state.x[b, j], state.y[b, j])
         if its > vehicle.middle or abs(its) > 2.0 * vehicle.middle:
             continue
-        stands = labels.bits[b, j] & STANDS != 0 or abs(state.speed[b, j]) < SLOW
+        stands = labels.bits[b, j] & FLAG.STANDS != 0 or abs(state.speed[b, j]) < SLOW
         if stands and own - length < key <= car.until:
             return speed
         if abs(key - own) < length + BERTH:

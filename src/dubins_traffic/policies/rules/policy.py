@@ -26,7 +26,7 @@ from dubins_traffic.policies.rules.command_cache import (
     stop_coasting,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
-from dubins_traffic.policies.rules.lists import NOBODY, enlist, unlist_cars
+from dubins_traffic.policies.rules.lists import LISTED, enlist, unlist_cars
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off, keep_passing
 from dubins_traffic.policies.rules.path_cache import way_of
@@ -43,25 +43,12 @@ from dubins_traffic.policies.rules.seeing import (
 )
 from dubins_traffic.policies.rules.standing import watch
 from dubins_traffic.policies.rules.steering import follow_line, follows_line, move
-from dubins_traffic.policies.rules.tables import (
-    ABSENT,
-    ALONE,
-    CROWDED,
-    LEFT_SIDE,
-    NEMESIS,
-    ROUND,
-    TAILGATING,
-    UNSURE,
-    Driver,
-    Drivers,
-    Traffic,
-    Vehicle,
-)
-from dubins_traffic.policies.rules.turn_arcs import AFTER, BEFORE, THROUGH, ReferencePath, on_lane, on_way
+from dubins_traffic.policies.rules.tables import COMPANY, KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.safety import leaves_road
 from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.routing.lane_graph import lane_at
-from dubins_traffic.rules.propositions import APPROACH, BLOCKED, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 
 BUMPER = 0.005
 """Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
@@ -94,28 +81,28 @@ def decide_trial(
         traffic.drivers,
         traffic.scratch,
     )
-    scratch.listed[0] = NOBODY
+    scratch.listed[0] = LISTED.NOBODY
     enough = loss + alone(drivers.vehicle[b])
-    others = UNSURE if state.count[b] <= FEW else CROWDED
+    others = COMPANY.UNSURE if state.count[b] <= FEW else COMPANY.CROWDED
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
-        others = CROWDED
+        others = COMPANY.CROWDED
     look_who_coasts(b, traffic)
     for n in range(state.count[b]):
-        company = others if apart[n] > 0.0 else CROWDED
+        company = others if apart[n] > 0.0 else COMPANY.CROWDED
         if apart[n] > enough:
-            company = ALONE
+            company = COMPANY.ALONE
         kind = drivers.car[b, n].kind
-        if kind == ROUND:
+        if kind == KIND.ROUND:
             count_visit(b, n, labels, drivers)
-        if kind == ABSENT:
+        if kind == KIND.ABSENT:
             continue
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
-        elif company == CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
+        elif company == COMPANY.CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
             drive(b, n, tick, company, sight2, traffic, commands)
-    if scratch.listed[0] != NOBODY:
+    if scratch.listed[0] != LISTED.NOBODY:
         unlist_cars(b, traffic)
 
 
@@ -125,7 +112,7 @@ def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
     if tick * drivers.vehicle[b].period >= drivers.car[b, n].departs:
         return False
     bits = np.int64(labels.bits[b, n])
-    return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (APPROACH | STOPPED) == 0
+    return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (FLAG.APPROACH | FLAG.STOPPED) == 0
 
 
 @jit_inline
@@ -136,19 +123,19 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     car = drivers.car[b, n]
     x, y = state.x[b, n], state.y[b, n]
     stop_coasting(b, n, drivers)
-    if car.kind == NEMESIS:
+    if car.kind == KIND.NEMESIS:
         watch_ego(b, n, labels, drivers)
     way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], traffic)
     part, key, left, px, py = on_way(way, x, y)
     outside = labels.lane[b, n] == car.lane
-    if outside and part != BEFORE:
+    if outside and part != PART.BEFORE:
         part, key, left, px, py = on_lane(way, x, y)
-    leaves = car.kind != ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
+    leaves = car.kind != KIND.ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
-    free = company != CROWDED and just_drives(car)
+    free = company != COMPANY.CROWDED and just_drives(car)
     if free and chooses:
         free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
-    if free and company != ALONE:
+    if free and company != COMPANY.ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
     if free and drive_on(b, n, part, left, px, py, outside, chooses, way, traffic, commands):
         return
@@ -157,7 +144,12 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if not (free and not chooses and drivers.way[b, n].crossing != 0):
         near = gather(b, n, car.lane, x, y, way, traffic)
     gap, who, close = look_ahead(b, part, key, left, x, y, way, near, traffic, vehicle, car)
-    rides = car.violations & TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == car.lane
+    rides = (
+        car.violations & VIOLATION.TAILGATING != 0
+        and outside
+        and who >= 0
+        and labels.lane[b, who] == car.lane
+    )
     speed = cruise(rides or car.aside != 0.0, labels.crosses[b, n] >= 0, vehicle, car)
     speed = yield_at_line(b, n, tick, speed, part, left, x, y, way, near, traffic)
     kept = 0.0
@@ -167,7 +159,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
-    bend = way.bend if part == THROUGH else 0.0
+    bend = way.bend if part == PART.THROUGH else 0.0
     if not close and follows_line(b, n, left - offset, traffic):
         follow_line(b, n, speed, left - offset, px, py, bend, traffic, commands)
         return
@@ -186,7 +178,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         who if rides else -1,
         traffic,
     )
-    if speed != 0.0 and car.kind == ROUND and strays(b, n, speed, yaw_rate, way, traffic):
+    if speed != 0.0 and car.kind == KIND.ROUND and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed
     commands[b, n, 1] = yaw_rate
@@ -195,7 +187,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
 @jit_inline
 def just_drives(car: Driver) -> bool:
     """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
-    return car.kind != NEMESIS and car.violations & TAILGATING == 0 and car.aside == 0.0
+    return car.kind != KIND.NEMESIS and car.violations & VIOLATION.TAILGATING == 0 and car.aside == 0.0
 
 
 @jit_inline
@@ -216,7 +208,7 @@ def follow(
     car = drivers.car[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, traffic, car, part, vehicle.reach)
     if kept > QUEUE_GAP and not rides and who != -1:
-        turn = part == BEFORE and car.turn > 0
+        turn = part == PART.BEFORE and car.turn > 0
         if turn or is_pressed(b, n, traffic):
             kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0
@@ -229,7 +221,7 @@ def dawdle(b: int, n: int, speed: float, near: int, traffic: Traffic) -> float:
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     car = drivers.car[b, n]
     passes = car.aside != 0.0
-    if car.kind == NEMESIS and not passes and before_ego(b, n, near, traffic):
+    if car.kind == KIND.NEMESIS and not passes and before_ego(b, n, near, traffic):
         speed = min(speed, DAWDLE)
     if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):
         car.hold -= drivers.vehicle[b].period
@@ -267,23 +259,23 @@ def pass_what_stands(
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     bits = np.int64(labels.bits[b, n])
-    if outside and (bits & BLOCKED != 0 or car.aside != 0.0):
+    if outside and (bits & FLAG.BLOCKED != 0 or car.aside != 0.0):
         watch(b, n, who, state, car, car.lane, scratch)
-    offset = 2.0 * vehicle.middle if car.violations & LEFT_SIDE != 0 and outside else 0.0
-    stubborn = part == THROUGH or who < 0 or bits & BLOCKED != 0 or offset != 0.0
+    offset = 2.0 * vehicle.middle if car.violations & VIOLATION.LEFT_SIDE != 0 and outside else 0.0
+    stubborn = part == PART.THROUGH or who < 0 or bits & FLAG.BLOCKED != 0 or offset != 0.0
     car.waited = car.waited + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and car.waited > ticks_of(STUCK, vehicle):
-        car.violations &= ~LEFT_SIDE
+        car.violations &= ~VIOLATION.LEFT_SIDE
     idle = car.aside == 0.0 or (within_lane(car.aside, vehicle) and car.waited > ticks_of(STUCK, vehicle))
-    if who < -1 and part == BEFORE and idle and offset == 0.0:
+    if who < -1 and part == PART.BEFORE and idle and offset == 0.0:
         keep_off(b, n, -2 - who, way, traffic)
     if not outside:
-        there = part == BEFORE and within_lane(car.aside, vehicle)
+        there = part == PART.BEFORE and within_lane(car.aside, vehicle)
         car.aside = offset = car.aside if there else 0.0
     elif car.aside != 0.0:
         speed = keep_passing(b, n, speed, way, near, traffic)
         offset = car.aside if way_to_go(way, state.x[b, n], state.y[b, n]) < car.until else 0.0
-    elif (bits & BLOCKED != 0 or who < -1) and waited_long(car, bits, vehicle):
+    elif (bits & FLAG.BLOCKED != 0 or who < -1) and waited_long(car, bits, vehicle):
         find_way_past(b, n, way, who, traffic)
     return speed, offset
 
@@ -291,7 +283,7 @@ def pass_what_stands(
 @jit_inline
 def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether it is time to look for a way past: not in every tick, and sooner for who is left already."""
-    return (car.waited >= ticks_of(PASSING_WAIT, vehicle) or bits & LEFT != 0) and car.waited % 4 == 0
+    return (car.waited >= ticks_of(PASSING_WAIT, vehicle) or bits & FLAG.LEFT != 0) and car.waited % 4 == 0
 
 
 @jit_inline
@@ -312,7 +304,7 @@ def keep_place(
     way = way_of(b, n, roads, drivers)
     if seen < 0 and (x - way.x) * way.tx + (y - way.y) * way.ty > -1.5 * vehicle.disc:
         part, _, _, _, _ = on_way(way, x, y)
-        if part == AFTER:
+        if part == PART.AFTER:
             take_lane(b, n, tick, car.next_lane, traffic)
             way = way_of(b, n, roads, drivers)
     return way

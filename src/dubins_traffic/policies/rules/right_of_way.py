@@ -14,20 +14,10 @@ from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
-from dubins_traffic.policies.rules.tables import (
-    LEFT_SIDE,
-    NEMESIS,
-    ROLLING,
-    ROUND,
-    TAILGATING,
-    Driver,
-    Drivers,
-    Traffic,
-    Vehicle,
-)
-from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
+from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way
 from dubins_traffic.roads.lookup import INFINITE, lane_end
-from dubins_traffic.rules.propositions import CLEAR, FIRST, FORFEITED, LEFT, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 
 CHOOSY = 1.0
 """Seconds for which a car whose turn it is waits for room in the lane it wants."""
@@ -48,7 +38,7 @@ LINGER = 0.8
 """For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
 TRAIL = 3.5
 """A nemesis minds the ego within this, metres."""
-GOES_NOW = STOPPED | FIRST | CLEAR
+GOES_NOW = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
 
 
 @jit_inline
@@ -75,7 +65,7 @@ def yield_at_line(
     bits = np.int64(labels.bits[b, n])
     its_turn = count_turn(bits, drivers.way[b, n], car)
     line = to_line(left, x, y, way, vehicle)
-    minds = n != EGO and car.violations & TAILGATING == 0
+    minds = n != EGO and car.violations & VIOLATION.TAILGATING == 0
     behind = minds and is_behind_ego(b, n, x, y, way, traffic)
     if behind and drivers.way[b, n].crossing != 0:
         line -= vehicle.approaches
@@ -85,10 +75,10 @@ def yield_at_line(
     v = lane_end(roads, net, car.lane)
     if drivers.way[b, n].crossing != 0:
         free = its_turn and may_go(b, n, tick, traffic)
-        free = free or car.violations & ROLLING != 0
+        free = free or car.violations & VIOLATION.ROLLING != 0
     else:
         free = may_enter_bend(b, n, tick, v, way, near, traffic)
-    if bits & LEFT != 0 and car.violations & LEFT_SIDE == 0:
+    if bits & FLAG.LEFT != 0 and car.violations & VIOLATION.LEFT_SIDE == 0:
         free = False
     return speed if free else max(0.0, line) / vehicle.period
 
@@ -123,7 +113,7 @@ def may_enter_bend(
             held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
         elif turns and degree > 1:
             held = held or comes_first(b, n, j, v, traffic)
-    long = car.kind != ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
+    long = car.kind != KIND.ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:
@@ -155,7 +145,9 @@ def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers
 def faces_gate(b: int, n: int, part: int, traffic: Traffic) -> bool:
     """Tell whether a car is before the disc at the end of its lane."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
-    return part == BEFORE and labels.crosses[b, n] != lane_end(roads, drivers.net[b], drivers.car[b, n].lane)
+    return part == PART.BEFORE and labels.crosses[b, n] != lane_end(
+        roads, drivers.net[b], drivers.car[b, n].lane
+    )
 
 
 @jit_inline
@@ -163,7 +155,7 @@ def count_turn(bits: Any, way: KeptPath, car: Driver) -> bool:
     """Tell whether it is the turn of a car before a disc, and count for how long; `way` is its row of `Drivers.way`."""
     its_turn = way.crossing != 0 and bits & GOES_NOW == GOES_NOW
     car.turn = car.turn + 1 if its_turn else 0
-    car.owed = 0 if bits & STOPPED == 0 else car.owed + (1 if its_turn else 0)
+    car.owed = 0 if bits & FLAG.STOPPED == 0 else car.owed + (1 if its_turn else 0)
     return its_turn
 
 
@@ -225,10 +217,10 @@ def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
     car = drivers.car[b, n]
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    due = car.kind != ROUND and is_due(car.turn, bits, vehicle)
+    due = car.kind != KIND.ROUND and is_due(car.turn, bits, vehicle)
     if (
-        car.kind == NEMESIS
-        and bits & FORFEITED == 0
+        car.kind == KIND.NEMESIS
+        and bits & FLAG.FORFEITED == 0
         and car.turn < ticks_of(LINGER * vehicle.forfeit, vehicle)
     ):
         dx = state.x[b, 0] - state.x[b, n]
@@ -240,7 +232,7 @@ def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
     waited = car.owed - ticks_of(CHOOSY, vehicle)
     if not due and (waited < 0 or waited % 8 != 0):
         return False
-    budget = BUDGET * car.owed * vehicle.period if car.kind == ROUND else INFINITE
+    budget = BUDGET * car.owed * vehicle.period if car.kind == KIND.ROUND else INFINITE
     if take_another(b, n, tick, budget, traffic):
         return True
     if due and take_last_resort(b, n, traffic):
@@ -253,7 +245,7 @@ def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
 @jit_inline
 def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
     """Tell whether an e-agent whose turn it is has to enter now, or it loses its place a second time."""
-    if bits & FORFEITED == 0:
+    if bits & FLAG.FORFEITED == 0:
         return False
     forfeit = ticks_of(vehicle.forfeit, vehicle)
     since = turn - forfeit if turn >= forfeit else turn

@@ -12,7 +12,7 @@ from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
-from dubins_traffic.rules.propositions import LEFT, STANDS
+from dubins_traffic.rules.propositions import FLAG
 
 MARGIN = 0.02
 """What a car keeps from a disc that it may not enter, metres."""
@@ -73,7 +73,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
         j = scratch.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-            gone = labels.at[b, j] == end and labels.bits[b, j] & STANDS == 0 and (j != EGO or n == EGO)
+            gone = labels.at[b, j] == end and labels.bits[b, j] & FLAG.STANDS == 0 and (j != EGO or n == EGO)
             if j != n and not gone and takes_room(b, j, out, start, along, aside, labels, vehicle):
                 if look == 1:
                     last -= pitch if along < wall else 0.0
@@ -82,7 +82,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
                 if is_slow(b, j, heading, state) and along < mouth + pitch:
                     return -1.0
-                if labels.bits[b, j] & STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
+                if labels.bits[b, j] & FLAG.STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
                     back = vehicle.backs_up if j == EGO and n != EGO and crossing else 0.0
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
@@ -101,7 +101,7 @@ def is_clear(b: int, n: int, way: KeptPath, labels: Labels, count: Any) -> bool:
         return False
     for j in range(count):
         there = labels.segment[b, j] == way.out >> 1 and j != n
-        if there and (labels.lane[b, j] != way.out ^ 1 or labels.bits[b, j] & LEFT != 0):
+        if there and (labels.lane[b, j] != way.out ^ 1 or labels.bits[b, j] & FLAG.LEFT != 0):
             return False
     return True
 
@@ -111,7 +111,7 @@ def takes_room(
     b: int, j: Any, out: int, start: int, along: float, aside: float, labels: Labels, vehicle: Vehicle
 ) -> bool:
     """Tell whether a car, at (along, aside) of the lane `out`, is in the way of those that come there from `start`."""
-    oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & LEFT == 0
+    oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & FLAG.LEFT == 0
     there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
     return there and not oncoming and labels.crosses[b, j] != start
 

@@ -9,10 +9,10 @@ import numpy as np
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.policies.rules.tables import ROUND, TAILGATING, Driver, Scratch, Traffic, Vehicle
-from dubins_traffic.policies.rules.turn_arcs import BEFORE, ReferencePath, on_way
+from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Scratch, Traffic, Vehicle
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
-from dubins_traffic.rules.propositions import APPROACH, EXCUSED, LEFT, STANDS
+from dubins_traffic.rules.propositions import FLAG
 
 QUEUE_GAP = 0.12
 """Gap kept behind a car that waits, metres."""
@@ -170,7 +170,7 @@ def look_ahead(
         there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
         if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
             continue
-        passed = car.aside > 0.0 and labels.bits[b, j] & STANDS != 0
+        passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
             continue
         far = sqrt(d2)
@@ -241,22 +241,22 @@ def wanted_gap(
     if who == -1:
         return 0.0
     standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)
-    if labels.bits[b, n] & LEFT != 0:
+    if labels.bits[b, n] & FLAG.LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
         return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
-    if car.violations & TAILGATING != 0:
+    if car.violations & VIOLATION.TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
     stands_facing = labels.crosses[b, n] >= 0 and abs(state.speed[b, who]) < 0.05
     if along < -0.3 and labels.crosses[b, who] < 0 and not stands_facing:
-        return FACING_GAP if labels.bits[b, n] & LEFT == 0 else MOVING_GAP
+        return FACING_GAP if labels.bits[b, n] & FLAG.LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
-    waits = its & EXCUSED != 0 or its & APPROACH != 0
+    waits = its & FLAG.EXCUSED != 0 or its & FLAG.APPROACH != 0
     if in_disc or waits:
         return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
-    if its & STANDS != 0 or (car.kind == ROUND and part == BEFORE):
+    if its & FLAG.STANDS != 0 or (car.kind == KIND.ROUND and part == PART.BEFORE):
         return standing
     return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 else MOVING_GAP

@@ -9,7 +9,7 @@ from dubins_traffic.policies.rules.passing import along, aside, half_width
 from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.blocking import narrows
-from dubins_traffic.rules.propositions import APPROACH, OVERTAKING, STANDS, STOPPED
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_extent
 
 LINE, SURE = 0.002, 0.03
@@ -27,7 +27,7 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
     half = half_extent(way.tx, way.ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     if aside(way, x, y) + half <= vehicle.middle + vehicle.over - LINE:
         return True
-    if labels.bits[b, n] & OVERTAKING == 0:
+    if labels.bits[b, n] & FLAG.OVERTAKING == 0:
         return False
     own = along(way, x, y)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
@@ -56,10 +56,10 @@ def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traff
     j = scratch.head[lane >> 1]
     while j >= 0:
         bits = labels.bits[b, j]
-        if j != n and labels.lane[b, j] == lane and bits & (APPROACH | STOPPED) == APPROACH:
+        if j != n and labels.lane[b, j] == lane and bits & (FLAG.APPROACH | FLAG.STOPPED) == FLAG.APPROACH:
             return False
         watched = state.x[b, j] == watch_x and state.y[b, j] == watch_y
-        if j != n and bits & STANDS != 0 and watched:
+        if j != n and bits & FLAG.STANDS != 0 and watched:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - vehicle.middle
             half = half_width(b, j, way, state, vehicle)

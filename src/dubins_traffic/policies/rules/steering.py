@@ -11,10 +11,10 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.standing import stays_right
-from dubins_traffic.policies.rules.tables import LEFT_SIDE, ROUND, Traffic, Vehicle
+from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
-from dubins_traffic.rules.propositions import LEFT
+from dubins_traffic.rules.propositions import FLAG
 
 HURRY = 0.25
 """Metres in which a car returns to its way."""
@@ -50,7 +50,7 @@ def move(
     vehicle = drivers.vehicle[b]
     c, s, limit = state.c[b, n], state.s[b, n], vehicle.yaw_most
     passes = drivers.car[b, n].aside != 0.0
-    steep = STEEP if passes or np.int64(labels.bits[b, n]) & LEFT != 0 else SLANT
+    steep = STEEP if passes or np.int64(labels.bits[b, n]) & FLAG.LEFT != 0 else SLANT
     if not outside and left - offset > ASTRAY:
         steep = ABRUPT
     aligned = NIMBLE if passes and left < offset else ALIGNED
@@ -87,12 +87,12 @@ def keep_right(
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    lawless = drivers.car[b, n].violations & LEFT_SIDE != 0
+    lawless = drivers.car[b, n].violations & VIOLATION.LEFT_SIDE != 0
     if (
         lawless
         or speed == 0.0
         or not outside
-        or bits & LEFT != 0
+        or bits & FLAG.LEFT != 0
         or stays_right(b, n, speed, yaw_rate, way, traffic)
     ):
         return speed, yaw_rate
@@ -108,10 +108,10 @@ def follows_line(b: int, n: int, left: float, traffic: Traffic) -> bool:
     """Tell whether a car with nothing close around it, `left` (m) of its line, may just follow that."""
     labels, obstacles, drivers = traffic.labels, traffic.obstacles, traffic.drivers
     car = drivers.car[b, n]
-    free = obstacles.off[b] == obstacles.off[b + 1] and car.kind != ROUND
+    free = obstacles.off[b] == obstacles.off[b + 1] and car.kind != KIND.ROUND
     bound = car.aside != 0.0 or drivers.vehicle[b].tightest > 0.0
     astray = labels.lane[b, n] < 0 and left > ASTRAY
-    return free and not bound and not astray and np.int64(labels.bits[b, n]) & LEFT == 0
+    return free and not bound and not astray and np.int64(labels.bits[b, n]) & FLAG.LEFT == 0
 
 
 @jit_inline

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,21 +21,58 @@ from dubins_traffic.rules.parameters import RuleParameters
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
-ABSENT, ROUND, WANDER, LOOP, PLACES, NEMESIS = range(6)
-GOES = {"wander": WANDER, "loop": LOOP, "places": PLACES}
+
+class _Kind(NamedTuple):
+    """How a car chooses its way, `Driver.kind`."""
+
+    ABSENT: int = 0
+    """The rules do not drive it."""
+    ROUND: int = 1
+    """By the shortest round of its goals."""
+    WANDER: int = 2
+    """By chance."""
+    LOOP: int = 3
+    """Along lanes that are given, again and again."""
+    PLACES: int = 4
+    """To goals drawn by chance."""
+    NEMESIS: int = 5
+    """To where the ego goes."""
+
+
+KIND: Final = _Kind()
+GOES = {"wander": KIND.WANDER, "loop": KIND.LOOP, "places": KIND.PLACES}
 
 LONGEST_WAY = 2.21
 """Length of the longest way through a disc, in units of R + rho."""
 PROMPT = 0.8
 
-ROLLING, LEFT_SIDE, TAILGATING = 1, 2, 4
-"""Bits of `Driver.violations`."""
+
+class _Violation(NamedTuple):
+    """Which rules a car breaks at present, bits of `Driver.violations`."""
+
+    ROLLING: int = 1
+    """It does not stop before a crossing."""
+    LEFT_SIDE: int = 2
+    """It drives on the left."""
+    TAILGATING: int = 4
+    """It follows close."""
 
 
-ALONE, UNSURE, CROWDED = range(3)
-"""What is known of the cars around one: that they make no difference to it; nothing, but it can be found by looking at
-all of them; nothing.
-"""
+VIOLATION: Final = _Violation()
+
+
+class _Company(NamedTuple):
+    """What is known of the cars around one."""
+
+    ALONE: int = 0
+    """That they make no difference to it."""
+    UNSURE: int = 1
+    """Nothing, but it can be found by looking at all of them."""
+    CROWDED: int = 2
+    """Nothing."""
+
+
+COMPANY: Final = _Company()
 
 
 @record
@@ -43,7 +80,7 @@ class Driver:
     """A car that the law drives: what it is given, and what it remembers."""
 
     kind: int
-    """How the car chooses its way, ABSENT where the law does not drive."""
+    """How the car chooses its way: `KIND`."""
     first: int
     """Its first row of `Drivers.stage`: the lanes of a loop, or the goals' vertices."""
     last: int
@@ -83,7 +120,7 @@ class Driver:
     waited: int
     """Ticks for which something has been in its way."""
     violations: int
-    """Which rules it breaks on this lane: ROLLING, LEFT_SIDE, TAILGATING."""
+    """Which rules it breaks on this lane: bits of `VIOLATION`."""
     watched: int
     """Ticks for which what it may pass has not moved."""
     kept_out: int

@@ -7,20 +7,32 @@ directions their arcs have the same centre, and stay a lane's width apart.
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_direction, lane_end
 from dubins_traffic.roads.table import RoadTable
 
-BEFORE, THROUGH, AFTER = range(3)
-"""Where a point lies on a way: on the lane in, in the arc, on the lane out."""
 STRAIGHT = 0.01
 """Sine of the angle between two lanes below which the way is straight."""
 BEGIN = 0.8
 """Arcs begin this far from the intersection along the lanes, in units of the radius R of its disc."""
 TIGHTEST = 0.05
 """Least radius of an arc, metres."""
+
+
+class _Part(NamedTuple):
+    """Where a point lies on a way."""
+
+    BEFORE: int = 0
+    """On the lane in."""
+    THROUGH: int = 1
+    """In the arc."""
+    AFTER: int = 2
+    """On the lane out."""
+
+
+PART: Final = _Part()
 
 
 class ReferencePath(NamedTuple):
@@ -91,7 +103,7 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
 def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, float, float]:
     """Return (part, key, left, px, py) of a point.
 
-    `part` is BEFORE, THROUGH or AFTER; `key` grows along each part; `left` is how far left of the way the point lies,
+    `part` is one of `PART`; `key` grows along each part; `left` is how far left of the way the point lies,
     metres, and (px, py) the direction of the way there.
     """
     tx, ty, ux, uy = way.tx, way.ty, way.ux, way.uy
@@ -102,8 +114,8 @@ def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, f
     if way.side == 0.0:
         along = rx * tx + ry * ty
         if along < 0.0:
-            return BEFORE, along, in_left, tx, ty
-        return AFTER, along, out_left, ux, uy
+            return PART.BEFORE, along, in_left, tx, ty
+        return PART.AFTER, along, out_left, ux, uy
     dx = x - way.cx
     dy = y - way.cy
     along = dx * tx + dy * ty
@@ -111,8 +123,8 @@ def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, f
     if along > 0.0 > past:
         return in_arc(way, dx, dy)
     if past < 0.0 or (along <= 0.0 and abs(in_left) < abs(out_left)):
-        return BEFORE, along, in_left, tx, ty
-    return AFTER, past, out_left, ux, uy
+        return PART.BEFORE, along, in_left, tx, ty
+    return PART.AFTER, past, out_left, ux, uy
 
 
 @jit_inline
@@ -123,7 +135,7 @@ def in_arc(way: ReferencePath, dx: float, dy: float) -> tuple[int, float, float,
     ey = dy / far
     side = way.side
     ahead = side * (ex * way.ty - ey * way.tx)
-    return THROUGH, 1.0 - ahead, side * (way.radius - far), -side * ey, side * ex
+    return PART.THROUGH, 1.0 - ahead, side * (way.radius - far), -side * ey, side * ex
 
 
 @jit
@@ -131,4 +143,4 @@ def on_lane(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, 
     """Return what `on_way` does, of a point that is known to be on the lane in."""
     along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
     left = way.tx * (y - way.y) - way.ty * (x - way.x) + way.middle
-    return BEFORE, min(along, -1e-9), left, way.tx, way.ty
+    return PART.BEFORE, min(along, -1e-9), left, way.tx, way.ty
