@@ -84,7 +84,7 @@ def check_submission(
     Raises
     ------
     InputError
-        For the first thing wrong. Nothing is left in the store then.
+        For the first thing wrong, caused by an OSError if it can't be stored. Nothing is left in the store then.
     """
     bounds = bounds or Bounds()
     name = "upload" if isinstance(source, bytes) else os.fspath(source)
@@ -227,4 +227,4 @@ def _store(files: dict[str, bytes], program: str | None, path: Path) -> None:
                 if not path.is_dir():  # else somebody else has stored the same
                     raise
     except OSError as error:
-        raise InputError(f"can't be stored ({error.strerror})", file=str(path)) from None
+        raise InputError(f"can't be stored ({error.strerror})", file=str(path)) from error
