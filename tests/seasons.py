@@ -10,10 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
+from obstore.store import LocalStore, from_url
 from sqlalchemy import func, select
 
 from dubins_traffic.service.connection import TOKEN
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.storage import Storage
 from dubins_traffic.service.tables import Chunk, Submission, Trial
 from tests.services import Person, Service, competition_text, serving
 
@@ -38,16 +40,33 @@ def database_of(folder: Path, settings: str) -> Database:
     return Database(url or f"sqlite:///{folder / 'here' / 'service.db'}")
 
 
-def counted_once(folder: Path, settings: str, submissions: int, trials: int = TRIALS) -> None:
-    """Every trial of every submission has exactly one result, and nothing is left in the queue."""
+def counted_once(folder: Path, settings: str, submissions: int, runs: int | None = None) -> None:
+    """Every trial of every run has exactly one result, and nothing is left in the queue; a submission has one run."""
+    trials = TRIALS * (runs or submissions)
     database = database_of(folder, settings)
     with database.reading() as session:
         assert session.scalars(select(Submission.state)).all() == ["done"] * submissions
-        assert session.scalar(select(func.count()).select_from(Trial)) == trials * submissions
+        assert session.scalar(select(func.count()).select_from(Trial)) == trials
         numbers = session.execute(select(Trial.submission_id, Trial.run, Trial.number)).all()
-        assert len({tuple(one) for one in numbers}) == trials * submissions
+        assert len({tuple(one) for one in numbers}) == trials
         assert set(session.scalars(select(Chunk.state))) == {"done"}
     database.close()
+
+
+def kept_whole(folder: Path, settings: str, place: str) -> None:
+    """What is in the store is what it is called, all replays are there, and no lease has ended without a result."""
+    database, storage = database_of(folder, settings), Storage(place)
+    with database.reading() as session:
+        assert set(session.scalars(select(Chunk.attempts))) == {1}
+        replays = session.scalars(select(Trial.replay)).all()
+    database.close()
+    assert None not in replays
+    kept = from_url(place) if "://" in place else LocalStore(place)
+    names = [own["path"] for some in kept.list() for own in some]
+    for name in names:
+        kind, _, digest = name.rpartition("/")
+        storage.get(digest, kind.partition("/")[0])
+    assert {name.rpartition("/")[2] for name in names if name.startswith("replays")} == set(replays)
 
 
 def launched(
