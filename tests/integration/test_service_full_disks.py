@@ -12,7 +12,7 @@ import pytest
 
 from tests import postgres
 from tests.disks import fill, small_disk
-from tests.seasons import FAULTS, SETTINGS, counted_once, database_of, offered, season, sent
+from tests.seasons import FAULTS, SETTINGS, counted_once, kept_whole, offered, season, sent
 from tests.services import STANDING, Person, wait_until
 
 DISKS = 3 if FAULTS >= 20 else 1

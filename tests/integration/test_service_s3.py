@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from tests import s3
-from tests.seasons import SETTINGS, TRIALS, counted_once, kept_whole, offered, season, sent
-from tests.services import STANDING, Person, Service, wait_until
+from tests.seasons import SETTINGS, counted_once, kept_whole, offered, season, sent
+from tests.services import STANDING, Person, wait_until
 
 PLACE = f"s3://{s3.BUCKET}/here"
 S3_SETTINGS = f'{SETTINGS}storage = "{PLACE}"\n'
@@ -50,7 +50,7 @@ def test_a_season_over_s3(tmp_path: Path, store: s3.Store, wire: s3.Wire) -> Non
         wait_until(lambda: TAKES_NOTHING in log.read_text(), 60)
         wire.most = None
         person.ended(cut)
-        away(service, store, person)
+        away(store, person)
         assert len(person.api("GET", "/competitions/short/phases/practice/submissions").json()) == 4
         wait_until(lambda: all(person.state(own + 1) == "done" for own in range(4)))
     assert not (tmp_path / "here" / "store").exists()
@@ -83,7 +83,7 @@ def cut_uploads(person: Person, wire: s3.Wire) -> None:
             assert sent(person, big) == sent(person, big)
 
 
-def away(service: Service, store: s3.Store, person: Person) -> None:
+def away(store: s3.Store, person: Person) -> None:
     """The store is killed under load, and comes back."""
     number = person.submit("short/practice", f"{STANDING}\n# away\n")
     wait_until(lambda: person.state(number) in ("queued", "running"), pause=0.02)

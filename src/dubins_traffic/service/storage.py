@@ -38,8 +38,7 @@ class Storage:
         if place.startswith(("file:", "memory:")):
             self._store = from_url(place)
         elif "://" in place:
-            patience = {"max_retries": RETRIES, "retry_timeout": PATIENCE}
-            self._store = from_url(place, retry_config=patience)  # pyright: ignore[reportArgumentType]
+            self._store = from_url(place, retry_config={"max_retries": RETRIES, "retry_timeout": PATIENCE})
         else:
             self._store = LocalStore(Path(place).resolve(), mkdir=True)
 
