@@ -68,8 +68,8 @@ def worker(
 ) -> None:
     """Judge trials for a service, which may be on another machine; start as many as there are cores to spare.
 
-    With --ray they run on the nodes of a cluster, and one that is lost there is replaced. What is at work when it is told
-    to end is given back. It gives way to other programs of the machine.
+    With --ray they run on the nodes of a cluster, and one that is lost there is replaced. What is at work when it is
+    told to end is given back. It gives way to other programs of the machine.
     """
     from dubins_traffic.cli.extras import needs
 
