@@ -23,6 +23,7 @@ from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.sandbox import available_layers
+from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.service.connection import AwayError, Connection, RefusalError
 
 log = structlog.get_logger("dubins_traffic.worker")
@@ -141,6 +142,7 @@ class Worker:
         data = self._service.patiently(lambda: self._service.fetch(where), self._over(lost))
         try:
             submission = check_submission(data, self._folder / "submissions")
+            program_of(str(submission.path))
         except InputError as error:
             if lacks_room(error):
                 raise
