@@ -15,8 +15,10 @@ from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.submission import check_submission
 from dubins_traffic.errors import InputError
 from dubins_traffic.sandbox import BoxedController, Layers, boxed_controller, images
+from dubins_traffic.service.worker import lacks_room
 from tests import images as made
 from tests.boxes import needs_boxes
+from tests.disks import fill, small_disk
 from tests.recordings import make_instance
 
 pytestmark = needs_boxes
@@ -74,7 +76,7 @@ def test_it_sees_itself_and_has_the_limits_of_every_box(tmp_path: Path, drive: P
     )
     _, controller = hashed(place)
     assert controller.end is None
-    assert controller.log_tail == "reads /dev/null\nwrites /tmp/new\nopens 256 as 1000\n"
+    assert controller.log_tail.split("\n")[:3] == ["reads /dev/null", "writes /tmp/new", "opens 256 as 1000"]
 
 
 def test_what_is_no_image_is_refused(tmp_path: Path, drive: Path) -> None:
@@ -83,15 +85,16 @@ def test_what_is_no_image_is_refused(tmp_path: Path, drive: Path) -> None:
     good = image.read_bytes()
     for data, why in (
         (b"nothing", "no image"),
-        (good[:5000], "podman load"),
-        (b"BZh91AY&SY" + bytes(100), "unusual way"),
+        (good[:5000], "no image|podman load"),
+        (gzip.compress(good, 1), "no image"),
+        (made.layer(tmp_path, files={"layer.tar": b"BZh91AY&SY"}).read_bytes(), "unusual way"),
         (made.layer(tmp_path, files={"a": b""}).read_bytes(), "podman load"),
         (good, "runs nothing"),
     ):
         image.write_bytes(data)
         with pytest.raises(InputError, match=why):
             boxed_controller(str(place))
-    image.write_bytes(gzip.compress(good, 1))
+    image.write_bytes(good)
     (place / "controller.toml").write_text('image = "image.tar"\nprogram = ["/drive"]\n')
     assert hashed(place)[0] == hashed(f"program:{drive}")[0]
     assert [own.name for own in (tmp_path / "cache" / "images").iterdir() if own.name.startswith(".")] == []
@@ -103,6 +106,18 @@ def test_a_bomb_is_refused_before_podman_sees_it(tmp_path: Path, monkeypatch: py
     bomb = made.layer(tmp_path, files={"layer.tar": gzip.compress(bytes(2 << 20))})
     with pytest.raises(InputError, match="unpacks to too much"):
         images.unpacked(bomb)
+
+
+def test_a_full_disk_is_this_machine_s_fault(
+    tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = submission(tmp_path, made.layer(tmp_path, files={"drive": drive.read_bytes()}), 'CMD ["/drive"]')
+    with small_disk(tmp_path / "disk", 1) as disk:
+        monkeypatch.setattr(platformdirs, "user_cache_dir", lambda _name: str(disk))
+        fill(disk / "ballast", 200_000)
+        with pytest.raises(InputError, match="can't be unpacked") as found:
+            boxed_controller(str(place))
+        assert lacks_room(found.value)
 
 
 def test_links_out_of_an_image_are_refused(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ root of a box, read-only, with the same layers as every box.
 
 from __future__ import annotations
 
+import errno
 import gzip
 import hashlib
 import json
@@ -35,6 +36,7 @@ OURS: Final = ("proc", "dev", "tmp", ".box")
 """Folders at the top of an image that a box covers with its own."""
 PACKED_OTHERWISE: Final = (b"\x28\xb5\x2f\xfd", b"\xfd7zXZ", b"BZh")
 OPTIONS: Final = ("--storage-driver", "vfs", "--events-backend", "none", "--cgroup-manager", "cgroupfs")
+NO_ROOM: Final = b"no space left on device"
 _STEP: Final = 1 << 20
 _EXPECTED: Final = "an archive of one image, as `podman save` writes it"
 
@@ -67,7 +69,7 @@ def unpacked(archive: Path, store: Path | None = None) -> Image:
     Parameters
     ----------
     archive : Path
-        As ``podman save`` writes it, of docker's or of OCI's kind; it may be packed by gzip.
+        As ``podman save`` writes it, of docker's or of OCI's kind; its layers may be packed by gzip.
     store : Path, optional
         Where unpacked images are kept; by default in the user's cache.
 
@@ -112,7 +114,7 @@ class _Podman:
         self._command = ("podman", *kept, *OPTIONS)
 
     def __call__(self, *words: str) -> str:
-        """Return what podman says; InputError if it says no."""
+        """Return what podman says; InputError if it says no, OSError if it has no room."""
         home = str(self._folder)
         own = {
             "HOME": home,
@@ -132,9 +134,11 @@ class _Podman:
             )
         except subprocess.TimeoutExpired:
             raise InputError("podman takes too long", field=words[0]) from None
+        if NO_ROOM in done.stderr.lower():
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         if done.returncode:
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
-            raise InputError(shown(said[-1], 200), field=f"podman {words[0]}", expected=_EXPECTED)
+            raise InputError(shown(said[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
         return done.stdout.decode(errors="replace").strip()
 
 
@@ -179,7 +183,7 @@ def _flattened(podman: Callable[..., str], archive: Path, target: Path) -> Mappi
         podman("export", "--output", str(target), container)
     finally:
         for words in (("rm", "--all", "--force"), ("rmi", "--all", "--force")):
-            with suppress(InputError):
+            with suppress(InputError, OSError):
                 podman(*words)
     return config
 
@@ -199,7 +203,7 @@ def _check_size(archive: Path) -> None:
     """Refuse an archive that unpacks to too much, before podman unpacks it."""
     left = MOST
     try:
-        with archive.open("rb") as file, tarfile.open(fileobj=_inflated(file), mode="r|") as members:
+        with archive.open("rb") as file, tarfile.open(fileobj=file, mode="r|") as members:
             for member in members:
                 data = members.extractfile(member) if member.isreg() else None
                 if data is not None:
