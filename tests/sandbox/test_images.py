@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import shutil
 import tarfile
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from tests import images as made
 from tests.boxes import needs_boxes
 from tests.disks import fill, small_disk
 from tests.recordings import make_instance
+from tests.sandbox.test_attacks import USER, as_root, as_user, open_folder
 
 pytestmark = needs_boxes
 
@@ -106,6 +108,19 @@ def test_a_bomb_is_refused_before_podman_sees_it(tmp_path: Path, monkeypatch: py
     bomb = made.layer(tmp_path, files={"layer.tar": gzip.compress(bytes(2 << 20))})
     with pytest.raises(InputError, match="unpacks to too much"):
         images.unpacked(bomb)
+
+
+@as_root
+def test_an_ordinary_user_unpacks_an_image(tmp_path: Path, drive: Path) -> None:
+    place = submission(tmp_path, made.layer(tmp_path, files={"drive": drive.read_bytes()}), 'CMD ["/drive"]')
+    with open_folder() as folder:
+        shutil.copy(place / "image.tar", folder / "image.tar")
+        (folder / "store").mkdir()
+        os.chown(folder / "store", USER, USER)
+        unpack = "import sys; from pathlib import Path; from dubins_traffic.sandbox import images; "
+        unpack += "print(images.unpacked(Path(sys.argv[1]), Path(sys.argv[2])).command)"
+        done = as_user(USER, ["-c", unpack, str(folder / "image.tar"), str(folder / "store")])
+    assert done.stdout == "('/drive',)\n", done.stderr
 
 
 def test_a_full_disk_is_this_machine_s_fault(

@@ -35,7 +35,11 @@ WAIT: Final = 300.0
 OURS: Final = ("proc", "dev", "tmp", ".box")
 """Folders at the top of an image that a box covers with its own."""
 PACKED_OTHERWISE: Final = (b"\x28\xb5\x2f\xfd", b"\xfd7zXZ", b"BZh")
-OPTIONS: Final = ("--storage-driver", "vfs", "--events-backend", "none", "--cgroup-manager", "cgroupfs")
+OPTIONS: Final = (
+    *("--storage-driver", "vfs", "--storage-opt", "vfs.ignore_chown_errors=true"),
+    *("--events-backend", "none", "--cgroup-manager", "cgroupfs"),
+)
+"""How podman keeps images as root and as an ordinary user alike."""
 NO_ROOM: Final = b"no space left on device"
 _STEP: Final = 1 << 20
 _EXPECTED: Final = "an archive of one image, as `podman save` writes it"
