@@ -144,7 +144,7 @@ class Worker:
             submission = check_submission(data, self._folder / "submissions")
             program_of(str(submission.path))
         except InputError as error:
-            if lacks_room(error):
+            if lacks_room(error) or lease["kind"] != "check":
                 raise
             return {"rejected": str(error)}
         if lease["kind"] == "check":
