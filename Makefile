@@ -28,7 +28,9 @@ test: .venv/.installed-dev ## all checks, then all tests
 test-all: test ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
 	$(BIN)/python -m tests.judge_trials 500
-	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py
+	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py \
+		tests/integration/test_service_full_disks.py tests/integration/test_service_ray.py
+	DUBINS_TRAFFIC_ATTACKS=all $(BIN)/python -m pytest tests/sandbox/test_second_version.py
 	$(BIN)/python -m benchmarks verify odd_egos rules
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json

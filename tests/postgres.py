@@ -7,6 +7,7 @@ import shutil
 import socket
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,9 +27,10 @@ def is_there() -> bool:
 class Cluster:
     """A cluster that can be stopped hard and started again."""
 
-    def __init__(self, folder: Path, port: int) -> None:
+    def __init__(self, folder: Path, port: int, disk: Path) -> None:
         self._folder, self._port = folder, port
-        self._data = folder / "data"
+        self._data = disk / "data"
+        self.log = folder / "postgres.log"
 
     def command(self, name: str, *arguments: str) -> None:
         drop = (
@@ -44,14 +46,34 @@ class Cluster:
         )
 
     def make(self) -> None:
-        self.command("initdb", "-D", str(self._data), "-U", "service", "-A", "trust", "-E", "UTF8")
+        options = ("-U", "service", "-A", "trust", "-E", "UTF8", "--wal-segsize=1")
+        self.command("initdb", "-D", str(self._data), *options)
 
     def start(self) -> None:
         options = (
             f"-c listen_addresses=127.0.0.1 -c port={self._port} -c unix_socket_directories={self._folder}"
         )
-        log = str(self._folder / "postgres.log")
+        log = str(self.log)
         self.command("pg_ctl", "-D", str(self._data), "-w", "-t", "60", "-l", log, "-o", options, "start")
+
+    def revive(self) -> None:
+        """Start it unless it is up, or comes up by itself."""
+        while True:
+            if self.is_up():
+                return
+            try:
+                self.command("pg_ctl", "-D", str(self._data), "status")
+            except subprocess.CalledProcessError:
+                self.start()
+            time.sleep(0.1)
+
+    def is_up(self) -> bool:
+        """Tell whether it takes connections."""
+        try:
+            self.command("pg_isready", "-h", "127.0.0.1", "-p", str(self._port))
+        except subprocess.CalledProcessError:
+            return False
+        return True
 
     def stop(self, mode: str = "immediate") -> None:
         self.command("pg_ctl", "-D", str(self._data), "-w", "-m", mode, "stop")
@@ -63,8 +85,14 @@ class Cluster:
 
 
 @contextmanager
-def cluster() -> Iterator[Cluster]:
-    """Run a cluster, in a folder of its own: pytest's is closed to other users, whose the cluster is under root."""
+def cluster(disk: Path | None = None) -> Iterator[Cluster]:
+    """Run a cluster, in a folder of its own: pytest's is closed to other users, whose the cluster is under root.
+
+    Parameters
+    ----------
+    disk : Path, optional
+        Where it keeps its data; the log is elsewhere.
+    """
     if not is_there():
         if os.environ.get("CI") == "true":
             pytest.fail(REASON)
@@ -75,7 +103,8 @@ def cluster() -> Iterator[Cluster]:
         folder = Path(name)
         if os.geteuid() == 0:
             shutil.chown(folder, USER, "nogroup")
-        made = Cluster(folder, port)
+            shutil.chown(disk or folder, USER, "nogroup")
+        made = Cluster(folder, port, disk or folder)
         made.make()
         made.start()
         try:

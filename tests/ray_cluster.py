@@ -36,6 +36,15 @@ class RayCluster:
         """Kill all processes of the head."""
         self._tell("head")
 
+    def actors(self) -> list[int]:
+        """Return the processes of the cluster that are actors."""
+        parents = _parents()
+        return [
+            process
+            for process in parents
+            if self._process.pid in _line(process, parents) and _is_actor(process)
+        ]
+
     def _tell(self, word: str) -> None:
         print(word, file=_there(self._process.stdin), flush=True)
         assert self._answer() == word
@@ -95,12 +104,33 @@ def main() -> None:
 
 def _helpers() -> list[int]:
     """Return the processes that those started here have started: Ray leaves them behind when these are killed."""
+    parents = _parents()
+    return [child for child, parent in parents.items() if parents.get(parent) == os.getpid()]
+
+
+def _parents() -> dict[int, int]:
+    """Return the parent of each process of this machine."""
     parents: dict[int, int] = {}
     for status in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             fields = status.read_text().rpartition(")")[2].split()
             parents[int(status.parent.name)] = int(fields[1])
-    return [child for child, parent in parents.items() if parents.get(parent) == os.getpid()]
+    return parents
+
+
+def _line(process: int, parents: dict[int, int]) -> set[int]:
+    """Return the parent of a process, that of its parent, and so on."""
+    found: set[int] = set()
+    while (process := parents.get(process, 0)) > 1:
+        found.add(process)
+    return found
+
+
+def _is_actor(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/cmdline").read_text().startswith("ray::Carried")
+    except OSError:
+        return False
 
 
 if __name__ == "__main__":

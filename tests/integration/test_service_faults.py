@@ -1,6 +1,6 @@
-"""Faults: workers killed with a lease, the database restarted, full disks, the server killed in uploads: nothing lost.
+"""Faults: workers killed with a lease, the database restarted, the server killed in uploads: nothing lost.
 
-The suite takes a part of the counts; `DUBINS_TRAFFIC_FAULTS=20` takes 20 workers, 10 restarts and 3 full disks.
+The suite takes a part of the counts; `DUBINS_TRAFFIC_FAULTS=20` takes 20 workers and 10 restarts.
 """
 
 from __future__ import annotations
@@ -8,39 +8,33 @@ from __future__ import annotations
 import itertools
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
-from sqlalchemy import func, select
+from sqlalchemy import select
 
-from dubins_traffic.service.connection import TOKEN
-from dubins_traffic.service.database import Database
-from dubins_traffic.service.tables import Chunk, Submission, Trial
+from dubins_traffic.service.tables import Chunk, Submission
 from tests import postgres
-from tests.services import (
-    STANDING,
-    Person,
-    Service,
-    answers,
-    competition_text,
-    serving,
-    shown_secret,
-    wait_until,
+from tests.seasons import (
+    FAULTS,
+    SETTINGS,
+    SUBMISSIONS,
+    counted_once,
+    database_of,
+    launched,
+    running,
+    season,
+    sent,
 )
+from tests.services import STANDING, Person, answers, shown_secret, wait_until
 
-FAULTS = int(os.environ.get("DUBINS_TRAFFIC_FAULTS", "3"))
 NUMBERS = itertools.count()
-TRIALS = 4
 TEAMS = max(2, FAULTS // 3)
 """So many that no chunk loses its worker so often that it is given up."""
-SETTINGS = "lease = 2.0\nlogins = 10000\n"
 
 
 @pytest.fixture(scope="module")
@@ -55,52 +49,6 @@ def settings(request: pytest.FixtureRequest) -> str:
         return SETTINGS
     url = request.getfixturevalue("cluster").url(f"faults{next(NUMBERS)}")
     return f'{SETTINGS}database = "{url}"\n'
-
-
-@contextmanager
-def season(folder: Path, settings: str, *arguments: str, port: int = 0) -> Iterator[Service]:
-    """Serve a competition whose phases have `TRIALS` trials."""
-    folder.mkdir(exist_ok=True)
-    (folder / "short.toml").write_text(competition_text(TRIALS))
-    made = ("--competition", str(folder / "short.toml"), "--trust-submissions", *arguments)
-    with serving(folder / "here", *made, settings=settings, port=port) as service:
-        yield service
-
-
-def database_of(folder: Path, settings: str) -> Database:
-    url = settings.partition('database = "')[2].partition('"')[0]
-    return Database(url or f"sqlite:///{folder / 'here' / 'service.db'}")
-
-
-def counted_once(folder: Path, settings: str, submissions: int) -> None:
-    """Every trial of every submission has exactly one result, and nothing is left in the queue."""
-    database = database_of(folder, settings)
-    with database.reading() as session:
-        assert session.scalars(select(Submission.state)).all() == ["done"] * submissions
-        assert session.scalar(select(func.count()).select_from(Trial)) == TRIALS * submissions
-        numbers = session.execute(select(Trial.submission_id, Trial.number)).all()
-        assert len({tuple(one) for one in numbers}) == TRIALS * submissions
-        assert set(session.scalars(select(Chunk.state))) == {"done"}
-    database.close()
-
-
-def launched(service: Service, token: str, name: str, folder: Path) -> subprocess.Popen[bytes]:
-    """Start a worker as one on another machine would be."""
-    command = [sys.executable, "-m", "dubins_traffic.cli", "worker", service.url, "--name", name]
-    command += ["--folder", str(folder / name), "--trust-submissions"]
-    with (folder / f"{name}.log").open("wb") as log:
-        return subprocess.Popen(command, env={**os.environ, TOKEN: token}, stderr=log, start_new_session=True)
-
-
-def running(folder: Path, settings: str, name: str) -> bool:
-    """Whether a worker holds a lease now."""
-    database = database_of(folder, settings)
-    with database.reading() as session:
-        found = session.scalar(
-            select(func.count()).select_from(Chunk).where(Chunk.state == "leased", Chunk.worker == name)
-        )
-    database.close()
-    return bool(found)
 
 
 def test_workers_killed_with_a_lease(tmp_path: Path, settings: str) -> None:
@@ -158,7 +106,7 @@ def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
     with season(tmp_path, settings, "--workers", "0", port=port) as service:
         for text, number in confirmed.items():
             assert sent(person, text) == number
-        everything = person.api("GET", "/competitions/short/phases/practice/submissions").json()
+        everything = person.api("GET", SUBMISSIONS).json()
         assert len(everything) >= len(confirmed)
         assert len({own["digest"] for own in everything}) == len(everything)
     assert answers(service.url) is False
@@ -187,48 +135,3 @@ def send_many(person: Person, confirmed: dict[str, int]) -> None:
             confirmed[text] = sent(person, text)
         except (httpx.HTTPError, KeyError):
             return
-
-
-def sent(person: Person, text: str) -> int:
-    files = {"file": ("controller.py", text.encode())}
-    return person.api("POST", "/competitions/short/phases/practice/submissions", files=files).json()["id"]
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="a small disk of its own needs root")
-def test_a_full_disk(tmp_path: Path) -> None:
-    """An upload that finds no room is refused, nothing is half kept, and all goes on when there is room."""
-    here = tmp_path / "disk"
-    here.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(here)], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("this machine allows no mount: a full disk can't be shown")
-    try:
-        with season(here, SETTINGS, "--workers", "0") as service:
-            organiser = service.organiser()
-            person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
-            for round_ in range(3):
-                ballast = here / "ballast"
-                fill(ballast)
-                big = f"{STANDING}\n# {round_}\n" + "#" * 400_000
-                files = {"file": ("controller.py", big.encode())}
-                answer = person.api("POST", "/competitions/short/phases/practice/submissions", files=files)
-                assert answer.status_code == 503, (here / "here.log").read_text()[-3000:]
-                assert person.api("GET", "/status").status_code == 200
-                ballast.unlink()
-                number = sent(person, big)
-                assert sent(person, big) == number
-            assert len(person.api("GET", "/competitions/short/phases/practice/submissions").json()) == 3
-    finally:
-        subprocess.run(["umount", "-l", str(here)], check=True)
-
-
-def fill(ballast: Path) -> None:
-    """Write until nothing more goes onto the disk."""
-    with ballast.open("wb", buffering=0) as file:
-        while True:
-            try:
-                file.write(b"\0" * 4096)
-            except OSError:
-                return

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.settings import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.office import Office
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
 from tests import postgres
@@ -136,6 +137,24 @@ def test_only_the_latest_lease_may_report(database: Database) -> None:
         with pytest.raises(queue.StaleLeaseError):
             queue.held(session, number, token)
         assert queue.held(session, number, second.token) is second
+
+
+def test_a_service_that_was_away_ends_no_lease(tmp_path: Path) -> None:
+    office = Office(tmp_path, clock=lambda: now[0])
+    office.database.migrate()
+    now = [30.0]
+    with office.database.writing() as session:
+        phase, people = furnished(session)
+        sent(session, phase, people[0], "x")
+        assert queue.take(session, "w", now[0], 60.0) is not None
+    now[0] += 1000.0
+    for was_away, seconds, left in ((True, 59.0, True), (False, 2.0, False)):
+        housekeeping.end_silent(office, was_away=was_away)
+        now[0] += seconds
+        housekeeping.end_silent(office)
+        with office.database.reading() as session:
+            assert (session.scalars(select(Chunk.state)).one() == "leased") == left
+    office.close()
 
 
 def test_a_chunk_that_kills_its_workers_ends_its_submission_by_our_fault(database: Database) -> None:

@@ -177,8 +177,8 @@ def test_damaged_and_unusual_archives_are_refused(tmp_path: Path) -> None:
         ({"controller.py": b"Controller\0"}, "not text"),
         ({"controller.toml": b"program = ["}, "not TOML"),
         ({"controller.toml": b"a = " + b"[" * 9000}, "not TOML"),
-        ({"controller.toml": b""}, "either python or program"),
-        ({"controller.toml": b'program = ["a"]\npython = "a.py:A"'}, "either python or program"),
+        ({"controller.toml": b""}, "one of python, program and image"),
+        ({"controller.toml": b'program = ["a"]\npython = "a.py:A"'}, "one of python, program and image"),
         ({"controller.toml": b'python = "a.py:A"'}, "no such file"),
         ({"controller.toml": b'python = "../a.py:A"', "a.py": b""}, "no such file"),
         ({"controller.toml": b"program = [1]"}, "a text"),
@@ -202,11 +202,12 @@ def test_what_can_not_be_written_whole_leaves_nothing(tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
     try:
-        with pytest.raises(InputError, match="can't be stored"):
+        with pytest.raises(InputError, match="can't be stored") as error:
             check_submission(archive({"a": b"", "controller.py": CONTROLLER * 100}), tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(tmp_path.iterdir()) == []
+    assert isinstance(error.value.__cause__, OSError)
 
 
 def test_a_store_that_was_changed_is_found_out(tmp_path: Path) -> None:

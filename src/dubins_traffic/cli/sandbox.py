@@ -33,14 +33,19 @@ def check(
 
     Exit status: 0 all hold; 1 an attack got through; 2 this machine can't hold a stranger's program.
     """
+    from dubins_traffic.sandbox import images
     from dubins_traffic.sandbox.available import available_layers, held
     from dubins_traffic.sandbox.limits import Limits
 
     layers = available_layers()
     mechanisms = dict(held(layers))
+    refused = images.why_not() or "; ".join(layers.missing())
     if not json:
         for limit, mechanism in mechanisms.items():
             print(f"{limit:<28} {mechanism or 'NOTHING'}")
+        print(
+            f"{'container images':<28} {f'refused: {refused}' if refused else 'podman unpacks them, into such boxes'}"
+        )
         print(f"\nlimits, unless others are told: {asdict(Limits())}\n")
     found = [] if layers.missing() or not attacks else _attacked(quiet=json)
     through = [each.attack.name for each in found if not each.stopped]
@@ -49,6 +54,7 @@ def check(
             "user": os.getuid(),
             "limits": mechanisms,
             "missing": layers.missing(),
+            "images": refused or None,
             "attacks": [_document(each) for each in found],
         }
         print(json_text.dumps(document, indent=2))

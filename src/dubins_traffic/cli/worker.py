@@ -9,8 +9,12 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import options
+from dubins_traffic.errors import InputError
 
-EXAMPLES = options.examples("worker https://compete.example.org --token-file worker.token")
+EXAMPLES = options.examples(
+    "worker https://compete.example.org --token-file worker.token",
+    "worker https://compete.example.org --token-file worker.token --ray 10.0.0.1:6379 --workers 16",
+)
 
 
 def worker(
@@ -42,11 +46,30 @@ def worker(
             "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
         ),
     ] = False,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            "--ray",
+            metavar="ADDRESS",
+            help="Be carried by a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            metavar="N",
+            min=1,
+            help="Workers on the Ray cluster.",
+            show_default="one for each of its processors",
+        ),
+    ] = None,
     with_parent: Annotated[bool, typer.Option("--with-parent", hidden=True)] = False,
 ) -> None:
     """Judge trials for a service, which may be on another machine; start as many as there are cores to spare.
 
-    What is at work when it is told to end is given back. It gives way to other programs of the machine.
+    With --ray they run on the nodes of a cluster, and one that is lost there is replaced. What is at work when it is
+    told to end is given back. It gives way to other programs of the machine.
     """
     from dubins_traffic.cli.extras import needs
 
@@ -55,8 +78,14 @@ def worker(
         from dubins_traffic.service import worker as room
         from dubins_traffic.service.connection import Connection, token_from
     logs.to_stderr()
+    called, token = name or socket.gethostname()[:60], token_from(token_file)
+    if ray is not None:
+        from dubins_traffic.service.ray_workers import Carrier, Task
+
+        Carrier(ray, Task(url, token, called, folder, trust), workers).carry()
+        return
+    if workers is not None:
+        raise InputError("only a cluster has a number of workers", file="--workers", expected="--ray ADDRESS")
     place = room.default_folder() if folder is None else Path(folder)
-    made = room.Worker(
-        Connection(url, token_from(token_file)), name or socket.gethostname()[:60], place, trust=trust
-    )
+    made = room.Worker(Connection(url, token), called, place, trust=trust)
     room.until_signalled(made, with_parent=with_parent)

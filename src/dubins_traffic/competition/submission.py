@@ -28,7 +28,7 @@ MOST_SOURCE = 4 << 20
 _NAMED = re.compile(rb"\b" + CLASS.encode() + rb"\b")
 _EXPECTED = f"a {CONTROLLER} with a class {CLASS}, or a {MANIFEST}"
 
-Kind = Literal["python", "program"]
+Kind = Literal["python", "program", "image"]
 
 
 class Manifest(Strict):
@@ -41,10 +41,14 @@ class Manifest(Strict):
         Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1)] | None
     ) = Field(default=None, description="a program that speaks lines, as `./drive`, and its arguments")
 
+    image: Annotated[str, Field(pattern=r"^[\w-][\w.-]*$", max_length=100)] | None = Field(
+        default=None, description="the archive of a container image, which runs `program`, else its own"
+    )
+
     @model_validator(mode="after")
     def _one(self) -> Manifest:
-        if (self.python is None) == (self.program is None):
-            raise fault("not one thing to run", "either python or program")
+        if (self.python is None) == (self.program is None and self.image is None):
+            raise fault("not one thing to run", "one of python, program and image")
         return self
 
 
@@ -57,7 +61,8 @@ class Submission:
     digest : str
         SHA-256 over a line ``SHA-256  name`` for each file, sorted by name. Dates and permissions do not count.
     kind : str
-        ``python``: a class that our shim drives; ``program``: anything else, which speaks lines.
+        ``python``: a class that our shim drives; ``program``: anything else, which speaks lines; ``image``: a container
+        image with such a program.
     path : Path
         The folder in which it is stored.
     """
@@ -84,7 +89,7 @@ def check_submission(
     Raises
     ------
     InputError
-        For the first thing wrong. Nothing is left in the store then.
+        For the first thing wrong, caused by an OSError if it can't be stored. Nothing is left in the store then.
     """
     bounds = bounds or Bounds()
     name = "upload" if isinstance(source, bytes) else os.fspath(source)
@@ -125,7 +130,8 @@ def content_digest(files: dict[str, bytes]) -> str:
 
 
 def _submission(digest: str, path: Path, manifest: Manifest) -> Submission:
-    return Submission(digest, "program" if manifest.program else "python", path)
+    kind: Kind = "image" if manifest.image else "program" if manifest.program else "python"
+    return Submission(digest, kind, path)
 
 
 def _files(source: str | os.PathLike[str] | bytes, bounds: Bounds) -> dict[str, bytes]:
@@ -167,6 +173,10 @@ def _manifest(files: dict[str, bytes]) -> Manifest:
                 "no such file", field=f"{MANIFEST}.python", value=place, expected="one in the submission"
             )
         _check_source(place, files[place])
+    if manifest.image is not None and manifest.image not in files:
+        raise InputError(
+            "no such file", field=f"{MANIFEST}.image", value=manifest.image, expected="one in the submission"
+        )
     program = _program_of(manifest)
     if program is not None and program not in files:
         raise InputError(
@@ -200,7 +210,7 @@ def _check_source(name: str, data: bytes) -> None:
 
 def _program_of(manifest: Manifest) -> str | None:
     """Return the file of the submission that is to be executable; a word without a slash is a program elsewhere."""
-    first = (manifest.program or [""])[0]
+    first = "" if manifest.image else (manifest.program or [""])[0]
     return first.removeprefix("./") if "/" in first else None
 
 
@@ -227,4 +237,4 @@ def _store(files: dict[str, bytes], program: str | None, path: Path) -> None:
                 if not path.is_dir():  # else somebody else has stored the same
                     raise
     except OSError as error:
-        raise InputError(f"can't be stored ({error.strerror})", file=str(path)) from None
+        raise InputError(f"can't be stored ({error.strerror})", file=str(path)) from error

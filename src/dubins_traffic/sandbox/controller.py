@@ -14,7 +14,7 @@ from dubins_traffic.protocols import End
 from dubins_traffic.sandbox.available import available_layers
 from dubins_traffic.sandbox.box import Box, BoxOverError
 from dubins_traffic.sandbox.launch import Program
-from dubins_traffic.sandbox.layers import Layers
+from dubins_traffic.sandbox.layers import INSTALL, Layers
 from dubins_traffic.sandbox.limits import BoxEnd, Limits
 from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.transports.answers import AnswerError, command_in, message_in
@@ -163,6 +163,8 @@ def boxed_controller(
     held = available_layers() if layers is None else layers
     if not trust and layers is None:
         held.require()
+    if program.image and not held.boxes:
+        raise InputError("a container image drives in a box alone", value=path, expected=INSTALL)
     return BoxedController(program, limits or Limits(), held)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,6 +30,8 @@ FIRST_USER: Final = 0x20000000
 OPEN_FILES: Final = 256
 STAGE: Final = 1 << 30
 """Bytes of a submission's folder at most, where root has to copy it."""
+OURS: Final = "/.box"
+"""Where a box that sees an image has the shell that sets its limits."""
 DEVICES: Final = ("null", "zero", "full", "random", "urandom")
 SETTINGS: Final = ("ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives")
 """What is seen of /etc: what the dynamic linker needs."""
@@ -53,13 +56,16 @@ class Shown:
 class Program:
     """What runs in a box: its command line as the box sees it, what it sees, and its environment.
 
-    `shim`: whether it is ours, which is handed the problem pickled, and says when it is ready to drive.
+    `shim`: whether it is ours, which is handed the problem pickled, and says when it is ready to drive. `image`:
+    whether the first that it sees, at ``/``, takes the place of the system; `environment` and `folder` are its own.
     """
 
     command: tuple[str, ...]
     shown: tuple[Shown, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict[str, str])
     shim: bool = False
+    image: bool = False
+    folder: str = ""
 
 
 def command_line(
@@ -83,13 +89,14 @@ def command_line(
         Whether the box says on standard error that it stands.
     """
     root = os.getuid() == 0 and layers.boxes
-    inner = ["/bin/sh", "-c", _limits(limits, layers, told), "box"]
+    shell = _own_shell() if program.image else ["/bin/sh"]
+    inner = [*shell, "-c", _limits(limits, layers, told, _entry(program)), "box"]
     if not layers.boxes:
         return _entered([*inner, *(outside(program, word) for word in program.command)], doors, ())
     inner += program.command
     places, steps = staged(program.shown) if root else (program.shown, [])
     more = ["--seccomp", str(seccomp)] if seccomp >= 0 else []
-    outer = _bubblewrap(program.environment, places, limits, layers) + more + ["--", *inner]
+    outer = _bubblewrap(program, places, limits, layers) + more + ["--", *inner]
     if not root:
         return _entered(outer, doors, ())
     dropped = [*_setpriv(), *outer]
@@ -175,9 +182,15 @@ def _stage() -> str:
     return place
 
 
-def _bubblewrap(
-    environment: Mapping[str, str], shown: Sequence[Shown], limits: Limits, layers: Layers
-) -> list[str]:
+def _entry(program: Program) -> list[str]:
+    """Return what the shell does last: an image's environment is not to change the shell that sets the limits."""
+    if not program.image:
+        return []
+    exports = [f"export {name}={shlex.quote(value)}" for name, value in program.environment.items()]
+    return [*exports, "export HOME=/tmp TMPDIR=/tmp", f"cd {shlex.quote(program.folder)}"]
+
+
+def _bubblewrap(program: Program, shown: Sequence[Shown], limits: Limits, layers: Layers) -> list[str]:
     """Return the command line of bubblewrap up to the program."""
     words = ["bwrap", "--unshare-user", "--unshare-uts", "--hostname", "box", "--unshare-cgroup-try"]
     words += ["--uid", str(USER), "--gid", str(USER), "--die-with-parent", "--new-session"]
@@ -187,14 +200,46 @@ def _bubblewrap(
     if ENVIRONMENT in layers:
         words += ["--clearenv", "--setenv", "PATH", SYSTEM, "--setenv", "HOME", "/tmp"]
         words += ["--setenv", "TMPDIR", "/tmp", "--setenv", "LANG", "C.UTF-8"]
-    for name, value in environment.items():
-        words += ["--setenv", name, value]
-    words += _system()
+    if not program.image:
+        for name, value in program.environment.items():
+            words += ["--setenv", name, value]
+        words += _system()
     for each in shown:
         words += ["--ro-bind", each.source, each.place]
+    if program.image:
+        words += _around_an_image()
     words += ["--proc", "/proc"] if PIDS in layers else ["--ro-bind", "/proc", "/proc"]
     words += ["--size", str(limits.files), "--tmpfs", "/tmp", "--chdir", "/tmp"]
     return [*words, "--remount-ro", "/"]
+
+
+@cache
+def _shell_files() -> Mapping[str, str]:
+    """Return the files of this machine's shell by their names in a box that sees an image."""
+    said = subprocess.run(["ldd", "/bin/sh"], capture_output=True, text=True, check=False).stdout
+    found = {"sh": str(Path("/bin/sh").resolve())}
+    for line in said.splitlines():
+        name, arrow, rest = line.strip().partition(" => ")
+        path = (rest if arrow else name).partition(" (")[0]
+        if path.startswith("/"):
+            found[name if arrow else "ld.so"] = path
+    return found
+
+
+def _own_shell() -> list[str]:
+    """Return the command of this machine's shell in a box that sees an image, which may have none."""
+    shell = [f"{OURS}/sh"]
+    return [f"{OURS}/ld.so", "--library-path", OURS, *shell] if "ld.so" in _shell_files() else shell
+
+
+@cache
+def _around_an_image() -> list[str]:
+    """Return what a box has besides an image, as options of bubblewrap: devices, and the shell that sets its limits."""
+    words = ["--size", "65536", "--tmpfs", "/dev", *_devices(), "--remount-ro", "/dev"]
+    words += ["--size", "65536", "--tmpfs", OURS]
+    for name, path in _shell_files().items():
+        words += ["--ro-bind", path, f"{OURS}/{name}"]
+    return [*words, "--remount-ro", OURS]
 
 
 @cache
@@ -209,6 +254,11 @@ def _system() -> list[str]:
             words += ["--ro-bind", str(path), str(path)]
     for name in SETTINGS:
         words += ["--ro-bind-try", f"/etc/{name}", f"/etc/{name}"]
+    return words + _devices()
+
+
+def _devices() -> list[str]:
+    words: list[str] = []
     for name in DEVICES:
         words += ["--dev-bind", f"/dev/{name}", f"/dev/{name}"]
     for number, name in enumerate(("stdin", "stdout", "stderr")):
@@ -216,7 +266,7 @@ def _system() -> list[str]:
     return [*words, "--symlink", "/proc/self/fd", "/dev/fd", "--symlink", "/tmp", "/dev/shm"]
 
 
-def _limits(limits: Limits, layers: Layers, told: bool) -> str:
+def _limits(limits: Limits, layers: Layers, told: bool, entry: Sequence[str]) -> str:
     """Return what the shell in the box does before it becomes the program."""
     lines = ["set -e"]
     if RLIMITS in layers:
@@ -227,4 +277,4 @@ def _limits(limits: Limits, layers: Layers, told: bool) -> str:
             most["v"] = limits.memory // 1024
         lines += [f"ulimit -{letter} {value}" for letter, value in most.items()]
     lines += [f"echo {STANDS} >&2"] if told else []
-    return "\n".join([*lines, 'exec "$@"'])
+    return "\n".join([*lines, *entry, 'exec "$@"'])

@@ -8,7 +8,7 @@ import sys
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import numpy
 
@@ -17,6 +17,7 @@ from dubins_traffic.controllers import registry
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file
 from dubins_traffic.kernels import store
+from dubins_traffic.sandbox import images
 from dubins_traffic.sandbox.launch import Program, Shown
 
 PROGRAM: Final = "program:"
@@ -98,9 +99,30 @@ def _folder(folder: Path) -> Program:
         ):
             inside = f"{PLACE}/{first.removeprefix('./')}" if "/" in first else first
             return Program((inside, *map(str, rest)), (shown,), ONE_THREAD)
+        case {"image": str(name), **rest} if set(rest) <= {"program"}:
+            return _image(folder / name, rest.get("program"))
         case _:
-            expected = 'python = "file.py:Class" or program = ["./drive", ...], and nothing else'
+            expected = 'python = "file.py:Class", program = ["./drive", ...] or image = "image.tar"'
             raise InputError("not a manifest", file=str(manifest), value=document, expected=expected)
+
+
+def _image(archive: Path, program: object) -> Program:
+    """Return the program of a container image: its own, or the one that the manifest names."""
+    if not is_file(archive) or not archive.resolve().is_relative_to(archive.parent.resolve()):
+        raise InputError(
+            "no such file", file=MANIFEST, field="image", value=archive.name, expected="an archive beside it"
+        )
+    image = images.unpacked(archive)
+    words = (
+        [str(word) for word in cast("list[object]", program)] if isinstance(program, list) else image.command
+    )
+    if not words:
+        raise InputError(
+            "the image runs nothing", file=MANIFEST, field="program", expected='program = ["/drive"]'
+        )
+    root = Shown(image.root, "/")
+    environment = {**image.environment, **ONE_THREAD}
+    return Program(tuple(words), (root,), environment, image=True, folder=image.folder)
 
 
 def _module(spec: str) -> Program:

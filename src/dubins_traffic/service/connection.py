@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraError, shown
 
@@ -17,6 +17,8 @@ PATIENCE_S = 600.0
 """How long a report is tried again while the service is away."""
 TOKEN = "DUBINS_TRAFFIC_TOKEN"
 """The environment variable that holds the token of a client, and of a worker."""
+
+Found = TypeVar("Found")
 
 
 class AwayError(DubinsTrafficError):
@@ -79,17 +81,30 @@ class Connection:
         """Return the bytes at a path."""
         return self._answer("GET", path).content
 
-    def patiently(self, method: str, path: str, document: Mapping[str, Any]) -> Any:
-        """Send JSON, again and again while the service is away; what is sent must be safe to send twice."""
+    def patiently(self, ask: Callable[[], Found], given_up: Callable[[], bool] = lambda: False) -> Found:
+        """Return what is asked for, again and again while the service is away; it must be safe to ask twice.
+
+        Parameters
+        ----------
+        ask : callable
+            What asks, such as ``lambda: connection.get("/status")``.
+        given_up : callable
+            Says that nobody waits for the answer any more.
+
+        Raises
+        ------
+        AwayError
+            If the service stays away for `PATIENCE_S`, or the answer is given up.
+        """
         until, pause = time.monotonic() + PATIENCE_S, 0.2
         while True:
             try:
-                return self._ask(method, path, json=dict(document))
+                return ask()
             except AwayError:
-                if time.monotonic() > until:
+                if time.monotonic() > until or given_up():
                     raise
             time.sleep(pause)
-            pause = min(10.0, 2.0 * pause)
+            pause = min(5.0, 2.0 * pause)
 
     def _ask(self, method: str, path: str, **given: Any) -> Any:
         answer = self._answer(method, path, **given)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from functools import partial
 
 import structlog
 from sqlalchemy import select
@@ -19,9 +21,19 @@ PODIUM = 3
 log = structlog.get_logger("dubins_traffic.service")
 
 
-def end_silent(office: Office) -> None:
-    """End leases that have run out, and submissions whose deadline has passed."""
+def end_silent(office: Office, *, was_away: bool = False) -> None:
+    """End leases that have run out, and submissions whose deadline has passed.
+
+    Parameters
+    ----------
+    office : Office
+        The service.
+    was_away : bool
+        The service or its database was away until now. No worker could renew its lease then, so all leases begin anew.
+    """
     with office.database.writing() as session:
+        if was_away:
+            queue.renew(session, office.clock() + office.settings.lease)
         end_leases(session, office.clock())
         end_overdue(session, office.clock())
 
@@ -71,19 +83,35 @@ def _run_podium_again(session: Session, phase: Phase) -> None:
     phase.podium_checked = True
 
 
-STEPS = (end_silent, organising.publish_opened, standings.refresh, check_podiums)
+STEPS = (organising.publish_opened, standings.refresh, check_podiums)
 """What is due again and again; each step may be taken twice, and does not wait for another that fails."""
 
 
-def sweep(office: Office) -> None:
-    """Take every step; one that fails is told of and taken again the next time."""
+def sweep(office: Office, *, was_away: bool = False) -> bool:
+    """Take every step; one that fails is told of and taken again the next time.
+
+    Returns
+    -------
+    bool
+        Whether leases could be looked after; if not, the next sweep is told that the service `was_away`.
+    """
+    looked_after = _taken(office, partial(end_silent, was_away=was_away), "end_silent")
     for step in STEPS:
-        try:
-            step(office)
-        except DBAPIError as error:
-            log.warning("the database is away", step=step.__name__, error=str(error.orig))
-        except Exception:
-            log.exception("housekeeping failed", step=step.__name__)
+        _taken(office, step, step.__name__)
+    return looked_after
+
+
+def _taken(office: Office, step: Callable[[Office], None], name: str) -> bool:
+    """Take a step, and return whether it was taken."""
+    try:
+        step(office)
+    except DBAPIError as error:
+        log.warning("the database is away", step=name, error=str(error.orig))
+        return False
+    except Exception:
+        log.exception("housekeeping failed", step=name)
+        return False
+    return True
 
 
 class Housekeeper(threading.Thread):
@@ -96,8 +124,9 @@ class Housekeeper(threading.Thread):
 
     def run(self) -> None:
         """Sweep until told to stop."""
+        here = False
         while not self._stop_asked.wait(PAUSE_S):
-            sweep(self._office)
+            here = sweep(self._office, was_away=not here)
 
     def stop(self) -> None:
         """End the sweeping, and wait for the last."""

@@ -118,6 +118,12 @@ def overdue(session: Session, at: float) -> Sequence[Chunk]:
     return session.scalars(select(Chunk).where(Chunk.state == "leased", Chunk.leased_until < at)).all()
 
 
+def renew(session: Session, until: float) -> None:
+    """Let all leases hold until a time at least."""
+    held_now = (Chunk.state == "leased", Chunk.leased_until < until)
+    session.execute(update(Chunk).where(*held_now).values(leased_until=until))
+
+
 def drop(session: Session, submission: Submission) -> None:
     """Take all work on a submission out of the queue; who holds a lease of it finds it ended."""
     open_states = Chunk.state.in_(["waiting", "leased"])

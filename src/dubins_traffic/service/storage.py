@@ -6,12 +6,18 @@ What is kept is called by its SHA-256, so that writing it twice is writing it on
 from __future__ import annotations
 
 import hashlib
+from datetime import timedelta
 from pathlib import Path
+from typing import Final
 
 from obstore.exceptions import BaseError
 from obstore.store import LocalStore, from_url
 
 from dubins_traffic.errors import DubinsTrafficError
+
+RETRIES: Final = 4
+PATIENCE: Final = timedelta(seconds=20)
+"""How long a store beyond a network is asked again, before who waits for it is told; it may come again then."""
 
 
 class StorageError(DubinsTrafficError):
@@ -29,8 +35,10 @@ class Storage:
     """
 
     def __init__(self, place: str) -> None:
-        if "://" in place:
+        if place.startswith(("file:", "memory:")):
             self._store = from_url(place)
+        elif "://" in place:
+            self._store = from_url(place, retry_config={"max_retries": RETRIES, "retry_timeout": PATIENCE})
         else:
             self._store = LocalStore(Path(place).resolve(), mkdir=True)
 

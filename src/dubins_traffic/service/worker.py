@@ -6,12 +6,13 @@ It knows nothing but an address and a token; seeds come with the work and are go
 from __future__ import annotations
 
 import contextlib
+import errno
 import gzip
 import os
 import signal
 import tempfile
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,17 @@ from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.sandbox import available_layers
+from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.service.connection import AwayError, Connection, RefusalError
 
 log = structlog.get_logger("dubins_traffic.worker")
 IDLE_S = 0.5
 AWAY_S = 2.0
+UNFIT_S = 5.0
+"""How long a worker that has no room leaves the work to others."""
+NO_ROOM = frozenset(
+    (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+)
 
 
 class Worker:
@@ -85,16 +92,26 @@ class Worker:
                 if report is None:
                     self._service.post(f"{where}/release", {**token, "note": "worker stopped", "left": True})
                 else:
-                    self._service.patiently("POST", f"{where}/done", {**token, **report})
+                    done = {**token, **report}
+                    self._service.patiently(lambda: self._service.post(f"{where}/done", done))
             except RefusalError as error:
                 log.info("a lease is lost", chunk=lease["chunk"], error=str(error))
             except AwayError:
                 raise
             except Exception as error:
                 log.exception("a chunk failed", chunk=lease["chunk"])
-                note = f"{type(error).__name__}: {error}"[:500]
-                with contextlib.suppress(RefusalError):
-                    self._service.post(f"{where}/release", {**token, "note": note, "left": False})
+                self._give_back(where, token, error)
+
+    def _give_back(self, where: str, token: dict[str, Any], error: Exception) -> None:
+        """End a lease that came to nothing; where this machine has no room, that is no attempt at the chunk."""
+        note, unfit = f"{type(error).__name__}: {error}"[:500], lacks_room(error)
+        told = {**token, "note": note, "left": unfit}
+        with contextlib.suppress(RefusalError):
+            self._service.patiently(
+                lambda: self._service.post(f"{where}/release", told), self._stopping.is_set
+            )
+        if unfit:
+            self._stopping.wait(UNFIT_S)
 
     @contextlib.contextmanager
     def _heartbeat(self, where: str, token: dict[str, Any], seconds: float) -> Generator[threading.Event]:
@@ -121,10 +138,14 @@ class Worker:
 
     def _done(self, lease: dict[str, Any], lost: threading.Event) -> dict[str, Any] | None:
         """Return the report of a chunk, None if the worker is to stop or has lost the lease before its end."""
-        data = self._service.fetch(f"/worker/submissions/{lease['digest']}")
+        where = f"/worker/submissions/{lease['digest']}"
+        data = self._service.patiently(lambda: self._service.fetch(where), self._over(lost))
         try:
             submission = check_submission(data, self._folder / "submissions")
+            program_of(str(submission.path))
         except InputError as error:
+            if lacks_room(error) or lease["kind"] != "check":
+                raise
             return {"rejected": str(error)}
         if lease["kind"] == "check":
             return {"content": submission.digest}
@@ -147,12 +168,16 @@ class Worker:
             for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, records=records):
                 if not judged.counts:
                     raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
-                trials.append({**judged.to_json(), "replay": self._replay(judged, lease)})
-                if lost.is_set() or self._stopping.is_set():
+                trials.append({**judged.to_json(), "replay": self._replay(judged, lease, lost)})
+                if self._over(lost)():
                     return None
         return {"trials": trials}
 
-    def _replay(self, judged: Judged, lease: dict[str, Any]) -> str | None:
+    def _over(self, lost: threading.Event) -> Callable[[], bool]:
+        """Return what tells that a lease is of no use any more."""
+        return lambda: lost.is_set() or self._stopping.is_set()
+
+    def _replay(self, judged: Judged, lease: dict[str, Any], lost: threading.Event) -> str | None:
         """Send the page that replays a trial, and return its SHA-256; None for a trial without a frame."""
         if judged.record is None or not judged.record.exists():
             return None
@@ -162,7 +187,17 @@ class Worker:
             return None
         judged.record.unlink()
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
-        return self._service.put(where, gzip.compress(page.encode(), 6, mtime=0))["digest"]
+        packed = gzip.compress(page.encode(), 6, mtime=0)
+        return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))["digest"]
+
+
+def lacks_room(error: BaseException | None) -> bool:
+    """Tell whether an error comes of this machine: a full or broken disk, no memory, no more open files."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def replay_of(record: Path) -> str:

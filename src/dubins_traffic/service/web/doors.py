@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Any
 
 import msgspec
@@ -132,7 +133,7 @@ class Doors(Controller):
         data = await request.body()
         if not data.startswith(b"\x1f\x8b"):
             raise ClientException("a replay is packed by gzip")
-        return {"digest": office.storage.put(data, "replays")}
+        return {"digest": await asyncio.to_thread(office.storage.put, data, "replays")}
 
     @post("/chunks/{number:int}/done", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
     def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:

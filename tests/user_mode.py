@@ -1,0 +1,110 @@
+"""A kernel of its own for a test: user-mode Linux, which sees this machine's files and can't write them.
+
+Its control groups are those of version 2, with all controllers, whatever those of this machine are.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+PROGRAM = "linux.uml"
+REASON = "needs user-mode-linux; scripts/system-packages.sh installs it"
+LIMIT_S = 3000.0
+DONE = "user-mode: status"
+BEGIN = """#!/bin/bash
+mount -t proc proc /proc
+mount -t sysfs sys /sys
+mount -t cgroup2 cgroup2 /sys/fs/cgroup
+for place in /tmp /run /var/tmp; do mount -t tmpfs -o mode=1777 tmpfs $place; done
+mkdir -p /dev/shm
+mount -t tmpfs -o mode=1777 tmpfs /dev/shm
+ip link set lo up 2>/dev/null
+cd /tmp
+"""
+SITUATIONS = {
+    "root": "",
+    "beside": """
+mkdir /sys/fs/cgroup/slice
+echo +memory +pids >/sys/fs/cgroup/cgroup.subtree_control
+echo +memory +pids >/sys/fs/cgroup/slice/cgroup.subtree_control
+mkdir /sys/fs/cgroup/slice/session
+echo $$ >/sys/fs/cgroup/slice/session/cgroup.procs
+""",
+    "ordinary": """
+mkdir -p /sys/fs/cgroup/user/session
+echo +memory +pids >/sys/fs/cgroup/cgroup.subtree_control
+chown -R 65533 /sys/fs/cgroup/user
+echo $$ >/sys/fs/cgroup/user/session/cgroup.procs
+""",
+}
+"""How control groups lie when a command begins: in the root, beside a session of systemd's, or handed to a user."""
+
+
+def require() -> None:
+    """Leave the test out where there is no user-mode Linux; in continuous integration it fails."""
+    if shutil.which(PROGRAM) is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail(REASON)
+        pytest.skip(REASON)
+
+
+def run(command: Sequence[str], situation: str, *, user: int = 0) -> tuple[int, str]:
+    """Run a command under a kernel of its own; return its status and what it has said.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The command line.
+    situation : str
+        Of `SITUATIONS`.
+    user : int
+        Who runs it.
+    """
+    drop = ("setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups") if user else ()
+    words = shlex.join([*drop, *command])
+    opened = _opened(Path(sys.base_prefix)) if user else ""
+    kept = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/tmp", "PYTHONDONTWRITEBYTECODE": "1"}
+    kept["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    sets = "".join(f"export {name}={shlex.quote(value)}\n" for name, value in kept.items())
+    with tempfile.NamedTemporaryFile("w", prefix="user-mode-", suffix=".sh", dir="/var/tmp") as script:
+        script.write(
+            f"{BEGIN}{sets}{SITUATIONS[situation]}{opened}\n{words}\necho {DONE} $?\n/sbin/poweroff -f\nsleep 9\n"
+        )
+        script.flush()
+        Path(script.name).chmod(0o755)
+        options = ["mem=2G", "rootfstype=hostfs", "rootflags=/", "ro", f"init={script.name}", "quiet"]
+        consoles = ["con=null", "con0=null,fd:2", "con1=null"]
+        with tempfile.TemporaryDirectory() as own:
+            done = subprocess.run(
+                [PROGRAM, *options, *consoles, f"uml_dir={own}"],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                timeout=LIMIT_S,
+                check=False,
+            )
+    said, found, rest = done.stdout.decode(errors="replace").rpartition(DONE)
+    assert found, rest
+    return int(rest.split()[0]), said
+
+
+def _opened(folder: Path) -> str:
+    """Return the steps that let everybody enter a folder below one that is closed, as that of an interpreter may be."""
+    closed = [own for own in folder.parents if not own.stat().st_mode & 0o1]
+    if not closed:
+        return ""
+    steps = (
+        "mkdir /tmp/open",
+        f"mount --bind {folder} /tmp/open",
+        f"mount -t tmpfs -o mode=755 tmpfs {closed[-1]}",
+    )
+    return "\n".join(["", *steps, f"mkdir -p {folder}", f"mount --move /tmp/open {folder}"])
