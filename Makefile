@@ -29,6 +29,7 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
 	$(BIN)/python -m tests.judge_trials 500
 	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py
+	DUBINS_TRAFFIC_SERVED_TRIALS=1000 $(BIN)/python -m pytest tests/integration/test_served_frames.py
 	$(BIN)/python -m benchmarks verify odd_egos rules
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json

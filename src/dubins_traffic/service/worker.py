@@ -9,7 +9,6 @@ import contextlib
 import gzip
 import os
 import signal
-import sys
 import tempfile
 import threading
 from collections.abc import Generator
@@ -225,5 +224,10 @@ def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
 
 
 def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
+    """End when nobody holds the other end of standard input; read without Python's own lock on it.
+
+    An interpreter that ends while a thread holds that lock aborts.
+    """
+    while os.read(0, 1024):
+        continue
     os._exit(1)
