@@ -46,6 +46,8 @@ class BoxedController:
         How the last driving ended, None if with its trial.
     log_tail : str
         The last that the program printed in the last trial.
+    seconds : float
+        Processor time that its box used in the last trial, from its start on.
     """
 
     def __init__(self, program: Program, limits: Limits, layers: Layers) -> None:
@@ -54,6 +56,7 @@ class BoxedController:
         self._reports: tuple[tuple[str, str], ...] = ()
         self.end: BoxEnd | None = None
         self.log_tail = ""
+        self.seconds = 0.0
 
     def __deepcopy__(self, memo: object) -> Self:
         """Refuse: a program drives in one trial at a time."""
@@ -125,7 +128,7 @@ class BoxedController:
 
     def _drop(self) -> None:
         if self._box is not None:
-            self.log_tail = self._box.log_tail
+            self.log_tail, self.seconds = self._box.log_tail, self._box.seconds()
             self._box.close()
             self._box = None
 
