@@ -11,6 +11,7 @@ import os
 import signal
 import tempfile
 import threading
+import time
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ from dubins_traffic.service.connection import AwayError, Connection, RefusalErro
 log = structlog.get_logger("dubins_traffic.worker")
 IDLE_S = 0.5
 AWAY_S = 2.0
+LONGEST_S = 60.0
+"""A chunk whose trials have taken so long is reported as far as it is done: others wait for no more than this."""
 
 
 class Worker:
@@ -88,13 +91,17 @@ class Worker:
                     self._service.patiently("POST", f"{where}/done", {**token, **report})
             except RefusalError as error:
                 log.info("a lease is lost", chunk=lease["chunk"], error=str(error))
+                self._give_back(where, token, str(error))
             except AwayError:
                 raise
             except Exception as error:
                 log.exception("a chunk failed", chunk=lease["chunk"])
-                note = f"{type(error).__name__}: {error}"[:500]
-                with contextlib.suppress(RefusalError):
-                    self._service.post(f"{where}/release", {**token, "note": note, "left": False})
+                self._give_back(where, token, f"{type(error).__name__}: {error}")
+
+    def _give_back(self, where: str, token: dict[str, Any], note: str) -> None:
+        """End a lease without a result, if it has not ended."""
+        with contextlib.suppress(RefusalError):
+            self._service.post(f"{where}/release", {**token, "note": note[:500], "left": False})
 
     @contextlib.contextmanager
     def _heartbeat(self, where: str, token: dict[str, Any], seconds: float) -> Generator[threading.Event]:
@@ -142,14 +149,17 @@ class Worker:
     ) -> dict[str, Any] | None:
         numbers: list[int] = lease["numbers"]
         trials: list[dict[str, Any]] = []
+        began = time.monotonic()
         with tempfile.TemporaryDirectory(dir=self._folder) as drafts:
             records = None if lease["kind"] == "again" else Path(drafts)
             for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, records=records):
                 if not judged.counts:
                     raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
                 trials.append({**judged.to_json(), "replay": self._replay(judged, lease)})
-                if lost.is_set() or self._stopping.is_set():
+                if lost.is_set():
                     return None
+                if self._stopping.is_set() or time.monotonic() - began > LONGEST_S:
+                    break
         return {"trials": trials}
 
     def _replay(self, judged: Judged, lease: dict[str, Any]) -> str | None:
@@ -162,7 +172,11 @@ class Worker:
             return None
         judged.record.unlink()
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
-        return self._service.put(where, gzip.compress(page.encode(), 6, mtime=0))["digest"]
+        try:
+            return self._service.put(where, gzip.compress(page.encode(), 6, mtime=0))["digest"]
+        except RefusalError as error:  # too large for the service: the result counts without it
+            log.warning("a replay is refused", trial=judged.number, error=str(error))
+            return None
 
 
 def replay_of(record: Path) -> str:
