@@ -60,7 +60,7 @@ class Worker:
         self._stopping.set()
 
     def work(self) -> None:
-        """Work until `stop`; a service that is away is waited for.
+        """Work until `stop`, then hang up; a service that is away is waited for.
 
         Raises
         ------
@@ -68,16 +68,21 @@ class Worker:
             If this machine can't hold a stranger's program, and the worker does not trust submissions.
         """
         check_boxes(trust=self._trust)
-        while not self._stopping.is_set():
-            try:
-                lease = self._service.post("/worker/lease", {"name": self._name})
-                if lease:
-                    self._serve(lease)
-                else:
-                    self._stopping.wait(IDLE_S)
-            except AwayError as error:
-                log.warning("the service is away", error=str(error))
-                self._stopping.wait(AWAY_S)
+        with contextlib.closing(self._service):
+            while not self._stopping.is_set():
+                self._ask()
+
+    def _ask(self) -> None:
+        """Ask for work, and do it; if there is none, or nobody answers, wait a little."""
+        try:
+            lease = self._service.post("/worker/lease", {"name": self._name})
+            if lease:
+                self._serve(lease)
+            else:
+                self._stopping.wait(IDLE_S)
+        except AwayError as error:
+            log.warning("the service is away", error=str(error))
+            self._stopping.wait(AWAY_S)
 
     def _serve(self, lease: dict[str, Any]) -> None:
         where = f"/worker/chunks/{lease['chunk']}"
