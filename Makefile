@@ -30,6 +30,7 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 	$(BIN)/python -m tests.judge_trials 500
 	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py \
 		tests/integration/test_service_full_disks.py tests/integration/test_service_ray.py
+	DUBINS_TRAFFIC_SERVED_TRIALS=1000 $(BIN)/python -m pytest tests/integration/test_served_frames.py
 	DUBINS_TRAFFIC_ATTACKS=all $(BIN)/python -m pytest tests/sandbox/test_second_version.py
 	$(BIN)/python -m benchmarks verify odd_egos rules
 

@@ -230,8 +230,9 @@ def serving(
             process.terminate()
             process.wait(timeout=60)
         process.stdout.close()
-        assert "Fatal Python error" not in log.read_text(), log.read_text()[-5000:]
-        assert "Traceback" not in log.read_text() or not clean, log.read_text()[-5000:]
+        said = log.read_text()
+        assert "Fatal Python error" not in said, said[-5000:]
+        assert "Traceback" not in said or not clean, said[-5000:]
 
 
 def answers(url: str) -> bool:

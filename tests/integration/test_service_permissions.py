@@ -54,6 +54,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("POST", "/desk/create"): ("/desk/create", {ORGANISER}),
     ("POST", "/desk/invite"): ("/desk/invite", {ORGANISER}),
     ("POST", "/desk/worker"): ("/desk/worker", {ORGANISER}),
+    ("POST", "/desk/worker/{number:int}/revoke"): ("/desk/worker/999/revoke", {ORGANISER}),
     ("POST", "/desk/accounts/{number:int}/reset"): ("/desk/accounts/2/reset", {ORGANISER}),
     ("POST", "/desk/accounts/{number:int}/remove"): ("", {ORGANISER}),
     ("GET", "/desk/c/{slug:str}"): ("/desk/c/short", {ORGANISER}),
@@ -159,6 +160,26 @@ def test_who_may_use_a_route(world: World, route: tuple[str, str], role: str) ->
 def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:
     answer = world.people[ORGANISER].http.post("/desk/invite", data={"role": "organiser"})
     assert answer.status_code == 403
+
+
+def test_a_worker_s_token_ends_when_it_is_revoked(world: World) -> None:
+    organiser, stolen = world.people[ORGANISER], world.service.person()
+    stolen.token = shown_secret(organiser.post("/desk/worker", form="/desk", name="a laptop"))
+
+    def status() -> int:
+        headers = {"authorization": f"Bearer {stolen.token}"}
+        return stolen.http.get("/metrics", headers=headers).status_code
+
+    assert status() == 200
+    number = re.search(
+        r'worker/(\d+)/revoke"[^>]*>\s*<input[^>]*>\s*<button[^>]*of a laptop', organiser.get("/desk").text
+    )
+    assert number is not None
+    assert organiser.post(f"/desk/worker/{number[1]}/revoke", form="/desk").status_code == 303
+    assert status() == 401
+    assert "revoke worker" in organiser.get("/desk/log").text
+    own = organiser.post("/desk/worker", form="/desk", name="workers  beside the server")
+    assert own.status_code == 400
 
 
 def test_a_session_ends_with_its_password(world: World) -> None:

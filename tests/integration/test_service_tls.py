@@ -56,7 +56,9 @@ def test_people_and_clients_come_by_https(tmp_path: Path) -> None:
     url = f"https://localhost:{port}"
     (tmp_path / "short.toml").write_text(competition_text())
     arguments = ("--workers", "0", "--competition", str(tmp_path / "short.toml"))
-    with serving(tmp_path / "here", *arguments, settings=f'url = "{url}"\n', behind=True) as service:
+    with serving(
+        tmp_path / "here", *arguments, settings=f'url = "{url}"\nlogins = 6\n', behind=True
+    ) as service:
         configuration = proxy_file(tmp_path, port, service.url)
         proxy = subprocess.Popen([NGINX, "-p", str(tmp_path), "-c", str(configuration), "-g", "daemon off;"])
         try:
@@ -87,8 +89,10 @@ def checked(url: str, code: str, trusted: ssl.SSLContext) -> None:
     assert person.submit("short/practice", big) == 1
     assert person.state(1) == "received"
     guesses = [Person(url, verify=trusted) for _ in range(2)]
-    answers = [guesses[k % 2].post("/login", name="Olga", password="wrong").status_code for k in range(25)]
+    answers = [guesses[k % 2].post("/login", name="Olga", password="wrong").status_code for k in range(9)]
     assert answers[0] == 200
     assert 429 in answers
+    wrong = {"password": "wrong wrong", "new": "another secret"}
+    wait_until(lambda: person.post("/team/password", form="/team", **wrong).status_code == 429, pause=0.0)
     for one in (organiser, person, *guesses):
         one.http.close()

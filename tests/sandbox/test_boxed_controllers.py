@@ -34,6 +34,34 @@ def test_twenty_trials_in_a_box_have_the_frames_of_the_same_controller_in_proces
         assert frames(tmp_path / f"{trial}.mcap") == frames(tmp_path / f"{trial}-here.mcap")
 
 
+def test_a_box_loads_what_it_drives_with_and_tells_its_processor_time(tmp_path: Path) -> None:
+    """Each trial begins a box: what it loads in vain is paid a hundred times a submission."""
+    body = "print(*sorted({name.partition('.')[0] for name in sys.modules}))\nreturn 0.1, 0.0"
+    result, controller = driven(written(tmp_path, body), ticks=1)
+    loaded = set(controller.log_tail.split())
+    assert {"dubins_traffic", "numpy"} <= loaded
+    assert not loaded & {"pydantic", "pyseccomp", "llvmlite", "rich", "typer", "mcap"}
+    assert 0.01 < controller.seconds < 60.0
+    assert result.ending.end == End.DURATION
+
+
+REPORTING = """
+class Mine:
+    def start(self, problem): pass
+    def act(self, seen): return 0.1, 0.0
+    def report(self): return [("note", "x" * 500)] * 100
+"""
+
+
+def test_what_a_box_reports_is_limited_as_what_it_prints(tmp_path: Path) -> None:
+    """Records and replays hold it: one that no service takes would be a fault of ours, free of charge."""
+    (tmp_path / "mine.py").write_text(REPORTING)
+    result, controller = driven(f"{tmp_path / 'mine.py'}:Mine", Limits(output=200_000))
+    assert (result.ending.end, result.ending.ticks) == (End.OUTPUT_FLOOD, 3)
+    assert controller.end is not None
+    assert controller.end.fault == "submission"
+
+
 def test_a_built_in_controller_in_a_box_drives_as_it_does_in_process(tmp_path: Path) -> None:
     instance = replace(dt.draw(dt.load_config("demo"), seed=3), duration=3.0)
     dt.run_trial(instance, "lanes+sandbox", record=tmp_path / "there.mcap")

@@ -102,8 +102,6 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
     ------
     InputError
         If an entry lacks a trial, has one twice, or one that ended by a fault of the platform and must run again.
-    MissingExtraError
-        Without the extra `competition`.
     """
     found = sorted(
         (_entry(name, results, phase) for name, results in sorted(entries.items())),

@@ -46,14 +46,18 @@ class BoxedController:
         How the last driving ended, None if with its trial.
     log_tail : str
         The last that the program printed in the last trial.
+    seconds : float
+        Processor time that its box used in the last trial, from its start on.
     """
 
     def __init__(self, program: Program, limits: Limits, layers: Layers) -> None:
         self._program, self._limits, self._layers = program, limits, layers
         self._box: Box | None = None
         self._reports: tuple[tuple[str, str], ...] = ()
+        self._reported = 0
         self.end: BoxEnd | None = None
         self.log_tail = ""
+        self.seconds = 0.0
 
     def __deepcopy__(self, memo: object) -> Self:
         """Refuse: a program drives in one trial at a time."""
@@ -64,7 +68,7 @@ class BoxedController:
     def start(self, problem: Problem) -> None:
         """Begin a box and tell its program the problem."""
         self._drop()
-        self.end, self.log_tail, self._reports = None, "", ()
+        self.end, self.log_tail, self._reports, self._reported = None, "", (), 0
         try:
             self._box = Box(self._program, self._limits, self._layers)
             if self._program.shim:
@@ -93,8 +97,16 @@ class BoxedController:
             raise self._over(error) from None
         if observation.tick == 0:
             box.decide()
-        self._reports = answer.reports
+        self._note(box, answer.reports)
         return Command(answer.speed, answer.yaw_rate)
+
+    def _note(self, box: Box, reports: tuple[tuple[str, str], ...]) -> None:
+        """Keep what has been reported; all of a trial is limited as what is printed, since records hold it."""
+        self._reports = reports
+        self._reported += sum(len(kind) + len(detail) for kind, detail in reports)
+        if self._reported > self._limits.output:
+            detail = f"it reported more than {self._limits.output} characters"
+            raise self._over(box.fault(End.OUTPUT_FLOOD, detail))
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what the controller has reported with its last command."""
@@ -125,7 +137,7 @@ class BoxedController:
 
     def _drop(self) -> None:
         if self._box is not None:
-            self.log_tail = self._box.log_tail
+            self.log_tail, self.seconds = self._box.log_tail, self._box.seconds()
             self._box.close()
             self._box = None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import secrets
 import unicodedata
 from collections.abc import Sequence
@@ -10,7 +11,7 @@ from functools import cache
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
@@ -21,6 +22,10 @@ ROLES = (PARTICIPANT, ORGANISER)
 SHORTEST_PASSWORD = 10
 LONGEST_PASSWORD = 1000
 LONGEST_NAME = 60
+RESERVED = re.compile(r"removed \d+", re.IGNORECASE)
+"""Names of accounts that have been removed: who had one could not be removed in turn."""
+LOCAL = "workers beside the server"
+"""Name of the token of workers that the server begins by itself."""
 INVITATION_S = 30 * 86400.0
 """How long an invitation is good, seconds."""
 RESET_S = 86400.0
@@ -101,7 +106,9 @@ def register(session: Session, code: str, name: str, password: str, team: str, a
     """
     invitation = _use(session, code, "invitation", at)
     name = clean_name(name, "name")
-    if session.scalar(select(func.count()).where(func.lower(Account.name) == name.lower())):
+    if RESERVED.fullmatch(name) or name.casefold() in map(
+        str.casefold, session.scalars(select(Account.name))
+    ):
         raise WrongEntryError("name: taken")
     account = Account(
         name=name,
@@ -120,7 +127,7 @@ def register(session: Session, code: str, name: str, password: str, team: str, a
 def found_team(session: Session, name: str, at: float) -> Team:
     """Make a new team; WrongEntryError if the name is taken or is none."""
     name = clean_name(name, "team")
-    if session.scalar(select(func.count()).where(func.lower(Team.name) == name.lower())):
+    if name.casefold() in map(str.casefold, session.scalars(select(Team.name))):
         raise WrongEntryError("team: the name is taken; a team's members invite further ones")
     team = Team(name=name, created=at)
     session.add(team)
@@ -130,9 +137,10 @@ def found_team(session: Session, name: str, at: float) -> Team:
 
 def verified(session: Session, name: str, password: str) -> Account | None:
     """Return the account that a name and a password are of, else None."""
-    wanted = unicodedata.normalize("NFKC", name).strip().lower()
-    query = select(Account).where(func.lower(Account.name) == wanted, Account.removed.is_(None))
-    account = session.scalars(query).first()
+    wanted = " ".join(unicodedata.normalize("NFKC", name).split()).casefold()
+    there = session.execute(select(Account.id, Account.name).where(Account.removed.is_(None))).all()
+    found = next((number for number, known in there if known.casefold() == wanted), None)
+    account = None if found is None else session.get(Account, found)
     try:
         _hasher().verify(_nobody() if account is None else account.password, password[:LONGEST_PASSWORD])
     except (VerificationError, InvalidHashError):
@@ -186,6 +194,12 @@ def new_token(session: Session, name: str, account: Account | None, at: float) -
     owner = account and account.id
     session.add(Token(digest=digest_of(token), name=clean_name(name, "name"), account_id=owner, created=at))
     return token
+
+
+def worker_tokens(session: Session) -> Sequence[Token]:
+    """Return the tokens of workers on other machines that are good."""
+    query = select(Token).where(Token.account_id.is_(None), Token.revoked.is_(None), Token.name != LOCAL)
+    return session.scalars(query.order_by(Token.id)).all()
 
 
 def token_of(session: Session, token: str) -> Token | None:

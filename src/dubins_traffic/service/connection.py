@@ -61,6 +61,10 @@ class Connection:
             base_url=url.rstrip("/"), headers=headers, timeout=TIMEOUT_S
         )
 
+    def close(self) -> None:
+        """Hang up."""
+        self._client.close()
+
     def get(self, path: str) -> Any:
         """Return the JSON at a path."""
         return self._ask("GET", path)

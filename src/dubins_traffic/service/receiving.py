@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
@@ -39,7 +41,7 @@ def take_in(
     """Keep what somebody has sent and queue it; the same again is the same submission.
 
     The bytes are in the store before a row names them, so a server that is killed in between loses nothing that it
-    has confirmed.
+    has confirmed. What is refused is not kept.
 
     Returns
     -------
@@ -56,16 +58,15 @@ def take_in(
     if len(data) > office.settings.largest_upload << 20:
         raise WrongEntryError(f"file: at most {office.settings.largest_upload} MiB")
     at = office.clock()
+    upload = Upload(hashlib.sha256(data).hexdigest(), filename or "upload", len(data))
     with office.database.reading() as session:
         phase = found_phase(session, slug, name)
-        if not phase.is_open(at) and not phase.is_closed(at):
-            raise RefusedError("the phase is not open yet")
-    digest = office.storage.put(data, "submissions")
+        submissions.admitted(session, phase, office.phase(phase).quota, account, upload, at)
+    office.storage.put(data, "submissions")
 
     def keep(session: Session) -> tuple[int, bool]:
         row = found_phase(session, slug, name)
         own = session.get_one(Account, account.id)
-        upload = Upload(digest, filename or "upload", len(data))
         submission, new = submissions.receive(session, row, office.phase(row).quota, own, upload, at)
         return submission.id, new
 

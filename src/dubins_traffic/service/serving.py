@@ -26,7 +26,6 @@ from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
 log = structlog.get_logger("dubins_traffic.service")
-LOCAL = "workers beside the server"
 WORKER = (sys.executable, "-m", "dubins_traffic.cli", "worker")
 WATCH_S = 1.0
 
@@ -99,9 +98,11 @@ def local_token(office: Office) -> str:
     """Return a token for the workers beside this server; those of servers before it end."""
 
     def make(session: Session) -> str:
-        old = update(Token).where(Token.name == LOCAL, Token.account_id.is_(None), Token.revoked.is_(None))
+        old = update(Token).where(
+            Token.name == accounts.LOCAL, Token.account_id.is_(None), Token.revoked.is_(None)
+        )
         session.execute(old.values(revoked=office.clock()))
-        return accounts.new_token(session, LOCAL, None, office.clock())
+        return accounts.new_token(session, accounts.LOCAL, None, office.clock())
 
     return office.database.patiently(make)
 

@@ -28,6 +28,10 @@ SAMPLE = 20
 """One trial in so many is run twice, and one at least."""
 MOST_UPLOADS = 200
 """Uploads of a team in an hour, rejected ones too: each costs us a check."""
+MOST_BYTES = 512 << 20
+"""Bytes of these: what is rejected costs no quota, and yet it is kept."""
+MOST_REPEATS = 20
+"""So often may the same be handed in again that was cancelled or failed by our fault."""
 REASONS = {
     "received": "waits for a worker that checks it",
     "checking": "a worker looks whether it can be run",
@@ -73,6 +77,33 @@ def receive(
     RefusedError
         If the account is in no team, the phase is not open at `at`, or the team's quota is used up.
     """
+    known = admitted(session, phase, quota, account, upload, at)
+    if known is not None and not _may_repeat(known):
+        return known, False
+    if known is None:
+        known = Submission(phase_id=phase.id, team_id=account.team_id, digest=upload.digest, size=upload.size)
+        known.run = 0
+    else:
+        known.run += 1
+    known.account_id, known.filename, known.received = account.id, shown(upload.filename, 100), at
+    known.costs = True
+    enter(known, "received", at)
+    session.add(known)
+    session.flush()
+    queue.add(session, known, "check", [[]])
+    return known, True
+
+
+def admitted(
+    session: Session, phase: Phase, quota: Quota, account: Account, upload: Upload, at: float
+) -> Submission | None:
+    """Return the submission that an upload is the same as, None if it is a new one; it may be taken in.
+
+    Raises
+    ------
+    RefusedError
+        As for `receive`, of which this is the part that keeps nothing.
+    """
     if account.team_id is None:
         raise RefusedError("you are in no team: join or found one first")
     same = select(Submission).where(
@@ -82,27 +113,24 @@ def receive(
     )
     known = session.scalars(same).first()
     if known is not None and not _may_repeat(known):
-        return known, False
+        return known
     if not phase.is_open(at):
         raise RefusedError("the phase is closed" if phase.is_closed(at) else "the phase is not open yet")
+    if known is not None and known.run >= MOST_REPEATS:
+        raise RefusedError("the same was handed in again too often: change it")
     _within_quota(session, phase, quota, account.team_id, at)
-    if known is None:
-        known = Submission(phase_id=phase.id, team_id=account.team_id, digest=upload.digest, size=upload.size)
-        known.run = 0
-    else:
-        known.run += 1
-    known.account_id, known.filename, known.received = account.id, shown(upload.filename, 100), at
-    known.costs, known.named, known.disqualified = True, known.named or False, ""
-    enter(known, "received", at)
-    session.add(known)
-    session.flush()
-    queue.add(session, known, "check", [[]])
-    return known, True
+    _within_an_hour(session, account.team_id, upload, at)
+    return known
 
 
 def _may_repeat(submission: Submission) -> bool:
-    """Whether sending the same again begins anew: it was cancelled, or failed by our fault."""
-    return submission.state == "cancelled" or (submission.state == "failed" and submission.fault == OURS)
+    """Whether sending the same again begins anew: it was cancelled before it ran, or failed by our fault.
+
+    What was cancelled while it ran has shown something, and has cost: it would run a second time for the same price.
+    """
+    if submission.state == "cancelled":
+        return not submission.costs
+    return submission.state == "failed" and submission.fault == OURS
 
 
 def used(session: Session, phase: Phase, team_id: int, at: float) -> tuple[int, int, int]:
@@ -124,9 +152,15 @@ def _within_quota(session: Session, phase: Phase, quota: Quota, team_id: int, at
     for name, limit, count in zip(names, limits, used(session, phase, team_id, at), strict=True):
         if limit is not None and count >= limit:
             raise RefusedError(f"the quota is used up: {count} of {limit} submissions {name}")
-    hour = select(func.count()).where(Submission.team_id == team_id, Submission.received > at - HOUR)
-    if (session.scalar(hour) or 0) >= MOST_UPLOADS:
+
+
+def _within_an_hour(session: Session, team_id: int, upload: Upload, at: float) -> None:
+    lately = select(Submission.size).where(Submission.team_id == team_id, Submission.received > at - HOUR)
+    sizes = session.scalars(lately).all()
+    if len(sizes) >= MOST_UPLOADS:
         raise RefusedError(f"more than {MOST_UPLOADS} uploads in an hour: try later")
+    if sum(sizes) + upload.size > MOST_BYTES:
+        raise RefusedError(f"more than {MOST_BYTES >> 20} MiB in an hour: try later")
 
 
 def taken(submission: Submission, chunk: Chunk, at: float) -> None:
@@ -138,10 +172,9 @@ def taken(submission: Submission, chunk: Chunk, at: float) -> None:
 
 
 def accept(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:
-    """Queue the trials of a submission that was found to be one, and a sample of them a second time."""
+    """Queue the trials of a submission that was found to be one; when all are run a sample follows a second time."""
     enter(submission, "queued", at)
     queue.add(session, submission, "trials", in_chunks(numbers))
-    queue.add(session, submission, "again", in_chunks(sample(submission.digest, numbers)))
 
 
 def in_chunks(numbers: Sequence[int]) -> list[list[int]]:
@@ -183,12 +216,13 @@ def cancel(session: Session, submission: Submission, at: float) -> None:
     if submission.state not in ACTIVE:
         raise RefusedError(f"it is {submission.state} already")
     queue.drop(session, submission)
-    submission.costs = submission.state in ("running", "scoring")
+    ran = select(Trial.id).where(Trial.submission_id == submission.id).limit(1)
+    submission.costs = submission.state in ("running", "scoring") or session.scalar(ran) is not None
     enter(submission, "cancelled", at, "cancelled by the team", THEIRS)
 
 
 def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float) -> None:
-    """Keep the results of a chunk of trials, end its lease, and let the submission go on.
+    """Keep the results of the first trials of a chunk, end its lease, queue the rest, and let the submission go on.
 
     Parameters
     ----------
@@ -197,7 +231,7 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
     chunk : Chunk
         The chunk, on lease.
     results : sequence of dict
-        For each of its trials `number`, `row`, `end`, `owner`, `log`, `frames` and `replay`.
+        For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames` and `replay`.
     at : float
         Now.
 
@@ -206,7 +240,8 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
     RefusedError
         If these are not the results of this chunk's trials.
     """
-    if [result["number"] for result in results] != chunk.numbers:
+    numbers, left = chunk.numbers[: len(results)], chunk.numbers[len(results) :]
+    if not results or [result["number"] for result in results] != numbers:
         raise RefusedError(f"chunk {chunk.id}: results of other trials")
     submission = chunk.submission
     if chunk.kind == "again":
@@ -216,10 +251,25 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
     else:
         for result in results:
             session.add(Trial(submission_id=submission.id, run=chunk.run, **result))
+    chunk.numbers = numbers
     queue.finish(session, chunk)
-    if queue.unfinished(session, submission) == 0 and submission.state in ACTIVE:
-        enter(submission, "scoring", at)
-        submission.phase.version += 1
+    if left:
+        queue.add(session, submission, chunk.kind, [left])
+    if submission.state in ACTIVE:
+        _go_on(session, submission, chunk, at)
+
+
+def _go_on(session: Session, submission: Submission, chunk: Chunk, at: float) -> None:
+    """Let a submission that has come further stay as long again; after its trials comes the sample, then the table."""
+    submission.deadline = at + DEADLINES[submission.state]
+    if queue.unfinished(session, submission):
+        return
+    if chunk.kind == "trials":
+        numbers = [trial.number for trial in trials(session, submission)]
+        queue.add(session, submission, "again", in_chunks(sample(submission.digest, numbers)))
+        return
+    enter(submission, "scoring", at)
+    submission.phase.version += 1
 
 
 def trials(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
@@ -235,10 +285,12 @@ def judge_again(session: Session, submission: Submission, numbers: Sequence[int]
     Raises
     ------
     RefusedError
-        If it was rejected, so that there is nothing to run.
+        If it was rejected, so that there is nothing to run, or has not been checked yet.
     """
     if submission.state == "rejected":
         raise RefusedError("it was rejected: there is nothing to run")
+    if submission.content is None:
+        raise RefusedError("no worker has checked it: there is nothing to judge again")
     queue.drop(session, submission)
     submission.run += 1
     accept(session, submission, numbers, at)

@@ -104,6 +104,7 @@ def told_submission(
     if is_organiser(account):
         open_model = phase.model.model_copy(update={"shows": "all"})
         phase = type(phase)(phase.name, open_model, phase.configurations, phase.ranking, phase.folder)
+    secret = phase.shows == "nothing" and not phase.is_closed(now)
     return {
         "id": submission.id,
         "competition": row.competition.slug,
@@ -115,7 +116,9 @@ def told_submission(
         "active": submission.state in submissions.ACTIVE,
         **visible(phase, state, results, now=now),
         "shows": row.shows,
-        "deadline": iso(submission.deadline) if submission.state in submissions.ACTIVE else None,
+        "deadline": iso(submission.deadline)
+        if submission.state in submissions.ACTIVE and not secret
+        else None,
     }
 
 

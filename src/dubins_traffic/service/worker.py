@@ -12,6 +12,7 @@ import os
 import signal
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ IDLE_S = 0.5
 AWAY_S = 2.0
 UNFIT_S = 5.0
 """How long a worker that has no room leaves the work to others."""
+LONGEST_S = 60.0
+"""A chunk whose trials have taken so long is reported as far as it is done: others wait for no more than this."""
 NO_ROOM = frozenset(
     (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 )
@@ -64,7 +67,7 @@ class Worker:
         self._stopping.set()
 
     def work(self) -> None:
-        """Work until `stop`; a service that is away is waited for.
+        """Work until `stop`, then hang up; a service that is away is waited for.
 
         Raises
         ------
@@ -72,16 +75,21 @@ class Worker:
             If this machine can't hold a stranger's program, and the worker does not trust submissions.
         """
         check_boxes(trust=self._trust)
-        while not self._stopping.is_set():
-            try:
-                lease = self._service.post("/worker/lease", {"name": self._name})
-                if lease:
-                    self._serve(lease)
-                else:
-                    self._stopping.wait(IDLE_S)
-            except AwayError as error:
-                log.warning("the service is away", error=str(error))
-                self._stopping.wait(AWAY_S)
+        with contextlib.closing(self._service):
+            while not self._stopping.is_set():
+                self._ask()
+
+    def _ask(self) -> None:
+        """Ask for work, and do it; if there is none, or nobody answers, wait a little."""
+        try:
+            lease = self._service.post("/worker/lease", {"name": self._name})
+            if lease:
+                self._serve(lease)
+            else:
+                self._stopping.wait(IDLE_S)
+        except AwayError as error:
+            log.warning("the service is away", error=str(error))
+            self._stopping.wait(AWAY_S)
 
     def _serve(self, lease: dict[str, Any]) -> None:
         where = f"/worker/chunks/{lease['chunk']}"
@@ -96,6 +104,7 @@ class Worker:
                     self._service.patiently(lambda: self._service.post(f"{where}/done", done))
             except RefusalError as error:
                 log.info("a lease is lost", chunk=lease["chunk"], error=str(error))
+                self._give_back(where, token, error)
             except AwayError:
                 raise
             except Exception as error:
@@ -103,7 +112,7 @@ class Worker:
                 self._give_back(where, token, error)
 
     def _give_back(self, where: str, token: dict[str, Any], error: Exception) -> None:
-        """End a lease that came to nothing; where this machine has no room, that is no attempt at the chunk."""
+        """End a lease that came to nothing, if it has not ended; without room here that is no attempt at the chunk."""
         note, unfit = f"{type(error).__name__}: {error}"[:500], lacks_room(error)
         told = {**token, "note": note, "left": unfit}
         with contextlib.suppress(RefusalError):
@@ -163,14 +172,17 @@ class Worker:
     ) -> dict[str, Any] | None:
         numbers: list[int] = lease["numbers"]
         trials: list[dict[str, Any]] = []
+        began = time.monotonic()
         with tempfile.TemporaryDirectory(dir=self._folder) as drafts:
             records = None if lease["kind"] == "again" else Path(drafts)
             for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, records=records):
                 if not judged.counts:
                     raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
                 trials.append({**judged.to_json(), "replay": self._replay(judged, lease, lost)})
-                if self._over(lost)():
+                if lost.is_set():
                     return None
+                if self._stopping.is_set() or time.monotonic() - began > LONGEST_S:
+                    break
         return {"trials": trials}
 
     def _over(self, lost: threading.Event) -> Callable[[], bool]:
@@ -188,7 +200,11 @@ class Worker:
         judged.record.unlink()
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
         packed = gzip.compress(page.encode(), 6, mtime=0)
-        return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))["digest"]
+        try:
+            return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))["digest"]
+        except RefusalError as error:  # too large for the service: the result counts without it
+            log.warning("a replay is refused", trial=judged.number, error=str(error))
+            return None
 
 
 def lacks_room(error: BaseException | None) -> bool:
@@ -259,6 +275,10 @@ def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
 
 
 def _end_with_parent() -> None:
-    while os.read(0, 4096):  # a thread that holds the lock of sys.stdin would abort the end of the process
-        pass
+    """End when nobody holds the other end of standard input; read without Python's own lock on it.
+
+    An interpreter that ends while a thread holds that lock aborts.
+    """
+    while os.read(0, 1024):
+        continue
     os._exit(1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeAlias
@@ -16,6 +16,8 @@ from dubins_traffic.kernels.arrays import Floats
 LEVEL = 0.95
 RESAMPLES = 1_000
 SEED = 2016
+NORMAL = 1.959963984540054
+"""The normal distribution has `LEVEL` of its weight within so many standard deviations of its mean."""
 MOST = 2_000
 """Of more values than these the interval follows from the normal and the binomial distribution."""
 _BATCH_VALUES = 4_000_000
@@ -70,12 +72,16 @@ def share(count: int, total: int) -> Share:
     """Return a share of trials."""
     if not total:
         return Share(count, total, None, None)
-    found: Any = stats().binomtest(count, total).proportion_ci(LEVEL, method="wilson")
-    return Share(count, total, count / total, (float(found.low), float(found.high)))
+    part, square = count / total, NORMAL**2
+    around = 2.0 * (total + square)
+    middle = (2.0 * total * part + square) / around
+    half = NORMAL / around * math.sqrt(4.0 * total * part * (1.0 - part) + square)
+    low = 0.0 if count == 0 else middle - half
+    return Share(count, total, part, (low, 1.0 if count == total else middle + half))
 
 
 def stats() -> Any:
-    """Return scipy.stats.
+    """Return scipy.stats, which medians of very many values need.
 
     Raises
     ------
@@ -89,24 +95,29 @@ def stats() -> Any:
 
 
 def _bootstrap(values: Floats, statistic: Callable[..., Any]) -> Interval:
-    if len(values) == 1:
-        return float(values[0]), float(values[0])
-    found: Any = stats().bootstrap(
-        (values,),
-        statistic,
-        n_resamples=RESAMPLES,
-        batch=max(1, _BATCH_VALUES // len(values)),
-        vectorized=True,
-        confidence_level=LEVEL,
-        method="percentile",
-        random_state=np.random.default_rng(SEED),
-    )
-    low, high = found.confidence_interval
-    return float(low), float(high)
+    """Return the interval between the percentiles of a statistic of resamples, a batch of them at a time."""
+    count = len(values)
+    draws = np.random.default_rng(SEED)
+    batch = max(1, _BATCH_VALUES // count)
+    found: list[Floats] = []
+    for first in range(0, RESAMPLES, batch):
+        picked = draws.integers(0, count, (min(batch, RESAMPLES - first), count))
+        found.append(statistic(values[picked], axis=-1))
+    ordered = np.sort(np.concatenate(found)).tolist()
+    tail = (1.0 - LEVEL) / 2.0
+    return _quantile(ordered, tail), _quantile(ordered, 1.0 - tail)
+
+
+def _quantile(ordered: Sequence[float], part: float) -> float:
+    """Return the value below which a part of the values lies, between two of them by their distance."""
+    place = part * len(ordered) + (1.0 - part)
+    first = max(1, min(int(place), len(ordered) - 1))
+    beyond = place - first
+    return (1.0 - beyond) * ordered[first - 1] + beyond * ordered[first]
 
 
 def _normal(values: Floats, mean: float) -> Interval:
-    half = float(stats().norm.ppf(0.5 + 0.5 * LEVEL)) * float(values.std(ddof=1)) / math.sqrt(len(values))
+    half = NORMAL * float(values.std(ddof=1)) / math.sqrt(len(values))
     return mean - half, mean + half
 
 

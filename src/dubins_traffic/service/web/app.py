@@ -49,6 +49,8 @@ HEADERS = {
 }
 WITHOUT_SESSION = [*(f"^{path}" for path in PROGRAMS), "^/static/"]
 """Where no cookie is read: patterns of paths."""
+GUESSES = ("/login", "/join", "/reset", "/team/password", "/team/remove")
+"""Where a password or a code is tried."""
 STATUS = {
     WrongEntryError: 400,
     UnknownError: 404,
@@ -136,7 +138,7 @@ async def _viewer(request: Request[Any, Any, Any]) -> Viewer:
 
 def _is_guess(request: Request[Any, Any, Any]) -> bool:
     """Whether a request tries a password or a code."""
-    return request.method == "POST" and request.url.path in ("/login", "/join", "/reset")
+    return request.method == "POST" and request.url.path.rstrip("/") in GUESSES
 
 
 def _described(name: str) -> OpenAPIConfig:

@@ -181,7 +181,9 @@ def _done(office: Office, session: Session, number: int, report: Report) -> None
     at = office.clock()
     chunk = queue.held(session, number, report.token)
     submission = chunk.submission
-    if chunk.kind != "check":
+    if report.rejected is not None and chunk.kind != "check":
+        housekeeping.give_back(session, chunk.id, report.rejected, at)
+    elif chunk.kind != "check":
         submissions.record(session, chunk, [msgspec.to_builtins(own) for own in report.trials or ()], at)
     elif report.rejected is not None:
         queue.finish(session, chunk)

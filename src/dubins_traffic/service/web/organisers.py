@@ -71,10 +71,23 @@ class Organisers(Controller):
     @post("/worker", sync_to_thread=True, status_code=200)
     def worker(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
         """Show the token of a new worker, this once."""
+        if accounts.clean_name(data.get("name", ""), "name") == accounts.LOCAL:
+            raise WrongEntryError("name: that of the workers beside the server")
         with office.database.writing() as session:
             token = accounts.new_token(session, data.get("name", ""), None, office.clock())
             accounts.note(session, viewer.person, "worker token", data.get("name", ""), "", office.clock())
         return _shown(office, viewer, token=token)
+
+    @post("/worker/{number:int}/revoke", sync_to_thread=True)
+    def revoke(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Revoke the token of a worker; what it has on lease goes to another."""
+        with office.database.writing() as session:
+            token = next((one for one in accounts.worker_tokens(session) if one.id == number), None)
+            if token is None:
+                raise WrongEntryError("no such worker")
+            token.revoked = office.clock()
+            accounts.note(session, viewer.person, "revoke worker", token.name, "", office.clock())
+        return Redirect("/desk", status_code=303)
 
     @post("/accounts/{number:int}/reset", sync_to_thread=True, status_code=200)
     def reset(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
@@ -174,6 +187,7 @@ def _shown(office: Office, viewer: Viewer, **secret: Any) -> Template:
         competitions = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
         people = session.scalars(select(Account).where(Account.removed.is_(None)).order_by(Account.id)).all()
         teams = {team.id: team.name for team in session.scalars(select(Team))}
+        workers = accounts.worker_tokens(session)
     given = {"code": "", "token": "", "reset": "", **secret}
     return page(
         office,
@@ -183,6 +197,7 @@ def _shown(office: Office, viewer: Viewer, **secret: Any) -> Template:
         competitions=competitions,
         people=people,
         teams=teams,
+        workers=workers,
         url=office.settings.url,
         **given,
     )

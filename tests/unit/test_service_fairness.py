@@ -1,0 +1,266 @@
+"""Ways to gain more than one's share, or to see more than one may, and that they lead nowhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from dubins_traffic.competition.settings import Quota
+from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
+from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.submissions import RefusedError, Upload
+from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
+from tests.services import competition_text
+
+NOW = 2_000_000_000.0
+QUOTA = Quota(a_day=2)
+
+
+class Clock:
+    """A clock that a test sets."""
+
+    at = NOW
+
+    def __call__(self) -> float:
+        return self.at
+
+
+@pytest.fixture
+def office(tmp_path: Path) -> Iterator[Office]:
+    made = Office(tmp_path / "here", tmp_path / "here.key", Clock())
+    made.database.migrate()
+    organising.create(made, "short", {"competition.toml": competition_text(12).encode()}, None)
+    yield made
+    made.close()
+
+
+def joined(office: Office, name: str = "Ann", team: str = "Ants") -> Account:
+    """Let a person join with a team of its own."""
+    with office.database.writing() as session:
+        code = accounts.invite(session, accounts.PARTICIPANT, None, NOW)
+        return accounts.register(session, code, name, "correct horse", team, NOW)
+
+
+def handed(session: Session, office: Office, account: Account, name: str, phase: str = "test") -> Submission:
+    row = receiving.found_phase(session, "short", phase)
+    upload = Upload(accounts.digest_of(name), name, 1)
+    return submissions.receive(session, row, QUOTA, account, upload, office.clock())[0]
+
+
+def checked(session: Session, submission: Submission, trials: int = 12) -> None:
+    """Let the check of a submission be done, and its trials wait."""
+    queue.drop(session, submission)
+    submission.content = submission.digest
+    submissions.accept(session, submission, range(trials), NOW)
+
+
+def taken(session: Session, at: float = NOW) -> Chunk:
+    chunk = queue.take(session, "w", at, 60.0)
+    assert chunk is not None
+    submissions.taken(session.get_one(Submission, chunk.submission_id), chunk, at)
+    return chunk
+
+
+def results(numbers: list[int], frames: str = "f") -> list[dict[str, object]]:
+    same = {"row": {"end": "duration"}, "end": "duration", "owner": None, "log": "", "replay": None}
+    return [{"number": number, "frames": frames, **same} for number in numbers]
+
+
+def test_what_was_cancelled_while_it_ran_does_not_run_again_for_the_same_price(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        checked(session, submission)
+        submissions.record(session, taken(session), results(list(range(10))), NOW)
+        submissions.cancel(session, submission, NOW)
+        again = handed(session, office, ann, "x")
+        assert (again.id, again.state, again.costs, again.run) == (submission.id, "cancelled", True, 0)
+
+
+def test_what_ran_and_is_judged_again_is_not_free_when_it_is_cancelled(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        checked(session, submission)
+        submissions.record(session, taken(session), results(list(range(10))), NOW)
+        submissions.judge_again(session, submission, range(12), NOW)
+        assert submission.state == "queued"
+        submissions.cancel(session, submission, NOW)
+        assert submission.costs
+
+
+def test_the_same_is_not_sent_and_cancelled_for_ever(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        for _ in range(submissions.MOST_REPEATS + 1):
+            submissions.cancel(session, handed(session, office, ann, "x"), NOW)
+        with pytest.raises(RefusedError, match="too often"):
+            handed(session, office, ann, "x")
+
+
+def test_who_was_disqualified_is_not_let_in_by_sending_the_same_again(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        organising.disqualify(office, session, submission, ann, "it tried to get out")
+        submissions.cancel(session, submission, NOW)
+        again = handed(session, office, ann, "x")
+        assert (again.state, again.disqualified) == ("received", "it tried to get out")
+
+
+def test_what_is_refused_fills_no_disk(office: Office) -> None:
+    ann = joined(office)
+
+    def kept() -> int:
+        return sum(1 for path in (office.folder / "store").rglob("*") if path.is_file())
+
+    def send(text: str, phase: str = "test") -> None:
+        receiving.take_in(office, ann, "short", phase, "x.py", text.encode())
+
+    for text in ("1", "2", "3"):
+        send(text)
+    assert kept() == 3
+    with pytest.raises(RefusedError, match="3 of 3 submissions today"):
+        send("4")
+    with office.database.writing() as session:
+        receiving.found_phase(session, "short", "test").closes = NOW - 1.0
+    with pytest.raises(RefusedError, match="closed"):
+        send("5")
+    assert kept() == 3
+    send("1")
+
+
+def test_a_team_sends_so_many_bytes_an_hour(office: Office) -> None:
+    """What is rejected costs no quota, yet it lies in the store."""
+    ann = joined(office)
+    with office.database.writing() as session:
+        row = receiving.found_phase(session, "short", "practice")
+        for name in ("a", "b"):
+            big = Upload(accounts.digest_of(name), name, submissions.MOST_BYTES // 2)
+            submission, _ = submissions.receive(session, row, Quota(), ann, big, NOW)
+            submissions.reject(session, submission, "no class", NOW)
+        upload = Upload(accounts.digest_of("c"), "c", 1)
+        with pytest.raises(RefusedError, match="MiB in an hour"):
+            submissions.receive(session, row, Quota(), ann, upload, NOW)
+        assert submissions.receive(session, row, Quota(), ann, upload, NOW + submissions.HOUR)[1]
+
+
+def test_a_slow_submission_that_goes_on_does_not_fail_by_our_fault(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        checked(session, submission)
+        late = NOW + submissions.DEADLINES["queued"] - 1.0
+        chunk = taken(session, late)
+        later = late + submissions.DEADLINES["running"] - 1.0
+        submissions.record(session, chunk, results(chunk.numbers), later)
+        housekeeping.end_overdue(session, later + 2.0)
+        assert submission.state == "running"
+        housekeeping.end_overdue(session, later + submissions.DEADLINES["running"] + 1.0)
+        assert submission.state == "failed"
+
+
+def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(office: Office) -> None:
+    ann, bob = joined(office), joined(office, "Bob", "Bees")
+    with office.database.writing() as session:
+        slow = handed(session, office, ann, "slow")
+        checked(session, slow)
+        chunk = taken(session)
+        other = handed(session, office, bob, "other")
+        submissions.record(session, chunk, results([0, 1]), NOW)
+        assert taken(session).submission_id == other.id
+        while (next_one := queue.take(session, "w", NOW, 60.0)) is not None:
+            submissions.record(session, next_one, results(next_one.numbers), NOW)
+        assert [trial.number for trial in submissions.trials(session, slow)] == list(range(12))
+        assert slow.state == "scoring"
+        with pytest.raises(RefusedError, match="other trials"):
+            submissions.record(session, chunk, [], NOW)
+
+
+def test_the_sample_is_compared_whatever_ends_first(office: Office) -> None:
+    """It is queued when all trials are there; before, a second worker could end it first, and it was lost."""
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        checked(session, submission)
+        leased = [taken(session), taken(session)]
+        assert queue.take(session, "w", NOW, 60.0) is None
+        for chunk in reversed(leased):
+            submissions.record(session, chunk, results(chunk.numbers), NOW)
+        again = taken(session)
+        assert again.kind == "again"
+        submissions.record(session, again, results(again.numbers, "g"), NOW)
+        assert viewing.differing(session, submission) == submissions.sample(submission.digest, range(12))
+
+
+def test_a_secret_phase_shows_no_time_at_which_something_happened(office: Office) -> None:
+    """A deadline moves with the state: it told when a submission began to run, and when each part of it was done."""
+    ann = joined(office)
+    seen: list[object] = []
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        checked(session, submission)
+        for at in (NOW + 100.0, NOW + 200.0):
+            submissions.enter(submission, "running", at)
+            seen.append(viewing.told_submission(office, session, submission, ann, {}))
+        open_phase = handed(session, office, ann, "y", "practice")
+        assert viewing.told_submission(office, session, open_phase, ann, {})["deadline"] is not None
+    assert seen[0] == seen[1]
+
+
+def test_what_was_not_checked_is_not_judged_again(office: Office) -> None:
+    """Its trials would be found to be none by every worker, and it would fail by our fault, free of charge."""
+    ann = joined(office)
+    with office.database.writing() as session:
+        submission = handed(session, office, ann, "x")
+        with pytest.raises(RefusedError, match="checked"):
+            submissions.judge_again(session, submission, range(12), NOW)
+        assert session.scalar(select(func.count()).select_from(Trial)) == 0
+
+
+def test_names_are_one_s_own_in_every_spelling_and_their_owner_can_log_in(office: Office) -> None:
+    """SQLite knows capitals of ASCII alone."""
+    joined(office, "Änne", "Ökobienen")
+    for name, team in (("änne", "x"), ("Bob", "ÖKOBIENEN"), ("removed 7", "x"), ("REMOVED 7", "x")):
+        with pytest.raises(WrongEntryError, match="taken"):
+            joined(office, name, team)
+    with office.database.reading() as session:
+        for typed in ("Änne", "änne", " ÄNNE "):
+            assert accounts.verified(session, typed, "correct horse") is not None
+        assert accounts.verified(session, "Änne", "wrong horse!") is None
+
+
+def test_a_removed_account_is_removed_whatever_others_are_called(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        accounts.remove(session, session.get_one(Account, ann.id), NOW)
+    with office.database.reading() as session:
+        assert session.get_one(Account, ann.id).name == f"removed {ann.id}"
+        assert accounts.verified(session, f"removed {ann.id}", "none") is None
+
+
+def test_another_team_s_bytes_are_another_submission(office: Office) -> None:
+    """Who knows what another team has sent learns nothing of it, and takes nothing from it."""
+    ann, bob = joined(office), joined(office, "Bob", "Bees")
+    with office.database.writing() as session:
+        first, second = handed(session, office, ann, "x"), handed(session, office, bob, "x")
+        assert (first.id != second.id, first.digest) == (True, second.digest)
+        submissions.cancel(session, second, NOW)
+        assert first.state == "received"
+        with pytest.raises(receiving.UnknownError):
+            receiving.found_submission(session, first.id, bob)
+
+
+def test_nothing_is_named_when_a_phase_has_closed(office: Office) -> None:
+    ann = joined(office)
+    with office.database.writing() as session:
+        number = handed(session, office, ann, "x").id
+        phase: Phase = receiving.found_phase(session, "short", "test")
+        phase.closes = NOW
+    with pytest.raises(RefusedError, match="closed"):
+        receiving.name_it(office, ann, number)
