@@ -4,7 +4,8 @@
 two minutes more. Its parts `queries`, `generation` and `peers` are run by themselves only if they are named, and so is
 `million`, which takes some minutes.
 
-`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`, `sandbox`: about a minute;
+`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`, `sandbox`: about a minute; `envs`,
+which compiles an earlier commit, two and more;
 `first_use`, with empty caches of kernels, some; `service`, `ros1`: three; `verify` runs 500 short trials and verifies
 their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so does `odd_egos`
 for its 2,000; `synthesis` solves its games in about two minutes; `campaign` runs 300,000 short trials in as many;
@@ -26,6 +27,7 @@ NAMES = (
     "first_use",
     "judging",
     "batch",
+    "envs",
     "world",
     "scale",
     "monitors",
