@@ -44,7 +44,7 @@ def test_the_page_names_all_that_stands_in_an_observation() -> None:
 
 
 def clean_rounds(controller: str) -> int:
-    done = run_batch(load_config(str(EXAMPLE / "district.json")), controller, trials=40, seed=1000)
+    done = run_batch(load_config(str(EXAMPLE / "district.json")), controller, trials=16, seed=1000)
     return sum(outcome.score.counted_rounds or 0 for outcome in done.outcomes)
 
 

@@ -97,7 +97,7 @@ def load(path: str | Path) -> Policy:
     try:
         if Path(path).stat().st_size > MOST:
             raise InputError("too large", file=str(path), expected=f"at most {MOST} bytes")
-        with np.load(path, allow_pickle=False) as found:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
             arrays = {name: found[name] for name in _ARRAYS}
         return _policy(arrays)
     except InputError as error:
@@ -116,7 +116,7 @@ def _policy(arrays: Mapping[str, Any]) -> Policy:
 
 def _format(path: str | Path) -> str:
     try:
-        with np.load(path, allow_pickle=False) as found:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
             return str(found["format"]) if "format" in found else ""
     except _DAMAGED:
         return ""
