@@ -300,10 +300,14 @@ class Group:
         while len(active):
             left = int((goal - self.ticks[active]).max())
             self._take(active, left, 1.0 / self._rate, self.commands, self._world)
-            self._drain()
-            self._mind(active)
+            self.settle(active)
             going = self._going[active] & (self.ticks[active] < goal)
             active, goal = active[going], goal[going]
+
+    def settle(self, trials: Ints) -> None:
+        """Take over what a pass of `trials` that others have called has found; note which have ended, and make room."""
+        self._drain()
+        self._mind(trials)
 
     def _mind(self, active: Ints) -> None:
         """Enlarge what was too small, and write down how trials ended."""

@@ -1,0 +1,89 @@
+"""Trials of episodes that are stepped together: a group of the engine, and what environments ask of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dubins_traffic.engine.group import Group
+from dubins_traffic.envs.step_kernel import begin_trials, observe_trials, step_trials
+from dubins_traffic.envs.tables import StepTables, Stride
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import table
+from dubins_traffic.observations.outlook import new_outlook
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dubins_traffic.engine.group import Outcome
+    from dubins_traffic.problem.instance import Instance
+
+
+class Board:
+    """What a step of all environments gives, in arrays whose rows are environments (`envs.tables.StepTables`).
+
+    Parameters
+    ----------
+    envs : int
+        How many there are.
+    weights : (T,)
+        Weights of the terms.
+    width : int
+        Numbers in a flat observation.
+    """
+
+    def __init__(self, envs: int, weights: Floats, width: int) -> None:
+        self.arrays: dict[str, Any] = {
+            "asked": np.zeros((envs, 2)),
+            "terms": np.zeros((envs, len(weights))),
+            "weights": weights,
+            "reward": np.zeros(envs),
+            "status": np.zeros(envs, dtype=np.int64),
+            "flat": np.zeros((envs, width), dtype=np.float32),
+            "one": np.zeros(1, dtype=np.int64),
+        }
+
+
+class Bank:
+    """Some trials, of which each waits in its first frame until an environment steps it.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial, of one configuration.
+    board : Board
+        What their steps are written to.
+    shown : int
+        Other cars that a flat observation shows, at most.
+    """
+
+    def __init__(self, instances: Sequence[Instance], board: Board, shown: int) -> None:
+        self.group = Group(instances, keeps_rules=False)
+        world = self.group.world
+        problems = [instance.problem for instance in instances]
+        nets: Ints = np.ascontiguousarray(world.rules["net"])
+        around = world.state, world.labels, world.cars, world.obstacles
+        self.outlook = new_outlook(problems, nets, world.roads, around, shown)
+        self.steps = StepTables(stride=table(Stride, len(instances)), **board.arrays)
+        self._dt = 1.0 / problems[0].rate
+        self._step, self._observe = bound(step_trials), bound(observe_trials)
+        begin_trials(self.outlook, self.steps)
+
+    def observe(self, rows: Ints, envs: Ints) -> None:
+        """Write what the egos of some trials observe as that of the environments `envs`."""
+        self._observe(rows, envs, self.outlook, self.steps)
+
+    def step(self, rows: Ints, envs: Ints, ticks: int) -> None:
+        """Take some trials up to `ticks` ticks farther, with the commands that stand on the board."""
+        left: Ints = self.steps.stride["left"]
+        left[rows] = ticks
+        while self._step(
+            rows, envs, self._dt, self.group.commands, self.group.world, self.outlook, self.steps
+        ):
+            self.group.settle(rows)
+
+    def outcome(self, row: int) -> Outcome:
+        """Return what came of a trial, which has ended."""
+        return self.group.outcomes([row], "env")[0]

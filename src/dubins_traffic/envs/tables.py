@@ -1,0 +1,60 @@
+"""What the compiled step of environments reads and writes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.records import Rows, record
+from dubins_traffic.kernels.tables import Tables
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+
+@record
+class Stride:
+    """How far a trial is in the present step of its environment, and what the next tick is compared with."""
+
+    left: int
+    """Ticks still to go in this step."""
+    speed: float
+    """The ego's in the frame before, m/s."""
+    yaw_rate: float
+    """The same, rad/s."""
+    route: float
+    """How far the ego had to go to the goal that it seeks, in the frame before, metres."""
+
+
+class StepTables(Tables):
+    """The environments of one bank of trials, and what a step of all environments gives.
+
+    Attributes
+    ----------
+    stride : (B,) Stride
+        Of each trial of the bank.
+    asked : (E, 2)
+        The command of each environment's ego: speed, m/s, and yaw rate, rad/s.
+    terms : (E, T)
+        Terms of the reward, without weights.
+    weights : (T,)
+        Their weights.
+    reward : (E,)
+        The reward.
+    status : (E,)
+        Why the trial stands still (`engine.batch_kernel`), RUNNING if it does not.
+    flat : (E, F)
+        Flat observations.
+    one : (1,)
+        Scratch: a trial.
+    """
+
+    stride: Rows[Stride]
+    asked: Floats
+    terms: Floats
+    weights: Floats
+    reward: Floats
+    status: Ints
+    flat: npt.NDArray[np.float32] | Any
+    one: Ints
