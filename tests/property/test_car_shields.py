@@ -22,7 +22,7 @@ from dubins_traffic.policies.rules.tables import vehicles_of
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.roads.table import pack_distinct
-from dubins_traffic.rules.referee import Breach
+from dubins_traffic.rules.referee import Breach, accused
 from dubins_traffic.shield.car_shields import CarShields
 from dubins_traffic.shield.filter import ShieldFilter
 from dubins_traffic.shield.tables import REASONS
@@ -57,6 +57,11 @@ def hostile(instances: Sequence[Instance], views: Viewpoints, first: int) -> Hos
     return Hostile(kinds, vehicles_of(own), net, roads, seed=first)
 
 
+def all_of(group: Group, b: int) -> list[Breach]:
+    """Return all breaches of a trial, those that lie in contacts among them."""
+    return [*group.breaches[b], *accused(group.contacts[b])]
+
+
 def driven(instances: Sequence[Instance], first: int, keeps_ego: bool) -> tuple[list[list[Breach]], set[str]]:
     """Drive all cars of trials badly, the e-agents under shields; return all breaches, and why shields stepped in."""
     group = Group(instances, keeps_rules=False)
@@ -81,7 +86,7 @@ def driven(instances: Sequence[Instance], first: int, keeps_ego: bool) -> tuple[
         group.advance()
         views.look(np.arange(trials))
     assert all(ending is not None and ending.end == "duration" for ending in group.endings)
-    return group._breaches, reasons
+    return [all_of(group, b) for b in range(trials)], reasons
 
 
 @pytest.mark.parametrize("keeps_ego", [True, False])
@@ -120,7 +125,7 @@ def test_no_commands_lead_e_agents_under_shields_to_a_breach(
         shields.filter(group.ticks, group.commands)
         group.advance()
         views.look(np.zeros(1, dtype=np.int64))
-    assert [one for one in group._breaches[0] if one.car > 0 and one.rule in KEPT] == []
+    assert [one for one in all_of(group, 0) if one.car > 0 and one.rule in KEPT] == []
 
 
 def test_a_cars_shield_does_as_that_of_an_ego_which_is_told_the_same() -> None:

@@ -82,7 +82,7 @@ def step_trials(
             status = world.progress.trial[b].status
             if world.progress.trial[b].tick > tick:
                 own.left -= 1
-                _count(b, e, dt, world, outlook, steps)
+                count_tick(b, e, dt, outlook, steps)
                 _charge(e, breaches, contacts, world, steps)
                 sweep(b, tick + 1, outlook)
         steps.status[e] = status
@@ -104,8 +104,11 @@ def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
 
 
 @jit_inline
-def _count(b: int, e: int, dt: float, world: World, outlook: OutlookTables, steps: StepTables) -> None:
-    """Count what a tick has brought, but breaches and collisions."""
+def count_tick(b: int, e: int, dt: float, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count what a tick of `dt` (s) has brought, but breaches and collisions.
+
+    `b` and `e` (row) are the trial's, and that of its terms.
+    """
     own, seen = steps.stride[b], outlook.trial[b]
     rounds, sought = seen.rounds, seen.target
     left = INFINITE
@@ -118,7 +121,7 @@ def _count(b: int, e: int, dt: float, world: World, outlook: OutlookTables, step
     steps.terms[e, VISITS] += seek(b, outlook)
     steps.terms[e, ROUNDS] += seen.rounds - rounds
     own.route = _route(b, outlook)
-    speed, yaw_rate = world.state.speed[b, EGO], world.state.yaw_rate[b, EGO]
+    speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
     faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
     steps.terms[e, COMFORT] += faster * faster + turned * turned
     own.speed, own.yaw_rate = speed, yaw_rate

@@ -28,7 +28,7 @@ class ViewTables(Tables):
 
 @jit
 def turn_round(trials: Ints, views: ViewTables) -> None:
-    """Write what the cars of some trials, (K,), see in the present frame."""
+    """Write what the cars of some `trials` (K,) see in the present frame."""
     for k in range(trials.shape[0]):
         b: int = trials[k]
         count = views.state.count[b]
