@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
@@ -16,6 +17,7 @@ from dubins_traffic.envs.citing import cited
 from dubins_traffic.envs.parallel import TrafficParallelEnv, parallel_env
 from dubins_traffic.envs.roles import PEER
 from dubins_traffic.envs.shielded import Shielded, others
+from dubins_traffic.envs.single import TrafficEnv
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
@@ -244,3 +246,24 @@ def test_what_makes_no_sense_is_named() -> None:
         env.step({"ego": np.zeros(2)})
     with pytest.raises(InputError, match=r"action: not an action"):
         env.step({"ego_0": np.array([np.nan, 0.0])})
+
+
+def test_environments_of_gymnasium_are_drawn_alike_one_by_one_and_many_at_once() -> None:
+    one = gymnasium.make("dubins_traffic/Town-v0", render_mode="rgb_array")
+    many = gymnasium.make_vec(
+        "dubins_traffic/Town-v0", 3, "vector_entry_point", render_mode="rgb_array", width=240, height=200
+    )
+    one.reset(seed=5)
+    many.reset(seed=5)
+    (first, *more), alone = many.render() or (), one.render()
+    assert isinstance(alone, np.ndarray)
+    assert alone.shape == (400, 400, 3)
+    assert first.shape == (200, 240, 3)
+    assert len(more) == 2
+    for _ in range(20):
+        many.step(np.ones((3, 2), dtype=np.float32))
+    assert ((many.render() or ())[0] != first).any()
+    with pytest.raises(InputError, match=r"render_mode: no such mode: got 'ansi'"):
+        TrafficEnv("town", render_mode="ansi")
+    one.close()
+    many.close()

@@ -25,7 +25,7 @@ from dubins_traffic.envs.terms import AT_FAULT, COSTS, TERMS
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
-from dubins_traffic.observations.outlook import OutlookTables, new_outlook
+from dubins_traffic.observations.outlook import new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
@@ -200,10 +200,6 @@ class Crew:
         whole = np.concatenate([self._flat, self._told], axis=1)
         return whole.reshape(*self.group.state.x.shape, -1)
 
-    def lit(self, b: int) -> list[int]:
-        """Return the intersections of the goals that the ego of trial b has visited in this round."""
-        return visited(self.outlook, b * self.group.state.x.shape[1])
-
 
 def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
     """Return an instance in which learners drive the e-agents of these numbers."""
@@ -212,13 +208,6 @@ def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
         for car, agent in enumerate(instance.e_agents, start=1)
     )
     return replace(instance, e_agents=agents)
-
-
-def visited(outlook: OutlookTables, row: int) -> list[int]:
-    """Return the intersections of the goals that the ego of a trial, by its row, has visited in this round."""
-    own = outlook.trial[row]
-    goals = [outlook.goal[k] for k in range(own.first_goal, own.last_goal)]
-    return [goal.vertex for goal in goals if goal.done]
 
 
 def _guilty(breach: Breach, contacts: Sequence[Contact]) -> int:

@@ -191,7 +191,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
     def render(self) -> Image | None:
         """Return the present frame as (H, W, 3) uint8, or show it, as `render_mode` says."""
         crew = self._begun()
-        return self._renderer.render(crew.group, 0, crew.lit(0))
+        return self._renderer.render(crew.group, 0, crew.outlook, 0)
 
     def close(self) -> None:
         """Close the page that shows the environment, if there is one."""

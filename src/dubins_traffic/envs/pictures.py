@@ -15,10 +15,10 @@ from dubins_traffic.viewer.raster import NO_MARKS, Raster
 from dubins_traffic.viewer.raster_kernel import CONTACT, OTHERS, OWN, Image
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from dubins_traffic.engine.group import Group
+    from dubins_traffic.envs.fleet import Fleet
     from dubins_traffic.kernels.arrays import Floats
+    from dubins_traffic.observations.outlook import OutlookTables
     from dubins_traffic.problem.instance import Problem
 
 MODES: Final = ("rgb_array", "human")
@@ -48,31 +48,36 @@ class Renderer:
             raise InputError("no such mode", field="render_mode", value=mode, expected=" or ".join(MODES))
         self._mode = mode
         self._size = width, height
-        self._raster: Raster | None = None
-        self._problem: Problem | None = None
+        self._rasters: dict[int, tuple[Problem, Raster]] = {}
         self._view: LiveView | None = None
         self._due = 0.0
 
-    def render(self, group: Group, b: int, lit: Sequence[int]) -> Image | None:
+    def render(self, group: Group, b: int, outlook: OutlookTables, row: int, env: int = 0) -> Image | None:
         """Return or show the present frame of trial b of a group; None if it is shown, or nothing is.
 
-        `lit` are the intersections of the goals that the ego has visited in this round.
+        The row of `outlook` is the one that tells what its ego has visited; `env` is the number of the environment.
         """
         if self._mode is None:
             return None
         instance = group.instances[b]
-        if self._raster is None or self._problem is not instance.problem:
-            self._problem = instance.problem
-            self._raster = Raster(instance.problem, width=self._size[0], height=self._size[1])
+        raster = self._raster(instance.problem, env)
         cars = slice(0, len(instance.starts))
         state: Any = group.state
         columns: list[Floats] = [array[b, cars] for array in state[:4]]
         x, y, c, s = columns
-        picture = self._raster.frame(x, y, c, s, lit=lit, marks=_marks(group, b))
+        picture = raster.frame(x, y, c, s, lit=_visited(outlook, row), marks=_marks(group, b))
         if self._mode == "rgb_array":
             return picture
         self._show(picture, 1.0 / instance.problem.rate)
         return None
+
+    def _raster(self, problem: Problem, env: int) -> Raster:
+        """Return what draws the trials of a problem, which an environment has been in last, or is in now."""
+        kept = self._rasters.get(env)
+        if kept is None or kept[0] is not problem:
+            width, height = self._size
+            kept = self._rasters[env] = problem, Raster(problem, width=width, height=height)
+        return kept[1]
 
     def _show(self, picture: Image, pause: float) -> None:
         if self._view is None:
@@ -83,11 +88,26 @@ class Renderer:
         self._view.show(picture)
         self._due = max(self._due + pause, monotonic())
 
+    def render_all(self, fleet: Fleet) -> tuple[Image | None, ...]:
+        """Return or show the present frames of the trials of all environments."""
+        found: list[Image | None] = []
+        for env in range(len(fleet)):
+            bank, row = fleet.seat(env)
+            found.append(self.render(bank.group, row, bank.outlook, row, env))
+        return tuple(found)
+
     def close(self) -> None:
         """Close the page, if there is one."""
         if self._view is not None:
             self._view.close()
             self._view = None
+
+
+def _visited(outlook: OutlookTables, row: int) -> list[int]:
+    """Return the intersections of the goals that the ego of a trial, by its row, has visited in this round."""
+    own = outlook.trial[row]
+    goals = [outlook.goal[k] for k in range(own.first_goal, own.last_goal)]
+    return [goal.vertex for goal in goals if goal.done]
 
 
 def _marks(group: Group, b: int) -> Floats:

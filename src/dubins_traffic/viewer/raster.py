@@ -134,8 +134,8 @@ class Raster:
     def _cover(self) -> Cover:
         return Cover(self.width, self.height)
 
-    def _roads(self) -> Floats:
-        """Return roads with kerbs, centre lines, directions of lanes and stop lines, (H, W, 3)."""
+    def _roads(self) -> Image:
+        """Return roads with kerbs, centre lines, directions of lanes and stop lines."""
         problem, scale = self._problem, self._view.scale
         network, car = problem.network, problem.car
         picture = np.broadcast_to(rgb(palette.GROUND_COLOUR), (self.height, self.width, 3)).copy()
@@ -158,11 +158,11 @@ class Raster:
             hints.path([self.at(*point) for point in hint], 0.5 * max(0.04 * scale, 0.7))
         blend(picture, hints, palette.HINT_COLOUR, min(1.0, scale / 20.0))
         blend(picture, lines, palette.LINE_COLOUR)
-        return picture
+        return (picture + 0.5).astype(np.uint8)
 
     def _with_goals(self, lit: Sequence[int]) -> Image:
         """Return the roads with goals, those of some intersections lit, and obstacles."""
-        picture = self._base.copy()
+        picture = self._base.astype(np.float64)
         points, stroke = self._problem.network.points, self._view.stroke
         radius = self._problem.intersection_radius * self._view.scale
         for vertex, numbers in self._numbers.items():
