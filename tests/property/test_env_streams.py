@@ -31,14 +31,14 @@ def streams(envs: int, watched: list[int], mode: AutoresetMode, **given: Any) ->
     for step in range(STEPS):
         if mode is AutoresetMode.DISABLED and over.any():
             seen, info = env.reset(options={"reset_mask": over})
-            for k in watched:
-                found[k] += [(seen[k].tobytes(), info["trial"][k].trial)] * int(over[k])
+            for k in np.flatnonzero(over & np.isin(np.arange(envs), watched)).tolist():
+                found[k].append((seen[k].tobytes(), info["trial"][k].trial))
         seen, reward, terminated, truncated, info = env.step(
             np.stack([weaving(step, k) for k in range(envs)])
         )
         over = terminated | truncated
         for k in watched:
-            terms = tuple(info["reward_terms"][name][k] for name in info["reward_terms"] if name[0] != "_")
+            terms = info["reward_terms"][k].tobytes()
             own = [seen[k].tobytes(), reward[k], terms, terminated[k], truncated[k]]
             if "trial" in info and info["_trial"][k]:
                 own.append(info["trial"][k].trial)

@@ -24,11 +24,11 @@ Flats = npt.NDArray[np.float32]
 
 
 @jit
-def count_cars(rows: Ints, tick: int, dt: float, outlook: OutlookTables, steps: StepTables) -> None:
-    """Count, for the cars of some `rows` (K,), what a tick of `dt` seconds has brought that ended in frame `tick`."""
+def count_cars(rows: Ints, tick: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count, for the cars of some `rows` (K,), what the tick has brought that ended in frame `tick`."""
     for k in range(rows.shape[0]):
         row: int = rows[k]
-        count_tick(row, row, dt, outlook, steps)
+        count_tick(row, row, outlook, steps)
         sweep(row, tick, outlook)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.step_kernel import begin_trials, observe_trials, step_trials
-from dubins_traffic.envs.tables import StepTables, Stride
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.envs.tables import Scale, StepTables, Stride
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.observations.outlook import new_outlook
@@ -17,7 +18,7 @@ from dubins_traffic.observations.outlook import new_outlook
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dubins_traffic.engine.group import Outcome
+    from dubins_traffic.envs.settings import Settings
     from dubins_traffic.problem.instance import Instance
 
 
@@ -28,20 +29,25 @@ class Board:
     ----------
     envs : int
         How many there are.
-    weights : (T,)
-        Weights of the terms.
-    width : int
-        Numbers in a flat observation.
+    settings : Settings
+        What they have in common.
     """
 
-    def __init__(self, envs: int, weights: Floats, width: int) -> None:
+    def __init__(self, envs: int, settings: Settings) -> None:
+        weights, actions = settings.weights, settings.actions
+        scale = table(Scale, 1)
+        scale[0].period = 1.0 / settings.sample.problem.rate
+        scale[0].middle = float(actions.middle[0])
+        scale[0].speed, scale[0].yaw_rate = actions.half.tolist()
         self.arrays: dict[str, Any] = {
+            "scale": scale,
             "asked": np.zeros((envs, 2)),
             "terms": np.zeros((envs, len(weights))),
+            "weighted": np.zeros((envs, len(weights))),
             "weights": weights,
             "reward": np.zeros(envs),
             "status": np.zeros(envs, dtype=np.int64),
-            "flat": np.zeros((envs, width), dtype=np.float32),
+            "flat": np.zeros((envs, settings.layout.size), dtype=np.float32),
             "one": np.zeros(1, dtype=np.int64),
         }
 
@@ -67,7 +73,6 @@ class Bank:
         around = world.state, world.labels, world.cars, world.obstacles
         self.outlook = new_outlook(problems, nets, world.roads, around, shown)
         self.steps = StepTables(stride=table(Stride, len(instances)), **board.arrays)
-        self._dt = 1.0 / problems[0].rate
         self._step, self._observe = bound(step_trials), bound(observe_trials)
         begin_trials(self.outlook, self.steps)
 
@@ -75,15 +80,23 @@ class Bank:
         """Write what the egos of some trials observe as that of the environments `envs`."""
         self._observe(rows, envs, self.outlook, self.steps)
 
-    def step(self, rows: Ints, envs: Ints, ticks: int) -> None:
-        """Take some trials up to `ticks` ticks farther, with the commands that stand on the board."""
-        left: Ints = self.steps.stride["left"]
-        left[rows] = ticks
-        while self._step(
-            rows, envs, self._dt, self.group.commands, self.group.world, self.outlook, self.steps
-        ):
-            self.group.settle(rows)
+    def step(self, rows: Ints, envs: Ints, ticks: int) -> bool:
+        """Take some trials up to `ticks` ticks farther, with the actions that stand on the board.
 
-    def outcome(self, row: int) -> Outcome:
-        """Return what came of a trial, which has ended."""
-        return self.group.outcomes([row], "env")[0]
+        Returns
+        -------
+        bool
+            Whether some have ended.
+
+        Raises
+        ------
+        InputError
+            If an action is not finite; then nothing has been stepped.
+        """
+        group, ended = self.group, False
+        while found := self._step(rows, envs, ticks, group.commands, group.world, self.outlook, self.steps):
+            if found < 0:
+                raise InputError("not an action", field="action", expected="finite numbers")
+            group.settle(rows)
+            ended, ticks = True, 0
+        return ended

@@ -21,7 +21,7 @@ from dubins_traffic.envs.bank import Board
 from dubins_traffic.envs.blame import Blame
 from dubins_traffic.envs.step_kernel import begin_trials
 from dubins_traffic.envs.tables import StepTables, Stride
-from dubins_traffic.envs.terms import AT_FAULT, COSTS, TERMS
+from dubins_traffic.envs.terms import AT_FAULT, COSTS
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
@@ -36,7 +36,7 @@ from dubins_traffic.shield.car_shields import CarShields
 
 if TYPE_CHECKING:
     from dubins_traffic.cars.state import Contact
-    from dubins_traffic.observations.flat import Layout
+    from dubins_traffic.envs.settings import Settings
     from dubins_traffic.shield.tables import Overtakes
 
 LEARNER: Final = "learner/policy"
@@ -74,8 +74,8 @@ class Crew:
         One a trial; all have as many cars.
     cast : Cast
         Who drives what.
-    layout : Layout
-        What stands where in flat observations.
+    settings : Settings
+        What the environments of the trials have in common.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Crew:
         Of each trial, whose breaches count.
     """
 
-    def __init__(self, instances: Sequence[Instance], cast: Cast, layout: Layout) -> None:
+    def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
         own = [with_learners(instance, cast.learned) for instance in instances]
         controlled = cast.ego not in (None, COMPILED)
         self._egos = Controlled(own, partial(registry.load, str(cast.ego))) if controlled else None
@@ -106,8 +106,8 @@ class Crew:
         nets: Ints = np.repeat(np.ascontiguousarray(self.group.world.rules["net"]), places)
         bodies = pack_cars([problem.car for problem in each]), pack_obstacles([one.obstacles for one in each])
         around = self._views.state, self._views.labels, *bodies
-        self.outlook = new_outlook(each, nets, self.group.world.roads, around, layout.cars)
-        board: dict[str, Any] = Board(len(each), np.zeros(len(TERMS)), layout.size).arrays
+        self.outlook = new_outlook(each, nets, self.group.world.roads, around, settings.layout.cars)
+        board: dict[str, Any] = Board(len(each), settings).arrays
         self._steps = StepTables(stride=table(Stride, len(each)), **board)
         self._flat, self._told = board["flat"], np.zeros((len(each), len(NAMES)), dtype=np.float32)
         self.terms: Floats = board["terms"].reshape(trials, places, -1)
@@ -118,7 +118,6 @@ class Crew:
         self._known = [(0, 0)] * trials
         self._learned = list(cast.learned)
         self._shields = self._shielded(problems, cast)
-        self._dt = problems[0].period
         self._count, self._tell = bound(count_cars), bound(tell_cars)
         begin_trials(self.outlook, self._steps)
         self._charge(np.arange(trials, dtype=np.int64))
@@ -170,7 +169,7 @@ class Crew:
         if not len(moved):
             return
         self._views.look(moved)
-        self._count(self._rows(moved), int(group.ticks[moved[0]]), self._dt, self.outlook, self._steps)
+        self._count(self._rows(moved), int(group.ticks[moved[0]]), self.outlook, self._steps)
         self._charge(moved)
 
     def _rows(self, trials: Ints) -> Ints:

@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.engine.batch_kernel import RUNNING
 from dubins_traffic.envs.bank import Bank, Board
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.protocols import End, Ending
 
@@ -41,12 +41,15 @@ class Fleet:
         What the last step has given.
     ended : (E,) bool
         Which environments are in a trial that has ended, or in none yet.
+    waiting : bool
+        Whether there are any such.
     """
 
     def __init__(self, settings: Settings, envs: int) -> None:
         self.settings = settings
-        self.board = Board(envs, settings.weights, settings.layout.size)
+        self.board = Board(envs, settings)
         self.ended = np.ones(envs, dtype=np.bool_)
+        self.waiting = True
         self._who: list[tuple[int, int]] = [(0, env) for env in range(envs)]
         self._next = [0] * envs
         self._ready: list[deque[tuple[Bank, int]]] = [deque() for _ in range(envs)]
@@ -76,22 +79,34 @@ class Fleet:
         for env in some:
             self._seats[env] = self._ready[env].popleft()
             self.ended[env] = False
+            self.board.arrays["status"][env] = RUNNING
+        self.waiting = bool(self.ended.any())
         self._parts = None
         for bank, rows, places in self._grouped(some):
             bank.observe(rows, places)
 
-    def step(self, commands: Floats) -> None:
-        """Take all environments whose trials have not ended through a step, each with its row of `commands` (E, 2)."""
-        board = self.board.arrays
-        board["asked"][:] = commands
-        board["terms"][:] = 0.0
+    def step(self, actions: Any) -> None:
+        """Take all environments whose trials have not ended through a step.
+
+        Parameters
+        ----------
+        actions : (E, ...)
+            One each, elements of the space of actions.
+
+        Raises
+        ------
+        InputError
+            If they are no actions.
+        """
+        self.settings.actions.put(actions, self.board.arrays["asked"])
         if self._parts is None:
             self._parts = self._grouped(np.flatnonzero(~self.ended).tolist())
+        ended = False
         for bank, rows, places in self._parts:
-            bank.step(rows, places, self.settings.frame_skip)
-        over = board["status"] != RUNNING
-        if over.any():
-            self.ended |= over
+            ended |= bank.step(rows, places, self.settings.frame_skip)
+        if ended:
+            self.ended |= self.board.arrays["status"] != RUNNING
+            self.waiting = bool(self.ended.any())
             self._parts = None
 
     def seat(self, env: int) -> tuple[Bank, int]:

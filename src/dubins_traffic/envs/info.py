@@ -9,14 +9,15 @@ import numpy as np
 from dubins_traffic.envs.terms import BREACHES, COSTS, TERMS
 from dubins_traffic.kernels.arrays import Floats
 
+_TERMS = np.dtype([(name, np.float64) for name in TERMS])
+_COSTS = np.dtype([(name, np.float64) for name in COSTS])
 
-def of_one(terms: Floats, weights: Floats) -> dict[str, Any]:
-    """Return the info of a step of one environment, whose terms, (T,), are without weights."""
-    weighted: list[float] = (terms * weights).tolist()
-    costs: list[float] = terms[BREACHES:].tolist()
+
+def of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
+    """Return the info of a step of one environment, whose terms, (T,), are given without and with weights."""
     return {
-        "reward_terms": dict(zip(TERMS, weighted, strict=True)),
-        "cost": dict(zip(COSTS, costs, strict=True)),
+        "reward_terms": dict(zip(TERMS, weighted.tolist(), strict=True)),
+        "cost": dict(zip(COSTS, terms[BREACHES:].tolist(), strict=True)),
     }
 
 
@@ -27,23 +28,21 @@ class StepInfo:
     ----------
     envs : int
         How many there are.
-    weights : (T,)
-        Weights of the terms.
     """
 
-    def __init__(self, envs: int, weights: Floats) -> None:
-        self._weights = weights
+    def __init__(self, envs: int) -> None:
         everyone = np.ones(envs, dtype=np.bool_)
         everyone.flags.writeable = False
         self._masks = {"_reward_terms": everyone, "_cost": everyone}
-        self._of_terms = {f"_{name}": everyone for name in TERMS}
-        self._of_costs = {f"_{name}": everyone for name in COSTS}
 
-    def of_all(self, terms: Floats) -> dict[str, Any]:
-        """Return the info of a step, whose terms, (E, T), are without weights: arrays (E,), with masks."""
-        weighted, costs = (terms * self._weights).T, terms[:, BREACHES:].T.copy()
+    def of_all(self, terms: Floats, weighted: Floats) -> dict[str, Any]:
+        """Return the info of a step, whose terms, (E, T), are given without and with weights.
+
+        Of `reward_terms` and `cost` each is an array (E,) of rows whose fields have the names of the terms, so that
+        ``info["cost"]["2.left"]`` is (E,).
+        """
         return {
-            "reward_terms": {**dict(zip(TERMS, weighted, strict=True)), **self._of_terms},
-            "cost": {**dict(zip(COSTS, costs, strict=True)), **self._of_costs},
+            "reward_terms": weighted.copy().view(_TERMS)[:, 0],
+            "cost": terms[:, BREACHES:].copy().view(_COSTS)[:, 0],
             **self._masks,
         }

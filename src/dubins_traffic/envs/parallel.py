@@ -156,7 +156,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
                 expected=", ".join(self._cars),
             )
         self._episode += 1
-        self._crew = Crew([instance], self._cast, self.settings.layout)
+        self._crew = Crew([instance], self._cast, self.settings)
         self.agents = list(self.possible_agents)
         return self._observed(), {name: {"trial": instance} for name in self.agents}
 

@@ -96,9 +96,9 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         """Hold an action for `frame_skip` ticks; see `gymnasium.Env.step`."""
         if self.fleet.ended[0]:
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
-        self.fleet.step(self.settings.actions.commands(np.asarray(action)[None]))
+        self.fleet.step(np.asarray(action)[None])
         board = self.fleet.board.arrays
-        told = info.of_one(board["terms"][0], self.settings.weights)
+        told = info.of_one(board["terms"][0], board["weighted"][0])
         ended, terminated = bool(self.fleet.ended[0]), False
         if ended:
             terminated = self.fleet.is_terminal(0)

@@ -12,7 +12,7 @@ from dubins_traffic.envs.tables import StepTables
 from dubins_traffic.envs.terms import AT_FAULT, BREACHES, COMFORT, PROGRESS, ROUNDS, TIME, VISITS
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
-from dubins_traffic.observations.flat_kernel import sweep, write_flat
+from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
 from dubins_traffic.observations.outlook import OutlookTables
 from dubins_traffic.observations.seeking import metres_to_goal, seek
 from dubins_traffic.rules.breach_log import COLLISION
@@ -42,55 +42,80 @@ def observe_trials(rows: Ints, envs: Ints, outlook: OutlookTables, steps: StepTa
 def step_trials(
     rows: Ints,
     envs: Ints,
-    dt: float,
+    ticks: int,
     commands: Floats,
     world: World,
     outlook: OutlookTables,
     steps: StepTables,
 ) -> int:
-    """Take some trials through the ticks that are left of their step; return how many have to be looked at.
+    """Take some trials through a step; return how many of them have to be looked at, -1 if an action is not finite.
 
-    These have ended, or stand still since there is no room for something; the step of the latter goes on in the next
-    call.
+    Those have ended, or stand still since there is no room for something. The step of the latter goes on in another
+    call with 0 ticks.
 
     Parameters
     ----------
     rows, envs : (K,)
         Trials of the bank, and the environment of each.
-    dt : float
-        Seconds of a tick.
+    ticks : int
+        Ticks of the step that begins; 0 to go on with one.
     commands : (B, N, 2)
         Speed and yaw rate of every car, m/s and rad/s; those of the egos are written here.
     world, outlook, steps
         The tables of the bank's trials.
     """
     special = 0
+    if ticks > 0 and not _begin(rows, envs, ticks, commands, steps):
+        return -1
     for k in range(rows.shape[0]):
         b: int = rows[k]
-        e: int = envs[k]
         own = steps.stride[b]
         if own.left == 0:
             continue
-        commands[b, EGO, 0] = steps.asked[e, 0]
-        commands[b, EGO, 1] = steps.asked[e, 1]
         steps.one[0] = b
         status = RUNNING
         while own.left > 0 and status == RUNNING:
-            breaches, contacts = world.breach_log.filled[0], world.work.found[0]
-            tick = world.progress.trial[b].tick
-            run_trials(steps.one, 1, dt, commands, world)
-            status = world.progress.trial[b].status
-            if world.progress.trial[b].tick > tick:
-                own.left -= 1
-                count_tick(b, e, dt, outlook, steps)
-                _charge(e, breaches, contacts, world, steps)
-                sweep(b, tick + 1, outlook)
-        steps.status[e] = status
+            status = _tick(b, envs[k], commands, world, outlook, steps)
+        steps.status[envs[k]] = status
         if status in (ENDED, COLLIDED, FAULTY):
             own.left = 0
         special += 0 if status == RUNNING else 1
-        _close(b, e, outlook, steps)
+        _close(b, envs[k], outlook, steps)
     return special
+
+
+@jit_inline
+def _begin(rows: Ints, envs: Ints, ticks: int, commands: Floats, steps: StepTables) -> bool:
+    """Begin a step: write down what the actions command, and count from nothing; False if an action is not finite."""
+    for e in range(steps.asked.shape[0]):
+        both = steps.asked[e, 0] + steps.asked[e, 1]
+        if both - both != 0.0:
+            return False
+    scale = steps.scale[0]
+    for k in range(rows.shape[0]):
+        b: int = rows[k]
+        e: int = envs[k]
+        commands[b, EGO, 0] = within(steps.asked[e, 0]) * scale.speed + scale.middle
+        commands[b, EGO, 1] = within(steps.asked[e, 1]) * scale.yaw_rate
+        steps.stride[b].left = ticks
+        for j in range(steps.terms.shape[1]):
+            steps.terms[e, j] = 0.0
+    return True
+
+
+@jit_inline
+def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables, steps: StepTables) -> int:
+    """Take trial b through a tick, and count what it has brought; return why it stands still, if it does."""
+    period = steps.scale[0].period
+    breaches, contacts = world.breach_log.filled[0], world.work.found[0]
+    tick = world.progress.trial[b].tick
+    run_trials(steps.one, 1, period, commands, world)
+    if world.progress.trial[b].tick > tick:
+        steps.stride[b].left -= 1
+        count_tick(b, e, outlook, steps)
+        _charge(e, breaches, contacts, world, steps)
+        sweep(b, tick + 1, outlook)
+    return world.progress.trial[b].status
 
 
 @jit_inline
@@ -98,34 +123,35 @@ def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
     """Sum up the reward of a step, and observe."""
     total = 0.0
     for j in range(steps.weights.shape[0]):
-        total += steps.weights[j] * steps.terms[e, j]
+        weighted = steps.weights[j] * steps.terms[e, j]
+        steps.weighted[e, j] = weighted
+        total += weighted
     steps.reward[e] = total
     write_flat(b, EGO, steps.flat[e], outlook)
 
 
 @jit_inline
-def count_tick(b: int, e: int, dt: float, outlook: OutlookTables, steps: StepTables) -> None:
-    """Count what a tick of `dt` (s) has brought, but breaches and collisions.
-
-    `b` and `e` (row) are the trial's, and that of its terms.
-    """
+def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count what a tick has brought, but breaches and collisions; `b` and `e` (row): the trial's, and of its terms."""
     own, seen = steps.stride[b], outlook.trial[b]
     rounds, sought = seen.rounds, seen.target
     left = INFINITE
+    there = False
     if sought >= 0:
-        there = outlook.labels.at[b, EGO] == outlook.goal[sought].vertex
-        fresh = outlook.goal[sought].fresh != 0
-        left = 0.0 if there and fresh else metres_to_goal(b, EGO, sought, outlook)
+        goal = outlook.goal[sought]
+        there = outlook.labels.at[b, EGO] == goal.vertex and goal.fresh != 0
+        left = 0.0 if there else metres_to_goal(b, EGO, sought, outlook)
     if own.route < INFINITE and left < INFINITE:
         steps.terms[e, PROGRESS] += own.route - left
-    steps.terms[e, VISITS] += seek(b, outlook)
+    visited = seek(b, outlook)
+    steps.terms[e, VISITS] += visited
     steps.terms[e, ROUNDS] += seen.rounds - rounds
-    own.route = _route(b, outlook)
+    own.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
     speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
     faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
     steps.terms[e, COMFORT] += faster * faster + turned * turned
     own.speed, own.yaw_rate = speed, yaw_rate
-    steps.terms[e, TIME] += dt
+    steps.terms[e, TIME] += steps.scale[0].period
 
 
 @jit_inline

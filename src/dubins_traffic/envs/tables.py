@@ -27,6 +27,20 @@ class Stride:
     """How far the ego had to go to the goal that it seeks, in the frame before, metres."""
 
 
+@record
+class Scale:
+    """How actions become commands, and how long a tick is."""
+
+    period: float
+    """Seconds of a tick."""
+    speed: float
+    """Half of the range of speeds, m/s."""
+    middle: float
+    """Its middle, m/s."""
+    yaw_rate: float
+    """The top yaw rate, rad/s."""
+
+
 class StepTables(Tables):
     """The environments of one bank of trials, and what a step of all environments gives.
 
@@ -34,10 +48,14 @@ class StepTables(Tables):
     ----------
     stride : (B,) Stride
         Of each trial of the bank.
+    scale : (1,) Scale
+        What all have in common.
     asked : (E, 2)
-        The command of each environment's ego: speed, m/s, and yaw rate, rad/s.
+        The action of each environment, shares of speed and yaw rate, -1 to 1.
     terms : (E, T)
         Terms of the reward, without weights.
+    weighted : (E, T)
+        The same, with weights.
     weights : (T,)
         Their weights.
     reward : (E,)
@@ -51,8 +69,10 @@ class StepTables(Tables):
     """
 
     stride: Rows[Stride]
+    scale: Rows[Scale]
     asked: Floats
     terms: Floats
+    weighted: Floats
     weights: Floats
     reward: Floats
     status: Ints

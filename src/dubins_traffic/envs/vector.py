@@ -103,7 +103,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         self.fleet = Fleet(self.settings, num_envs)
         self._seeded = False
         self._nothing = np.zeros(num_envs, dtype=np.bool_)
-        self._told = StepInfo(num_envs, self.settings.weights)
+        self._infos = StepInfo(num_envs)
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -139,15 +139,18 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     def step(self, actions: Any) -> tuple[Any, Floats, Bools, Bools, dict[str, Any]]:
         """Hold the actions for `frame_skip` ticks; see `gymnasium.vector.VectorEnv.step`."""
         fleet, board = self.fleet, self.fleet.board.arrays
-        waiting = fleet.ended.copy() if fleet.ended.any() else self._nothing
+        waiting = fleet.ended.copy() if fleet.waiting else self._nothing
         if waiting is not self._nothing and self.autoreset_mode is not AutoresetMode.NEXT_STEP:
             raise DubinsTrafficError("an episode is over, or has not begun: reset its environment")
         if waiting is not self._nothing and not self._seeded:
             raise DubinsTrafficError("the environments have to be reset before they are stepped")
-        fleet.step(self.settings.actions.commands(actions))
+        fleet.step(actions)
+        if waiting is not self._nothing:
+            for name in ("reward", "terms", "weighted"):
+                board[name][waiting] = 0.0
         rewards = board["reward"].copy()
-        told = self._told.of_all(board["terms"])
-        if waiting is self._nothing and not fleet.ended.any():
+        told = self._infos.of_all(board["terms"], board["weighted"])
+        if not fleet.waiting:
             return self._observed(), rewards, self._nothing.copy(), self._nothing.copy(), told
         over = fleet.ended & ~waiting
         ended: list[int] = np.flatnonzero(over).tolist()
@@ -155,7 +158,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         terminated[ended] = [fleet.is_terminal(env) for env in ended]
         last = self._ended(ended)
         if waiting.any():
-            told |= self._restarted(waiting, rewards)
+            told |= self._restarted(waiting)
         if ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             told |= self._final(over, ended, told, last)
             fleet.begin(ended)
@@ -168,9 +171,8 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of one environment's steps."""
         return np.repeat(self.settings.actions.commands(actions), self.settings.frame_skip, axis=0)
 
-    def _restarted(self, waiting: Bools, rewards: Floats) -> dict[str, Any]:
+    def _restarted(self, waiting: Bools) -> dict[str, Any]:
         """Begin the next episodes of the environments whose last one was over before this step."""
-        rewards[waiting] = 0.0
         some: list[int] = np.flatnonzero(waiting).tolist()
         self.fleet.begin(some)
         return self._begun(some)
