@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -23,6 +24,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.runs.single import run_trial
+from tests.integration.test_readme import ROOT, run_block, runnable
 
 
 def config(cars: int = 3, seconds: float = 20.0, kind: str = "lawful") -> dict[str, Any]:
@@ -267,3 +269,11 @@ def test_environments_of_gymnasium_are_drawn_alike_one_by_one_and_many_at_once()
         TrafficEnv("town", render_mode="ansi")
     one.close()
     many.close()
+
+
+def test_the_page_on_agents_runs(tmp_path: Path) -> None:
+    blocks = runnable((ROOT / "docs" / "learning-agents.md").read_text(encoding="utf-8"))
+    assert len(blocks) == 3
+    for language, text in blocks:
+        run_block(language, text, tmp_path)
+    assert {"episode.mcap", "town.png"} <= {path.name for path in tmp_path.iterdir()}
