@@ -11,6 +11,7 @@ import numpy as np
 from dubins_traffic.cars.state import Labels, Observation, State
 from dubins_traffic.envs import info
 from dubins_traffic.envs.fleet import Fleet
+from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.spaces import observed, space_of
 from dubins_traffic.errors import DubinsTrafficError
@@ -38,7 +39,9 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     observation, action, frame_skip, reward, cars, levels
         As in `envs.settings.Settings`.
     render_mode : str, optional
-        None.
+        ``rgb_array`` or ``human``.
+    width, height : int
+        Pixels of a picture.
 
     Raises
     ------
@@ -46,7 +49,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         If anything of this is wrong.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 30}  # noqa: RUF012  # Gymnasium's
+    metadata: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 30}  # noqa: RUF012  # Gymnasium's
 
     def __init__(
         self,
@@ -59,11 +62,14 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         cars: int = SHOWN,
         levels: Levels | Mapping[str, Any] | int | None = None,
         render_mode: str | None = None,
+        width: int = SIDE,
+        height: int = SIDE,
     ) -> None:
         self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels)
         self.observation_space = space_of(observation, self.settings.layout)
         self.action_space = self.settings.actions.space
         self.render_mode = render_mode
+        self._renderer = Renderer(render_mode, width, height)
         self.fleet = Fleet(self.settings, 1)
         self._seeded = False
         self._senses: Senses | None = None
@@ -103,6 +109,14 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of steps with these actions."""
         return np.repeat(self.settings.actions.commands(actions), self.settings.frame_skip, axis=0)
+
+    def render(self) -> Any:
+        """Return the present frame as (H, W, 3) uint8, or show it, as `render_mode` says."""
+        return self._renderer.render_all(self.fleet)[0]
+
+    def close(self) -> None:
+        """Close the page that shows the environment, if there is one."""
+        self._renderer.close()
 
     def _observed(self) -> Any:
         if self._senses is None:

@@ -112,7 +112,7 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
     run_trials(steps.one, 1, period, commands, world)
     if world.progress.trial[b].tick > tick:
         steps.stride[b].left -= 1
-        _count(b, e, world, outlook, steps)
+        count_tick(b, e, outlook, steps)
         _charge(e, breaches, contacts, world, steps)
         sweep(b, tick + 1, outlook)
     return world.progress.trial[b].status
@@ -131,8 +131,8 @@ def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
 
 
 @jit_inline
-def _count(b: int, e: int, world: World, outlook: OutlookTables, steps: StepTables) -> None:
-    """Count what a tick has brought, but breaches and collisions."""
+def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count what a tick has brought, but breaches and collisions; `b` and `e` (row): the trial's, and of its terms."""
     own, seen = steps.stride[b], outlook.trial[b]
     rounds, sought = seen.rounds, seen.target
     left = INFINITE
@@ -147,7 +147,7 @@ def _count(b: int, e: int, world: World, outlook: OutlookTables, steps: StepTabl
     steps.terms[e, VISITS] += visited
     steps.terms[e, ROUNDS] += seen.rounds - rounds
     own.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
-    speed, yaw_rate = world.state.speed[b, EGO], world.state.yaw_rate[b, EGO]
+    speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
     faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
     steps.terms[e, COMFORT] += faster * faster + turned * turned
     own.speed, own.yaw_rate = speed, yaw_rate

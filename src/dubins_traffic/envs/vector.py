@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from dubins_traffic.envs.episodes import seeds_of
 from dubins_traffic.envs.fleet import Fleet, masked
 from dubins_traffic.envs.info import StepInfo
+from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.spaces import observed, space_of
 from dubins_traffic.errors import DubinsTrafficError, InputError
@@ -49,7 +50,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         the same step, with the last observation and info in ``info["final_obs"]`` and ``info["final_info"]``; or when
         it is reset, by ``options["reset_mask"]``.
     render_mode : str, optional
-        None.
+        ``rgb_array``.
+    width, height : int
+        Pixels of a picture.
 
     Raises
     ------
@@ -72,6 +75,8 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         levels: Levels | Mapping[str, Any] | int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        width: int = SIDE,
+        height: int = SIDE,
     ) -> None:
         if observation not in VECTORIZED:
             expected = " or ".join(VECTORIZED)
@@ -84,8 +89,13 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             )
         self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels)
         self.num_envs, self.render_mode = num_envs, render_mode
+        self._renderer = Renderer(render_mode, width, height)
         self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "render_fps": 30, "autoreset_mode": self.autoreset_mode}
+        self.metadata = {
+            "render_modes": list(MODES[:1]),
+            "render_fps": 30,
+            "autoreset_mode": self.autoreset_mode,
+        }
         self.single_observation_space: spaces.Space[Any] = space_of(observation, self.settings.layout)
         self.single_action_space = self.settings.actions.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -121,6 +131,10 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             self._seeded = True
         self.fleet.begin(some)
         return self._observed(), self._begun(some)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return the present frames, each (H, W, 3) uint8; None without a render mode."""
+        return None if self.render_mode is None else self._renderer.render_all(self.fleet)
 
     def step(self, actions: Any) -> tuple[Any, Floats, Bools, Bools, dict[str, Any]]:
         """Hold the actions for `frame_skip` ticks; see `gymnasium.vector.VectorEnv.step`."""
