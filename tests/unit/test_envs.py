@@ -15,6 +15,7 @@ from dubins_traffic import load_config
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.envs.episodes import Episodes, Levels
+from dubins_traffic.envs.formulas import with_formulas
 from dubins_traffic.envs.registration import NAMES
 from dubins_traffic.envs.terms import COSTS, TERMS
 from dubins_traffic.errors import DubinsTrafficError, InputError
@@ -78,7 +79,7 @@ def test_weights_count_and_wrong_ones_are_refused() -> None:
     "given",
     [
         {"observation": "pixels"}, {"action": "joystick"}, {"frame_skip": 0}, {"cars": -1}, {"levels": 0},
-        {"levels": {"count": 2, "split": "all"}}, {"config": {**SHORT, "formulas": {"own": "[] !left"}}},
+        {"levels": {"count": 2, "split": "all"}}, {"config": {**SHORT, "formulas": {"own": "[] !left_ego"}}},
         {"config": {**SHORT, "disturbances": {"command_delay": 1}}},
     ],
 )  # fmt: skip
@@ -155,3 +156,33 @@ def test_an_episode_can_be_chosen_and_cited() -> None:
     assert np.array_equal(first, third)
     result = run_trial(instance, Scripted(env.commands([weaving(step) for step in range(400)])))
     assert result.instance is instance
+
+
+def test_states_of_formulas_are_what_a_trial_that_carries_them_is_told() -> None:
+    formulas = {
+        "keeps right": "[] !left_ego",
+        "goes on": "[] (still_ego -> <>[0,1] !still_ego)",
+        "leaves": "<> in_crossing_ego",
+    }
+    config = {**SHORT, "duration": 15.0, "end_on_collision": False}
+    env, alone = vector(3, config, frame_skip=4, formulas=formulas), single(config, formulas=formulas)
+    _, info = env.reset(seed=9)
+    instance, actions, over, states = info["trial"][0], [], np.zeros(3, dtype=bool), []
+    while not over[0]:
+        actions.append(weaving(len(actions)))
+        _, _, _, over, info = env.step(np.stack([actions[-1]] * 3))
+        states.append({name: str(info["formulas"][name][0]) for name in formulas})
+    carrying = with_formulas(instance, formulas)
+    result = run_trial(carrying, Scripted(env.commands(np.array(actions))))
+    assert {one.name: one.verdict for one in result.score.formulas} == states[-1]
+    assert len({tuple(own.values()) for own in states}) > 1
+    _, info = alone.reset(seed=9)
+    for step, action in enumerate(actions):
+        for _ in range(4):
+            *_, info = alone.step(action)
+        assert info["formulas"] == states[step]
+        if step == len(actions) - 2:
+            break
+    assert not instance.problem.formulas
+    with pytest.raises(InputError, match="colour"):
+        single(formulas={"own": "[] colour"})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.engine.group import Group
+from dubins_traffic.envs.formulas import FormulaWatch
 from dubins_traffic.envs.step_kernel import begin_trials, observe_trials, step_trials
 from dubins_traffic.envs.tables import Scale, StepTables, Stride
 from dubins_traffic.errors import InputError
@@ -16,7 +17,7 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.observations.outlook import new_outlook
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.problem.instance import Instance
@@ -37,6 +38,7 @@ class Board:
         weights, actions = settings.weights, settings.actions
         scale = table(Scale, 1)
         scale[0].period = 1.0 / settings.sample.problem.rate
+        scale[0].pause = 1 if settings.formulas else 0
         scale[0].middle = float(actions.middle[0])
         scale[0].speed, scale[0].yaw_rate = actions.half.tolist()
         self.arrays: dict[str, Any] = {
@@ -63,6 +65,13 @@ class Bank:
         What their steps are written to.
     shown : int
         Other cars that a flat observation shows, at most.
+
+    Attributes
+    ----------
+    group : Group
+        The trials.
+    watches : dict
+        Who judges formulas on the trials that are watched, by their rows.
     """
 
     def __init__(self, instances: Sequence[Instance], board: Board, shown: int) -> None:
@@ -74,6 +83,7 @@ class Bank:
         self.outlook = new_outlook(problems, nets, world.roads, around, shown)
         self.steps = StepTables(stride=table(Stride, len(instances)), **board.arrays)
         self._step, self._observe = bound(step_trials), bound(observe_trials)
+        self.watches: dict[int, FormulaWatch] = {}
         begin_trials(self.outlook, self.steps)
 
     def observe(self, rows: Ints, envs: Ints) -> None:
@@ -97,6 +107,17 @@ class Bank:
         while found := self._step(rows, envs, ticks, group.commands, group.world, self.outlook, self.steps):
             if found < 0:
                 raise InputError("not an action", field="action", expected="finite numbers")
-            group.settle(rows)
+            self._settle(rows)
             ended, ticks = True, 0
+        if self.watches:
+            self._settle(rows)
         return ended
+
+    def watch(self, row: int, formulas: Mapping[str, str]) -> None:
+        """Judge formulas on the frames of a trial, from its first one on."""
+        self.watches[row] = FormulaWatch(self.group, row, formulas)
+
+    def _settle(self, rows: Ints) -> None:
+        self.group.settle(rows)
+        for row in rows.tolist() if self.watches else ():
+            self.watches[row].look()

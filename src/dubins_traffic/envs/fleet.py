@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dubins_traffic.engine.group import Outcome
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.scoring.formulas import Status
 
 AHEAD: Final = 4
 """So many trials wait for each environment, at most."""
@@ -77,7 +78,9 @@ class Fleet:
         if any(not self._ready[env] for env in some):
             self._fill(some)
         for env in some:
-            self._seats[env] = self._ready[env].popleft()
+            bank, row = self._seats[env] = self._ready[env].popleft()
+            if self.settings.formulas:
+                bank.watch(row, self.settings.formulas)
             self.ended[env] = False
             self.board.arrays["status"][env] = RUNNING
         self.waiting = bool(self.ended.any())
@@ -126,6 +129,11 @@ class Fleet:
         """Return the instance of an environment's trial."""
         bank, row = self.seat(env)
         return bank.group.instances[row]
+
+    def states(self, env: int) -> dict[str, Status]:
+        """Return what is said of each formula, in the present frame of an environment's trial."""
+        bank, row = self.seat(env)
+        return bank.watches[row].states
 
     def tick(self, env: int) -> int:
         """Return the present frame of an environment's trial."""

@@ -10,6 +10,7 @@ from typing import Any, Final
 from dubins_traffic.engine.sharing import can_share, undisturbed
 from dubins_traffic.envs.actions import ActionMap
 from dubins_traffic.envs.episodes import Episodes, Levels
+from dubins_traffic.envs.formulas import with_formulas
 from dubins_traffic.envs.terms import weights_of
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
@@ -40,6 +41,9 @@ class Settings:
         Other cars that a flat observation shows, at most.
     levels : int, mapping or Levels, optional
         A pool of road networks that are drawn once.
+    formulas : mapping, optional
+        Formulas (docs/verdicts.md), texts by name, whose states are told in ``info["formulas"]``: what is said of each
+        so far, judged after every tick. The trials know nothing of them.
 
     Raises
     ------
@@ -55,6 +59,7 @@ class Settings:
     reward: Mapping[str, float] | None = None
     cars: int = SHOWN
     levels: Levels | Mapping[str, Any] | int | None = None
+    formulas: Mapping[str, str] | None = None
     episodes: Episodes = field(init=False)
     actions: ActionMap = field(init=False)
     weights: Floats = field(init=False)
@@ -78,6 +83,8 @@ class Settings:
             )
         if not undisturbed(sample):
             raise _wrong("disturbances", sample.disturbances, "none")
+        if self.formulas:
+            with_formulas(sample, self.formulas)
         found = {
             "episodes": episodes,
             "actions": ActionMap(self.action, sample.problem.car.bounds),

@@ -36,7 +36,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     ----------
     config : Configuration, path, name or mapping
         What the trials are drawn from.
-    observation, action, frame_skip, reward, cars, levels
+    observation, action, frame_skip, reward, cars, levels, formulas
         As in `envs.settings.Settings`.
     render_mode : str, optional
         ``rgb_array`` or ``human``.
@@ -61,11 +61,12 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         reward: Mapping[str, float] | None = None,
         cars: int = SHOWN,
         levels: Levels | Mapping[str, Any] | int | None = None,
+        formulas: Mapping[str, str] | None = None,
         render_mode: str | None = None,
         width: int = SIDE,
         height: int = SIDE,
     ) -> None:
-        self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels)
+        self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels, formulas)
         self.observation_space = space_of(observation, self.settings.layout)
         self.action_space = self.settings.actions.space
         self.render_mode = render_mode
@@ -90,7 +91,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         instance = self.fleet.instance(0)
         if self.settings.observation == "object":
             self._senses = Senses(instance)
-        return self._observed(), {"trial": instance}
+        return self._observed(), {"trial": instance, **self._states()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Hold an action for `frame_skip` ticks; see `gymnasium.Env.step`."""
@@ -98,7 +99,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
         self.fleet.step(np.asarray(action)[None])
         board = self.fleet.board.arrays
-        told = info.of_one(board["terms"][0], board["weighted"][0])
+        told = info.of_one(board["terms"][0], board["weighted"][0]) | self._states()
         ended, terminated = bool(self.fleet.ended[0]), False
         if ended:
             terminated = self.fleet.is_terminal(0)
@@ -117,6 +118,9 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     def close(self) -> None:
         """Close the page that shows the environment, if there is one."""
         self._renderer.close()
+
+    def _states(self) -> dict[str, Any]:
+        return {"formulas": self.fleet.states(0)} if self.settings.formulas else {}
 
     def _observed(self) -> Any:
         if self._senses is None:

@@ -50,8 +50,8 @@ def step_trials(
 ) -> int:
     """Take some trials through a step; return how many of them have to be looked at, -1 if an action is not finite.
 
-    Those have ended, or stand still since there is no room for something. The step of the latter goes on in another
-    call with 0 ticks.
+    Those have ended, pause, or stand still since there is no room for something. The step of the others goes on in
+    another call with 0 ticks.
 
     Parameters
     ----------
@@ -74,12 +74,13 @@ def step_trials(
             continue
         steps.one[0] = b
         status = RUNNING
-        while own.left > 0 and status == RUNNING:
+        pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
+        while own.left > max(pause, 0) and status == RUNNING:
             status = _tick(b, envs[k], commands, world, outlook, steps)
         steps.status[envs[k]] = status
         if status in (ENDED, COLLIDED, FAULTY):
             own.left = 0
-        special += 0 if status == RUNNING else 1
+        special += 0 if status == RUNNING and own.left == 0 else 1
         _close(b, envs[k], outlook, steps)
     return special
 

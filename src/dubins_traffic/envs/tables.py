@@ -33,6 +33,8 @@ class Scale:
 
     period: float
     """Seconds of a tick."""
+    pause: int
+    """Ticks after which a step pauses for somebody who looks at every frame; 0: it does not."""
     speed: float
     """Half of the range of speeds, m/s."""
     middle: float

@@ -43,7 +43,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         How many environments.
     config : Configuration, path, name or mapping
         What the trials are drawn from.
-    observation, action, frame_skip, reward, cars, levels
+    observation, action, frame_skip, reward, cars, levels, formulas
         As in `envs.settings.Settings`; observations are ``flat`` or ``dict``.
     autoreset_mode : AutoresetMode or str
         When an environment whose episode is over begins the next one: in the next step, which then only does that; in
@@ -73,6 +73,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         reward: Mapping[str, float] | None = None,
         cars: int = SHOWN,
         levels: Levels | Mapping[str, Any] | int | None = None,
+        formulas: Mapping[str, str] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         width: int = SIDE,
@@ -87,7 +88,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             raise InputError(
                 "can't be a vector environment", field="num_envs", value=num_envs, expected=">= 1"
             )
-        self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels)
+        self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels, formulas)
         self.num_envs, self.render_mode = num_envs, render_mode
         self._renderer = Renderer(render_mode, width, height)
         self.autoreset_mode = _mode(autoreset_mode)
@@ -130,7 +131,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
                 self.fleet.seed(env, who[env], given.get("episode", 0))
             self._seeded = True
         self.fleet.begin(some)
-        return self._observed(), self._begun(some)
+        return self._observed(), self._begun(some) | self._states()
 
     def render(self) -> tuple[Any, ...] | None:
         """Return the present frames, each (H, W, 3) uint8; None without a render mode."""
@@ -149,7 +150,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             for name in ("reward", "terms", "weighted"):
                 board[name][waiting] = 0.0
         rewards = board["reward"].copy()
-        told = self._infos.of_all(board["terms"], board["weighted"])
+        told = self._infos.of_all(board["terms"], board["weighted"]) | self._states()
         if not fleet.waiting:
             return self._observed(), rewards, self._nothing.copy(), self._nothing.copy(), told
         over = fleet.ended & ~waiting
@@ -158,11 +159,11 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         terminated[ended] = [fleet.is_terminal(env) for env in ended]
         last = self._ended(ended)
         if waiting.any():
-            told |= self._restarted(waiting)
+            told |= self._restarted(waiting) | self._states()
         if ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
             told |= self._final(over, ended, told, last)
             fleet.begin(ended)
-            told |= self._begun(ended)
+            told |= self._begun(ended) | self._states()
         else:
             told |= last
         return self._observed(), rewards, terminated, over & ~terminated, told
@@ -180,6 +181,13 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     def _begun(self, some: Sequence[int]) -> dict[str, Any]:
         """Return what is told of episodes that begin."""
         return self._spread(some, "trial", [self.fleet.instance(env) for env in some])
+
+    def _states(self) -> dict[str, Any]:
+        """Return what is said of each formula in the environments, (E,) texts by name."""
+        if not self.settings.formulas:
+            return {}
+        each = [self.fleet.states(env) for env in range(self.num_envs)]
+        return {"formulas": {name: np.array([own[name] for own in each]) for name in self.settings.formulas}}
 
     def _ended(self, some: Sequence[int]) -> dict[str, Any]:
         """Return what is told of episodes that have ended."""
