@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.learned import Learned, Policy, load
 from dubins_traffic.errors import InputError
 from dubins_traffic.observations.flat import Layout
+from dubins_traffic.scoring.score import Score
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "learning"
@@ -43,29 +45,41 @@ def test_the_page_names_all_that_stands_in_an_observation() -> None:
         )
 
 
-def clean_rounds(controller: str) -> int:
-    done = run_batch(load_config(str(EXAMPLE / "district.json")), controller, trials=16, seed=1000)
-    return sum(outcome.score.counted_rounds or 0 for outcome in done.outcomes)
+def driven(name: str, controller: str, trials: int) -> list[Score]:
+    """Return the scores of a controller in trials that nobody has learned from."""
+    done = run_batch(load_config(str(EXAMPLE / f"{name}.json")), controller, trials=trials, seed=1000)
+    return [outcome.score for outcome in done.outcomes]
 
 
 def test_what_has_been_learned_drives_better_than_simple_and_nearly_as_well_as_lanes() -> None:
-    learned = clean_rounds(str(EXAMPLE / "policy.npz"))
-    assert learned > clean_rounds("simple")
-    assert learned >= 0.3 * clean_rounds("lanes")
+    who = (str(EXAMPLE / "district.npz"), "simple", "lanes")
+    learned, simple, lanes = (
+        sum(own.counted_rounds or 0 for own in driven("district", one, 16)) for one in who
+    )
+    assert learned > simple
+    assert learned >= 0.3 * lanes
 
 
-def test_the_curve_comes_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_under_the_shield_what_has_been_learned_keeps_the_rules() -> None:
+    policy = str(EXAMPLE / "town.npz")
+    bare, shielded = driven("town", policy, 3), driven("town", f"{policy}+shield", 3)
+    assert sum(own.rounds for own in bare) > 0
+    assert not any(own.verdict is None or own.verdict.clean for own in bare)
+    assert all(own.verdict is not None and own.verdict.clean for own in shielded)
+
+
+@pytest.mark.parametrize("name", ["district", "town"])
+def test_the_curve_comes_again(tmp_path: Path, name: str) -> None:
     spec = importlib.util.spec_from_file_location("train", EXAMPLE / "train.py")
     assert spec is not None
     assert spec.loader is not None
-    train: Any = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(train)
-    monkeypatch.setattr(train, "GENERATIONS", 2)
-    train.main(tmp_path)
-    with (EXAMPLE / "curve.csv").open() as kept, (tmp_path / "curve.csv").open() as made:
+    example: Any = sys.modules.setdefault("train", importlib.util.module_from_spec(spec))
+    spec.loader.exec_module(example)
+    example.train(name, tmp_path, 2)
+    with (EXAMPLE / f"{name}.csv").open() as kept, (tmp_path / f"{name}.csv").open() as made:
         before, again = ([float(row["mean_return"]) for row in csv.DictReader(file)] for file in (kept, made))
     assert again == pytest.approx(before[:2], abs=0.02)
-    assert np.mean(before[-20:]) > 5.0 + np.mean(before[:20])
+    assert np.mean(before[-20:]) > 3.0 + np.mean(before[:20])
 
 
 def test_a_policy_is_told_from_a_strategy_and_a_damaged_one_is_refused(tmp_path: Path) -> None:

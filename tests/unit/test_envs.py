@@ -190,7 +190,11 @@ def test_states_of_formulas_are_what_a_trial_that_carries_them_is_told() -> None
 
 def test_who_is_hit_while_it_stands_is_not_at_fault() -> None:
     """A scripted car drives straight into the ego, which stands before it; then the ego drives into a parked one."""
-    script = {"type": "scripted", "parameters": {"commands": [[5.0, 0.5, 0.0]], "repeat": True}, "start": [1, 6, 0]}
+    script = {
+        "type": "scripted",
+        "parameters": {"commands": [[5.0, 0.5, 0.0]], "repeat": True},
+        "start": [1, 6, 0],
+    }
     parked = {"type": "parked", "parameters": {"vacates_after": None}, "start": [4.5, 6, 0]}
     for agent, speed, fault in ((script, 0.0, 0.0), (parked, 1.0, 1.0)):
         config = {**SHORT, "e-agents": [agent], "ego": {"start": [3, 6, 0]}, "duration": 10.0}
