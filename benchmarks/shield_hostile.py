@@ -225,11 +225,11 @@ class Hostile:
         """Return `Scene.lane`; in a disc, of the nearest segment along the heading."""
         x, y, c, s = pose.T
         segment, lane = labels.segment[:, EGO], labels.lane[:, EGO]
-        row = self._roads.seg[self._roads.seg_off[self._net] + np.where(lane < 0, segment, lane >> 1)]
-        forth = np.where(lane < 0, c * row[:, 2] + s * row[:, 3] >= 0.0, lane % 2 == 0)
+        row = self._roads.segment[self._roads.seg_off[self._net] + np.where(lane < 0, segment, lane >> 1)]
+        forth = np.where(lane < 0, c * row["tx"] + s * row["ty"] >= 0.0, lane % 2 == 0)
         sign = np.where(forth, 1.0, -1.0)
-        tx, ty = sign * row[:, 2], sign * row[:, 3]
-        across = tx * (y - row[:, 1]) - ty * (x - row[:, 0])
+        tx, ty = sign * row["tx"], sign * row["ty"]
+        across = tx * (y - row["y"]) - ty * (x - row["x"])
         return np.stack([tx, ty, across, self._vehicles["middle"]], axis=1)
 
 

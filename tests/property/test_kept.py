@@ -137,11 +137,14 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
             aside = offset @ (-row["axis_y"], row["axis_x"])
             kept &= (row["along_low"] < along) & (along < row["along_high"])
             kept &= (row["aside_low"] < aside) & (aside < row["aside_high"])
-            sure = (np.abs(points - (row["fork_x"], row["fork_y"])) < row["fork_sure"]).all(axis=1)
-            assert (segment[sure] == labels.segment[0, n]).all()
+            way = points - (row["vertex_x"], row["vertex_y"])
+            sure = np.ones(len(points), dtype=bool)
+            for side in ("arm", "right", "left"):
+                sure &= way @ (row[f"{side}_x"], row[f"{side}_y"]) > row["arm_least"]
+            assert (segment[kept & sure] == labels.segment[0, n]).all()
+            doubtful += int((kept & ~sure).sum())
             kept &= segment == labels.segment[0, n]
             certain += int((kept & sure).sum())
-            doubtful += int((kept & ~sure).sum())
             segment, far, vertex, away = segment[kept], far[kept], vertex[kept], away[kept]
             cross = problem.intersection_radius + problem.car.body.reach
             assert (segment == labels.segment[0, n]).all()

@@ -13,8 +13,8 @@ draws = Draws(7, 0, 0)
 for k in range(400):
     net = k & 1
     v = draws.between(int(table.vert_off[net]), int(table.vert_off[net + 1]) - 1)
-    x = float(table.vert[v, 0]) + draws.uniform(-4.0, 4.0)
-    y = float(table.vert[v, 1]) + draws.uniform(-4.0, 4.0)
+    x = float(table.vertex[v].x) + draws.uniform(-4.0, 4.0)
+    y = float(table.vertex[v].y) + draws.uniform(-4.0, 4.0)
     s, d2 = lookup.nearest_segment(table, net, x, y)
     v, v2 = lookup.nearest_vertex(table, net, x, y)
     lane = 2 * int(s) + (k >> 1 & 1)

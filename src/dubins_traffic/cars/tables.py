@@ -56,13 +56,11 @@ class Part:
 class ObstacleTable(Tables):
     """The static obstacles of each trial: those of trial b are the parts off[b] to off[b + 1] - 1.
 
-    `off` (B + 1,); `parts` (P,); `part` (P, 8): the same as columns x, y, cos, sin, half_length, half_width, rounding,
-    reach.
+    `off` (B + 1,); `parts` (P,).
     """
 
     off: Ints
     parts: Rows[Part]
-    part: Floats
 
 
 _SHAPE = ("x", "y", "c", "s", "half_length", "half_width", "rounding", "reach")
@@ -94,7 +92,7 @@ def pack_cars(cars: Sequence[Car]) -> CarTable:
 def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     """Return the table of one sequence of obstacles per trial."""
     if not any(obstacles):
-        return ObstacleTable(np.zeros(len(obstacles) + 1, dtype=np.int64), table(Part, 0), np.zeros((0, 8)))
+        return ObstacleTable(np.zeros(len(obstacles) + 1, dtype=np.int64), table(Part, 0))
     off = [0]
     parts: list[tuple[float, ...]] = []
     owners: list[int] = []
@@ -109,7 +107,7 @@ def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     for name, column in zip(_SHAPE, columns.T, strict=True):
         rows[name] = column
     rows["owner"] = owners
-    return ObstacleTable(np.array(off, dtype=np.int64), rows, columns)
+    return ObstacleTable(np.array(off, dtype=np.int64), rows)
 
 
 def _car_row(car: Car) -> tuple[float, ...]:

@@ -176,21 +176,28 @@ def _room(b: int, world: World) -> int:
 def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: World) -> None:
     if own.decided != 0:
         return
-    if own.others != 0 and not decide_others(b, tick, world, commands):
-        own.status = NO_SIGHT
-        return
+    if own.others != 0:
+        if not decide_others(b, tick, world, commands):
+            own.status = NO_SIGHT
+            return
+        if not _are_finite(b, commands):
+            own.status = FAULTY
     if own.lawful != 0:
         spacing = world.spacing
         decide_lawful(
             b, tick, own.sight2, spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
+    own.decided = 1
+
+
+@jit_inline
+def _are_finite(b: int, commands: Floats) -> bool:
+    """Tell whether all commands of trial b are finite: those of the law always are, and those from outside before."""
     finite = True
     for n in range(commands.shape[1]):
         speed, yaw_rate = commands[b, n, 0], commands[b, n, 1]
         finite &= (speed - speed == 0.0) & (yaw_rate - yaw_rate == 0.0)
-    if not finite:
-        own.status = FAULTY
-    own.decided = 1
+    return finite
 
 
 @jit

@@ -115,7 +115,7 @@ def _copied(table: Table) -> Table:
 
 def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
     own = ragged(table.off, trials)
-    return ObstacleTable(own.off, table.parts[own.row], table.part[own.row])
+    return ObstacleTable(own.off, table.parts[own.row])
 
 
 def _goals(terms: Rows[RefereeParameters]) -> Ints:

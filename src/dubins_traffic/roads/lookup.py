@@ -116,22 +116,18 @@ def nearest_vertex(t: RoadTable, net: int, x: float, y: float) -> tuple[int, flo
 
 
 @jit
-def nearest_arm(t: RoadTable, net: int, v: int, x: float, y: float) -> tuple[int, float, float]:
-    """Return the nearest of the segments that meet in intersection v, as `nearest_segment` does, and a distance.
-
-    Less than that many metres away, along x and along y, it is still the nearest of these.
-    """
+def nearest_arm(t: RoadTable, net: int, v: int, x: float, y: float) -> tuple[int, float]:
+    """Return the nearest of the segments that meet in intersection v, as `nearest_segment` does."""
     row = t.vert_off[net] + v
     best = 0
-    least = second = INFINITE
+    least = INFINITE
     for k in range(t.degree[row]):
         s = t.arms[row, k] >> 1
         d2 = distance2(t, net, s, x, y)
-        second = min(second, max(d2, least))
         if d2 < least or (d2 == least and s < best):
             best = s
             least = d2
-    return best, least, 0.7 * 0.5 * (sqrt(second) - sqrt(least)) - CERTAIN
+    return best, least
 
 
 @jit_inline

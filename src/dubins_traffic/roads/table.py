@@ -69,19 +69,15 @@ class RoadTable(Tables):
     half_width : array (K,)
         Half the width of the roads, 2w, metres.
     seg_off : array (K + 1,)
-        First row of each network in `seg` and `ends`.
-    seg : array (S, 7)
-        First end ax, ay; unit tangent tx, ty; length; second end bx, by.
+        First row of each network in `segment` and `ends`.
     segment : table (S,) of Segment
-        The same, with names.
+        The segments.
     ends : array (S, 2)
         Intersections at the ends.
     vert_off : array (K + 1,)
-        First row of each network in `vert`, `arms` and `degree`.
-    vert : array (V, 2)
-        Intersections, metres.
+        First row of each network in `vertex`, `arms` and `degree`.
     vertex : table (V,) of Vertex
-        The same, with names.
+        The intersections.
     arms : array (V, 4)
         Lanes out of an intersection, counter-clockwise, then -1.
     degree : array (V,)
@@ -98,11 +94,9 @@ class RoadTable(Tables):
 
     half_width: Floats
     seg_off: Ints
-    seg: Floats
     segment: Rows[Segment]
     ends: Ints
     vert_off: Ints
-    vert: Floats
     vertex: Rows[Vertex]
     arms: Ints
     degree: Ints
@@ -150,8 +144,8 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     }
     return RoadTable(
         **plain,
-        seg_off=_offsets([len(own.seg) for own in tables]),
-        vert_off=_offsets([len(own.vert) for own in tables]),
+        seg_off=_offsets([len(own.segment) for own in tables]),
+        vert_off=_offsets([len(own.vertex) for own in tables]),
         segment=join([own.segment for own in tables]),
         vertex=join([own.vertex for own in tables]),
         grid=_grids([own.grid for own in tables]),
@@ -168,11 +162,9 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
         network.known[key] = RoadTable(
             half_width=np.array([half_width], dtype=np.float64),
             seg_off=_offsets([len(network.segments)]),
-            seg=_segments(network),
-            segment=_named_segments(network),
+            segment=_segments(network),
             ends=network.ends.copy(),
             vert_off=_offsets([len(network.points)]),
-            vert=network.points.copy(),
             vertex=_vertices(network),
             arms=_arms(network),
             degree=network.degrees.copy(),
@@ -186,16 +178,12 @@ def _table(network: RoadNetwork, half_width: float) -> RoadTable:
     return cast(RoadTable, network.known[key])
 
 
-def _segments(network: RoadNetwork) -> Floats:
-    first, second = network.points[network.ends[:, 0]], network.points[network.ends[:, 1]]
-    return np.concatenate([first, network.tangents, network.lengths[:, None], second], axis=1)
-
-
-def _named_segments(network: RoadNetwork) -> Rows[Segment]:
+def _segments(network: RoadNetwork) -> Rows[Segment]:
     rows = table(Segment, len(network.segments))
-    names = ("x", "y", "tx", "ty", "length", "end_x", "end_y")
-    for name, column in zip(names, _segments(network).T, strict=True):
-        rows[name] = column
+    rows["x"], rows["y"] = network.points[network.ends[:, 0]].T
+    rows["tx"], rows["ty"] = network.tangents.T
+    rows["length"] = network.lengths
+    rows["end_x"], rows["end_y"] = network.points[network.ends[:, 1]].T
     rows["first"], rows["second"] = network.ends.T
     return rows
 

@@ -76,7 +76,8 @@ def _look_who_stays(block: Kept, last: int, back: float) -> None:
     along_low, along_high, aside_low, aside_high = (
         block.along_low, block.along_high, block.aside_low, block.aside_high,
     )  # fmt: skip
-    fork_x, fork_y, fork_sure, tops = block.fork_x, block.fork_y, block.fork_sure, block.top_so_far
+    arm_x, arm_y, right_x, right_y = block.arm_x, block.arm_y, block.right_x, block.right_y
+    left_x, left_y, arm_least, tops = block.left_x, block.left_y, block.arm_least, block.top_so_far
     away, way, holds = block.away2, block.way_so_far, block.holds
     for k in range(last):
         x = here_x[k]
@@ -87,6 +88,9 @@ def _look_who_stays(block: Kept, last: int, back: float) -> None:
         ry = y - vertex_y[k]
         away2 = rx * rx + ry * ry
         inside &= (ring_low[k] < away2) & (away2 < ring_high[k])
+        least = arm_least[k]
+        sure = (rx * arm_x[k] + ry * arm_y[k] > least) & (rx * right_x[k] + ry * right_y[k] > least)
+        sure &= rx * left_x[k] + ry * left_y[k] > least
         rx = x - from_x[k]
         ry = y - from_y[k]
         along = rx * axis_x[k] + ry * axis_y[k]
@@ -96,11 +100,9 @@ def _look_who_stays(block: Kept, last: int, back: float) -> None:
         inside &= along < along_high[k]
         aside = axis_x[k] * ry - axis_y[k] * rx
         inside &= (aside_low[k] < aside) & (aside < aside_high[k])
-        half = fork_sure[k]
         away[k] = away2
         way[k] = progress
         tops[k] = max(top, progress)
-        sure = (abs(x - fork_x[k]) < half) & (abs(y - fork_y[k]) < half)
         held = 1.0 if sure else IF_NEAREST
         holds[k] = held if inside else 0.0
 
@@ -207,10 +209,9 @@ def holds_on(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memo
         return False
     if holds == IF_NEAREST:
         x, y = block.here_x[k], block.here_y[k]
-        segment, _, surely = nearest_arm(t, own.net, memory.cell[b, n].vertex, x, y)
+        segment, _ = nearest_arm(t, own.net, memory.cell[b, n].vertex, x, y)
         if segment != labels.segment[b, n]:
             return False
-        trust_fork(block, n, x, y, surely)
     car = memory.car[b, n]
     car.top = block.top_so_far[k]
     car.progress = block.way_so_far[k]
@@ -238,15 +239,6 @@ def hold(
     block.valid_high_y[k] = min(cell.high_y, y + half)
     block.top_so_far[k] = car.top
     _keep_ring(block, k, away2, own)
-
-
-@jit_inline
-def trust_fork(block: Kept, n: int, x: float, y: float, surely: float) -> None:
-    """Keep that the nearest road of car n is the same up to `surely` metres from (x, y), along x and along y."""
-    k = n & (BLOCK - 1)
-    block.fork_x[k] = x
-    block.fork_y[k] = y
-    block.fork_sure[k] = surely
 
 
 @jit_inline

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.roads.lookup import CERTAIN
+from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import Kept, TrialRules
 
 HUGE = 1e300
+BISECTED = 1e-4
+"""Metres, about, from where two roads are equally near: nearer to it the nearest is looked for in every frame."""
 
 
 @jit_inline
@@ -100,3 +102,57 @@ def _keep_sides(block: Kept, k: int, length: float, half: float) -> bool:
     block.along_low[k] = CERTAIN if beside else -HUGE
     block.along_high[k] = length - CERTAIN if beside else HUGE
     return beside
+
+
+@jit_inline
+def keep_arm(
+    block: Kept, n: int, segment: int, away2: float, cell: ValidCell, t: RoadTable, net: int
+) -> None:
+    """Keep in `block` (columns) where `segment` is the nearest of the roads that meet in the vertex of car n.
+
+    With unit vectors along the roads, u of this one and w of another, and r the way from the vertex: if r.u > 0 and
+    r.(u - w) > 0, this one is nearer. It is enough to look at the two that are next to it by their bearing. All that
+    holds while r is shorter than each of the roads; `away2` (m^2) is its square. After `label_cache.hold`.
+    """
+    k = n & (BLOCK - 1)
+    _trust(block, k, -1.0)
+    row = int(t.vert_off[net]) + cell.vertex
+    roads = t.degree[row]
+    if cell.segment >= 0 or roads == 1:
+        return
+    shortest = INFINITE
+    mine = 0
+    for i in range(roads):
+        arm: int = t.arms[row, i]
+        length: float = t.segment[int(t.seg_off[net]) + (arm >> 1)].length
+        shortest = min(shortest, length)
+        if arm >> 1 == segment:
+            mine = i
+    room = shortest - CERTAIN
+    if away2 >= room * room:
+        _trust(block, k, 1.0)
+        return
+    block.ring_high[k] = min(block.ring_high[k], room * room)
+    ux, uy = _bearing(t.arms[row, mine], t, net)
+    vx, vy = _bearing(t.arms[row, mine - 1 if mine > 0 else roads - 1], t, net)
+    wx, wy = _bearing(t.arms[row, mine + 1 if mine < roads - 1 else 0], t, net)
+    block.arm_x[k], block.arm_y[k] = ux, uy
+    block.right_x[k], block.right_y[k] = ux - vx, uy - vy
+    block.left_x[k], block.left_y[k] = ux - wx, uy - wy
+    block.arm_least[k] = BISECTED
+
+
+@jit_inline
+def _trust(block: Kept, k: int, least: float) -> None:
+    """Keep that the nearest road is the same everywhere if `least` is below 0, else that this is never known."""
+    block.arm_x[k] = block.arm_y[k] = block.right_x[k] = block.right_y[k] = 0.0
+    block.left_x[k] = block.left_y[k] = 0.0
+    block.arm_least[k] = least
+
+
+@jit_inline
+def _bearing(arm: int, t: RoadTable, net: int) -> tuple[float, float]:
+    """Return the unit vector along a lane out of an intersection."""
+    own = t.segment[int(t.seg_off[net]) + (arm >> 1)]
+    sign = -1.0 if arm & 1 != 0 else 1.0
+    return sign * own.tx, sign * own.ty

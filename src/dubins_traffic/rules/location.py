@@ -33,9 +33,8 @@ from dubins_traffic.rules.label_cache import (
     lingers,
     note_growth,
     still,
-    trust_fork,
 )
-from dubins_traffic.rules.lane_cache import keep_road
+from dubins_traffic.rules.lane_cache import keep_arm, keep_road
 from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import (
     AHEAD,
@@ -66,7 +65,7 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     net = own.net
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
     half_road = t.half_width[net]
-    segment, off2, surely = _look_up(pose.x, pose.y, t, own, cell)
+    segment, off2 = _look_up(pose.x, pose.y, t, own, cell)
     v = cell.vertex
     away2 = vertex_distance2(t, net, v, pose.x, pose.y)
     at = v if away2 < own.radius * own.radius else -1
@@ -109,23 +108,22 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
         spare = min(spare, abs(sqrt(off2) - half_road))
     hold(block, n, away2, spare, cell, car, own)
-    trust_fork(block, n, pose.x, pose.y, surely)
+    keep_arm(block, n, segment, away2, cell, t, net)
     return _change_crossing(crossed, crosses, memory.head[b])
 
 
 @jit_inline
-def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell) -> tuple[int, float, float]:
-    """Return (segment, off2, surely) of the nearest segment, by `cell`, which is renewed if need be.
+def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell) -> tuple[int, float]:
+    """Return the nearest segment and the squared distance from it, by `cell`, which is renewed if need be.
 
-    `cell.vertex` is the nearest vertex if the body, or the disc about it, may meet its disc. off2 is the squared
-    distance from the segment, which is the nearest for `surely` metres along x and along y, as long as `cell` holds.
+    `cell.vertex` is the nearest vertex if the body, or the disc about it, may meet its disc.
     """
     net = own.net
     if not (cell.low_x < x < cell.high_x and cell.low_y < y < cell.high_y):
         valid_cell(t, net, x, y, sqrt(own.cross2) + own.half_length + own.half_width, cell)
     segment = cell.segment
     if segment >= 0:
-        return segment, distance2(t, net, segment, x, y), FARTHEST
+        return segment, distance2(t, net, segment, x, y)
     return nearest_arm(t, net, cell.vertex, x, y)
 
 

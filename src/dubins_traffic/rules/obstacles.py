@@ -6,11 +6,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.cars.tables import ObstacleTable, Part
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.roads.table import RoadTable, Segment
 
 
 @record
@@ -50,7 +50,7 @@ def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> O
 
     `nets` (B,) are the numbers of the trials' road networks.
     """
-    if not len(obstacles.part):
+    if not len(obstacles.parts):
         none = np.full(len(nets), -1, dtype=np.int64)
         return ObstacleLanes(none, np.zeros(1, np.int64), table(ObstaclePart, 0))
     base: list[int] = []
@@ -62,9 +62,9 @@ def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> O
             base.append(-1)
             continue
         base.append(len(start) - 1)
-        for segment in roads.seg[roads.seg_off[net] : roads.seg_off[net + 1]]:
+        for row in range(int(roads.seg_off[net]), int(roads.seg_off[net + 1])):
             part, reaches = _on_segment(
-                obstacles.part[own], obstacles.parts["owner"][own], segment, float(roads.half_width[net])
+                obstacles.parts[own], roads.segment[row], float(roads.half_width[net])
             )
             parts.append(part[reaches])
             start.append(start[-1] + int(reaches.sum()))
@@ -73,22 +73,21 @@ def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> O
     return ObstacleLanes(np.array(base, dtype=np.int64), np.array(start, dtype=np.int64), rows)
 
 
-def _on_segment(part: Floats, owner: Ints, segment: Floats, half_width: float) -> tuple[Any, Any]:
+def _on_segment(parts: Rows[Part], segment: Segment, half_width: float) -> tuple[Any, Any]:
     """Return the parts (P,) in the coordinates of a segment, and which of them are beside it."""
-    x, y, c, s, half_length, _, rounding, _ = part.T
-    ax, ay, tx, ty, length = segment[:5]
-    rows: Any = table(ObstaclePart, len(part))
+    owner, rounding = parts["owner"], parts["rounding"]
+    rows: Any = table(ObstaclePart, len(parts))
     for along, left, sign in (("s0", "l0", -1.0), ("s1", "l1", 1.0)):
-        px = x + sign * half_length * c - ax
-        py = y + sign * half_length * s - ay
-        rows[along] = px * tx + py * ty
-        rows[left] = py * tx - px * ty
+        px = parts["x"] + sign * parts["half_length"] * parts["c"] - segment.x
+        py = parts["y"] + sign * parts["half_length"] * parts["s"] - segment.y
+        rows[along] = px * segment.tx + py * segment.ty
+        rows[left] = py * segment.tx - px * segment.ty
     rows["rounding"] = rounding
     rows["owner"] = owner
     ends = np.stack([rows["s0"], rows["s1"]]), np.stack([rows["l0"], rows["l1"]])
     begin, end = ends[0].min(axis=0) - rounding, ends[0].max(axis=0) + rounding
     right, left = ends[1].min(axis=0) - rounding, ends[1].max(axis=0) + rounding
-    reaches = (end >= 0.0) & (begin <= length)
+    reaches = (end >= 0.0) & (begin <= segment.length)
     for number in np.unique(owner[reaches]):
         own = reaches & (owner == number)
         if left[own].max() <= -half_width or right[own].min() >= half_width:

@@ -156,10 +156,15 @@ class Kept:
     """How far a car is in its lane: `base` and `sign` times the metres from a point along an axis."""
     top_so_far: Floats
     """The most of that so far."""
-    fork_x: Floats
-    fork_y: Floats
-    fork_sure: Floats
-    """Where the nearest road is the same: up to so many metres from a point, along x and along y."""
+    arm_x: Floats
+    arm_y: Floats
+    right_x: Floats
+    right_y: Floats
+    left_x: Floats
+    left_y: Floats
+    arm_least: Floats
+    """Where the nearest of the roads that meet in the vertex is the same: where all three products of these vectors and
+    the way from the vertex are greater than the last, metres."""
     aside_low: Floats
     aside_high: Floats
     along_low: Floats

@@ -31,7 +31,7 @@ class Clearance:
         self._half = np.array([car.half_length[0], car.half_width[0]])
         self._rounding = float(car.rounding[0])
         self._reach = float(car.reach[0])
-        self._parts = pack_obstacles([instance.problem.obstacles]).part
+        self._parts = pack_obstacles([instance.problem.obstacles]).parts
         self._best = np.inf
 
     def frames(self, frames: Frames) -> None:
@@ -60,13 +60,15 @@ class Clearance:
         self._improve(bound, gap)
 
     def _try_obstacles(self, frames: Frames) -> None:
-        part = self._parts
-        bound = _distance(frames, part[:, 0], part[:, 1]) - self._reach - part[:, 7]
+        parts = self._parts
+        bound = _distance(frames, parts["x"], parts["y"]) - self._reach - parts["reach"]
+        places = np.stack([parts["x"], parts["y"], parts["c"], parts["s"]], axis=-1)
+        halves = np.stack([parts["half_length"], parts["half_width"]], axis=-1)
 
         def gap(f: np.ndarray, p: np.ndarray) -> Floats:
             half = np.broadcast_to(self._half, (len(f), 2))
-            apart = box_distance(self._ego(frames, f), half, part[p, :4], part[p, 4:6])
-            return apart - self._rounding - part[p, 6]
+            apart = box_distance(self._ego(frames, f), half, places[p], halves[p])
+            return apart - self._rounding - parts["rounding"][p]
 
         self._improve(bound, gap)
 
