@@ -57,7 +57,7 @@ def drive(ego: str, policies: Sequence[Floats] | None, seed: int, trials: Sequen
     learned = list(range(1, CARS + 1)) if policies is not None else []
     cast = Cast(learned, ego, dict.fromkeys(learned, "sure"), excuses=False)
     crew = Crew(SETTINGS.episodes.draw([(seed, trial, 0) for trial in trials]), cast, SETTINGS)
-    asked, broken = np.zeros((len(trials), CARS + 1, 2)), np.zeros((len(trials), len(PARTS)))
+    asked, broken = np.zeros((*crew.group.state.x.shape, 2)), np.zeros((len(trials), len(PARTS)))
     paid, stacked = np.zeros(len(trials)), np.array(policies) if policies is not None else None
     bounds = SETTINGS.sample.problem.car.bounds
     while len(crew.group.active):
