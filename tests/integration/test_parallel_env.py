@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -277,3 +278,17 @@ def test_the_page_on_agents_runs(tmp_path: Path) -> None:
     for language, text in blocks:
         run_block(language, text, tmp_path)
     assert {"episode.mcap", "town.png"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_the_example_of_adversaries_drives_alike_again_and_breaks_nothing_of_e1_and_e2() -> None:
+    spec = importlib.util.spec_from_file_location(
+        "adversaries", ROOT / "examples" / "learning" / "adversaries.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    example: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    first, again = (example.drive("lanes", [example.beginner()] * 3, 1, range(3)) for _ in range(2))
+    assert all((first[name] == again[name]).all() for name in first)
+    assert not first["broken"][:, :2].any()
+    assert first["visits"].sum() > 0.0

@@ -15,14 +15,16 @@ def breach(rule: str, car: int, tick: int) -> Breach:
     return Breach(rule, car, tick, tick, 0.0, 0.0, -1, -1)
 
 
-def counted(breaches: Sequence[Sequence[Breach]], **rules: Any) -> tuple[list[tuple[str, int]], int | None]:
+def counted(
+    breaches: Sequence[Sequence[Breach]], excuses: bool = True, **rules: Any
+) -> tuple[list[tuple[str, int]], int | None]:
     """Return what counts, part and car, of breaches that come in some calls, and who broke first."""
     document = {
         "version": 1, "problem_domain": "dubins_traffic", "network": {"grid": {"rows": 2, "columns": 2}},
         "e-agents": [{"type": "lawful", "name": f"a{k}"} for k in range(3)], "number_trials": 1, "duration": 5,
         "rules": rules or True,
     }  # fmt: skip
-    blame = Blame(draw(load_config(document), 1, 0).problem)
+    blame = Blame(draw(load_config(document), 1, 0).problem, excuses=excuses)
     found = [(part, one.car) for own in breaches for one, part in blame.of(own)]
     return found, blame.first
 
@@ -47,6 +49,12 @@ def test_each_e_agent_answers_for_itself() -> None:
     assert counted([[breach("E4", 1, 5)], [breach("E2", 3, 9)], [breach("E5", 1, 9)]])[0] == [
         ("E4", 1), ("E2", 3), ("E5", 1),
     ]  # fmt: skip
+
+
+def test_without_excuses_each_side_answers_for_all_that_it_breaks() -> None:
+    both = [[breach("1.road", 0, 5)], [breach("E4", 1, 6)], [breach("2.left", 0, 9)]]
+    assert counted(both, excuses=False) == ([("1.road", 0), ("E4", 1), ("2.left", 0)], 0)
+    assert counted(both[1:], excuses=False) == ([("E4", 1), ("2.left", 0)], 1)
 
 
 def test_what_is_not_assumed_and_what_is_allowed_cost_nothing() -> None:

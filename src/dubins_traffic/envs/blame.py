@@ -29,6 +29,8 @@ class Blame:
     ----------
     problem : Problem
         What is judged.
+    excuses : bool
+        Whether it matters who broke first; else each side answers for all that it breaks.
 
     Attributes
     ----------
@@ -36,7 +38,8 @@ class Blame:
         The car whose breach was the first that counted; None so far.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, *, excuses: bool = True) -> None:
+        self._excuses = excuses
         rules = RuleParameters.from_mapping(problem.rules)
         self._assumed = assumed(rules)
         self._exceptions = Exceptions(rules, problem.rate)
@@ -59,7 +62,7 @@ class Blame:
 
     def _counts(self, breach: Breach, part: str) -> bool:
         if breach.car == EGO:
-            return self.first in (None, EGO)
+            return self.first in (None, EGO) or not self._excuses
         allowed = part == "E1" and not self._exceptions.exceeded(breach)
-        excused = self.first == EGO and self._since < breach.tick
+        excused = self._excuses and self.first == EGO and self._since < breach.tick
         return part in self._assumed and not allowed and not excused

@@ -58,11 +58,14 @@ class Cast:
         The controller that drives the ego, by its name; None if a learner does.
     shields : dict
         Of cars under a shield, by number, when they may cross the centre line.
+    excuses : bool
+        Whether what one side breaks after the other costs nothing (`envs.blame`).
     """
 
     learned: Sequence[int]
     ego: str | None = None
     shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
+    excuses: bool = True
 
 
 class Crew:
@@ -114,7 +117,7 @@ class Crew:
         self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
         self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
         self.given: list[Floats] = []
-        self.blame = [Blame(problem) for problem in problems]
+        self.blame = [Blame(problem, excuses=cast.excuses) for problem in problems]
         self._known = [(0, 0)] * trials
         self._learned = list(cast.learned)
         self._shields = self._shielded(problems, cast)

@@ -54,6 +54,8 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         says, and keep the rules.
     reward : mapping, optional
         Weights of terms that are not as usual: under ``ego`` those of the ego, under ``others`` those of e-agents.
+    excuses : bool
+        Whether what one side breaks after the other costs nothing; else each answers for all that it breaks.
     action, frame_skip, cars, levels
         As in `envs.settings.Settings`.
     render_mode : str, optional
@@ -82,6 +84,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         ego: str | None = None,
         learned: Sequence[str] | None = None,
         reward: Mapping[str, Mapping[str, float]] | None = None,
+        excuses: bool = True,
         action: str = "continuous",
         frame_skip: int = 1,
         cars: int = SHOWN,
@@ -97,7 +100,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self._cars = self.settings.sample.names
         self._ids = [agent_name(car) for car in range(len(self._cars))]
         self.names = dict(zip(self._ids, self._cars, strict=True))
-        self._cast = Cast(_numbers(self.settings.sample, learned, with_ego=ego is None), ego)
+        self._cast = Cast(_numbers(self.settings.sample, learned, with_ego=ego is None), ego, excuses=excuses)
         self.possible_agents = [self._ids[car] for car in self._cast.learned]
         self.agents: list[str] = []
         size = self.settings.layout.size + len(NAMES)
