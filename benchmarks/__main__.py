@@ -4,12 +4,13 @@
 two minutes more. Its parts `queries`, `generation` and `peers` are run by themselves only if they are named, and so is
 `million`, which takes some minutes.
 
-`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `monitors`, `lcm`, `sandbox`: about a minute;
-`first_use`, with empty caches of kernels, some; `service`, `ros1`: three; `first_submission`, which installs the
-package: one; `verify` runs 500 short trials and verifies their records, in two; `lanes` runs 400 trials and `rules`
-1,400, which takes some minutes each, and so does `odd_egos` for its 2,000; `synthesis` solves its games in about two
-minutes; `campaign` runs 300,000 short trials in as many; `competition` judges 1,000 trials of strangers twice and
-`shield` runs 22,000 of a minute each, a quarter of an hour both; `synthesized` runs 2,000 of 300 s, in half an hour.
+`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `rendering`, `monitors`, `lcm`, `sandbox`: about a
+minute; `envs`, which compiles an earlier commit, two and more; `first_use`, with empty caches of kernels, some;
+`service`, `ros1`: three; `first_submission`, which installs the package: one; `verify` runs 500 short trials and
+verifies their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so does
+`odd_egos` for its 2,000; `synthesis` solves its games in about two minutes; `campaign` runs 300,000 short trials in as
+many; `competition` judges 1,000 trials of strangers twice and `shield` runs 22,000 of a minute each, a quarter of an
+hour both; `synthesized` runs 2,000 of 300 s, in half an hour.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ NAMES = (
     "first_use",
     "judging",
     "batch",
+    "envs",
     "world",
     "scale",
+    "rendering",
     "monitors",
     "lanes",
     "rules",

@@ -17,7 +17,7 @@ FAMILIES = {
 GROUND = {"kernels", "files", "display", "errors", "record", "protocols", "outside"}
 TASK = {"problem", "rules", "logic", "roads", "cars", "synthesis", "scoring"}
 TRIALS = {
-    "engine", "sandbox", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
+    "engine", "envs", "sandbox", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
     "observations", "routing",
 }  # fmt: skip
 WHAT = {
@@ -26,6 +26,7 @@ WHAT = {
     "competition": "phases, submissions of strangers, places",
     "campaign": "many trials and their reports; a check of controllers; bags and logs",
     "sessions": "drivers or worlds in other processes",
+    "envs": "environments for learning",
     "engine": "many trials in one compiled pass",
     "runs": "the work of one command",
     "viewer": "pictures, replays; records held against what must have happened",
@@ -35,7 +36,8 @@ WHAT = {
     "simulators": "what stands behind the protocols",
     "shield": "the nearest command that keeps the rules",
     "policies": "how cars drive; the game of cells",
-    "observations": "what a driver is told; ways through the network",
+    "observations": "what a driver is told, as a vector too",
+    "routing": "ways through the network",
     "protocols": "the seams, one file",
     "record": "one file a trial",
     "problem": "configurations, instances, how they are drawn",

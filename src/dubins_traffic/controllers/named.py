@@ -56,7 +56,8 @@ def load(spec: str) -> Controller:
     if spec.endswith(".mcap"):
         return cast(Controller, _module("scripted").replay(spec))
     if spec.endswith(".npz"):
-        return cast(Controller, _module("synthesized").player(spec))
+        learned = _module("learned")
+        return cast(Controller, (learned if learned.is_policy(spec) else _module("synthesized")).player(spec))
     if not outside.is_place(spec):
         raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(BUILT_IN)))
     return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))

@@ -95,6 +95,8 @@ class Group:
         Speed and yaw rate of each car; those of the egos may be written between the ticks.
     endings : list of Ending or None
         How each trial has ended, None while it runs.
+    contacts, breaches : list of list
+        Those of each trial so far.
     """
 
     def __init__(
@@ -135,8 +137,8 @@ class Group:
         self.commands: Floats = np.zeros((trials, places, 2))
         self.endings: list[Ending | None] = [None] * trials
         self._going = np.ones(trials, dtype=bool)
-        self._contacts: list[list[Contact]] = [[] for _ in instances]
-        self._breaches: list[list[Breach]] = [[] for _ in instances]
+        self.contacts: list[list[Contact]] = [[] for _ in instances]
+        self.breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
         self._feed = Feed(instances, places, metrics) if metrics else None
         self._take = bound(run_trials)
@@ -182,8 +184,8 @@ class Group:
         twin.commands = self.commands[taken]
         twin.endings = [None] * len(trials)
         twin._going = np.ones(len(trials), dtype=bool)
-        twin._contacts = [list(self._contacts[b]) for b in trials]
-        twin._breaches = [list(self._breaches[b]) for b in trials]
+        twin.contacts = [list(self.contacts[b]) for b in trials]
+        twin.breaches = [list(self.breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
         twin._take = bound(run_trials)
         twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
@@ -211,8 +213,7 @@ class Group:
 
     def advance(self, most: int = 1) -> None:
         """Take each trial that has not ended up to `most` ticks farther."""
-        active = self.active
-        if len(active):
+        if len(active := self.active):
             self._run(active, most)
 
     def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
@@ -250,11 +251,11 @@ class Group:
         pending = running(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
             score = scores.score(
-                self.instances[b], b, self._contacts[b], self._breaches[b], self._seen[b], hanging, ending,
+                self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging, ending,
                 self._rules[b], name, begin.get(b),
             )  # fmt: skip
             if self._feed is not None:
-                score = replace(score, metrics=self._feed.result(b, ending, self._contacts[b]))
+                score = replace(score, metrics=self._feed.result(b, ending, self.contacts[b]))
             found.append(Outcome(self.instances[b], ending, score))
         return found
 
@@ -265,8 +266,7 @@ class Group:
         fleets, whose = distinct([id(instance.e_agents) for instance in self.instances])
         kinds = [{agent.kind for agent in self.instances[b].e_agents} for b in fleets]
         trial["others"] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
-        radii = np.array([instance.problem.sensing_radius for instance in self.instances])
-        trial["sight2"] = radii * radii
+        trial["sight2"] = np.square([instance.problem.sensing_radius for instance in self.instances])
         return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))
 
     def _aim(self) -> None:
@@ -289,17 +289,21 @@ class Group:
             before = self.ticks[active].copy()
             self._carry(active, 1)
             moved = active[self.ticks[active] > before]
-            self._feed.push(moved, self.state, self.labels, self.commands, self._contacts)
+            self._feed.push(moved, self.state, self.labels, self.commands, self.contacts)
 
     def _carry(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most
         while len(active):
             left = int((goal - self.ticks[active]).max())
             self._take(active, left, 1.0 / self._rate, self.commands, self._world)
-            self._drain()
-            self._mind(active)
+            self.settle(active)
             going = self._going[active] & (self.ticks[active] < goal)
             active, goal = active[going], goal[going]
+
+    def settle(self, trials: Ints) -> None:
+        """Take over what a pass of `trials` that others have called has found; note which have ended, and make room."""
+        self._drain()
+        self._mind(trials)
 
     def _mind(self, active: Ints) -> None:
         """Enlarge what was too small, and write down how trials ended."""
@@ -315,7 +319,7 @@ class Group:
                 self.end(b, End.AGENT_FAULT, agent_fault(self.instances[b], self.commands[b]))
             elif why == STATUS.COLLIDED:
                 tick = int(self.ticks[b])
-                mine = [own for own in self._contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
+                mine = [own for own in self.contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
                 self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))
 
     def _drain(self) -> None:
@@ -324,13 +328,13 @@ class Group:
         for k, row in enumerate(world.work.meetings()):
             note = world.progress.contact[k]
             b, contact = row.b, contact_of(row, note.tick, self._rate)
-            self._contacts[b].append(with_fault_by(contact, note.bits, note.other_bits))
+            self.contacts[b].append(with_fault_by(contact, note.bits, note.other_bits))
             pair = ((contact.car, note.sensed), (contact.other, note.other_sensed))
             self._seen[b].update((car, note.tick) for car, is_seen in pair if is_seen)
         for k, breached in enumerate(world.breach_log.found()):
             place = world.progress.place[k]
             b, breach = int(breached.trial), breach_of(breached, place.x, place.y)
-            self._breaches[b].append(breach)
+            self.breaches[b].append(breach)
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.breach_log.filled[0] = 0

@@ -85,23 +85,37 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
     -----
     A car that stands is never at fault in a collision, and neither is one that moves away.
     """
-    x, y, c, s = pose
-    speed, yaw_rate = command
-    period = car.period
-    turns = abs(yaw_rate) * car.reach if car.half_length + car.half_width > 0.0 else 0.0
-    own = (abs(speed) + turns) * period
+    own = moved_by(command, car)
     if own == 0.0:
         return True
+    gap, least, last = gaps(pose, command, car, other, own + travel + GUARD)
+    return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
+
+
+@jit_inline
+def moved_by(command: Command, car: Mover) -> float:
+    """Return how far the farthest point of a car gets in a tick, metres, at most."""
+    turns = abs(command.yaw_rate) * car.reach if car.half_length + car.half_width > 0.0 else 0.0
+    return (abs(command.speed) + turns) * car.period
+
+
+@jit
+def gaps(pose: Pose, command: Command, car: Mover, other: Box, far: float) -> tuple[float, float, float]:
+    """Return the gap between a car and another body before a tick, the least of five in it, and that after it, metres.
+
+    The other stands. Where the first is more than `far` (m), all three are that one.
+    """
+    x, y, c, s = pose
     gap, _, _, _, _ = separation(body_at(pose, car), other)
-    if gap > own + travel + GUARD:
-        return True
     least = gap
     last = gap
+    if gap > far:
+        return gap, least, last
     for k in range(1, 5):
-        nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, 0.25 * k * period)
+        nx, ny, nc, ns = advance(x, y, c, s, command.speed, command.yaw_rate, 0.25 * k * car.period)
         last, _, _, _, _ = separation(body_at(Pose(nx, ny, nc, ns), car), other)
         least = min(least, last)
-    return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
+    return gap, least, last
 
 
 @jit_inline

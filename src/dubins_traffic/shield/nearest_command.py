@@ -201,6 +201,14 @@ def _nearest(
     if obeys and _apart(refused, law, vehicle) < least:
         best = law
         least = _apart(refused, law, vehicle)
+    straight = bounded(refused.speed, 0.0, vehicle)
+    if (
+        vehicle.half_length > 0.0
+        and _apart(refused, straight, vehicle) < least
+        and refusal(b, straight.speed, 0.0, near, traffic, guards) == NOTHING
+    ):
+        best = straight
+        least = _apart(refused, straight, vehicle)
     shift = vehicle.yaw_most
     for _ in range(SHIFTS):
         shift *= 0.5

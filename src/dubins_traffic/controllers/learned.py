@@ -1,0 +1,170 @@
+"""The controller of a learned policy: a small network on the flat observation, read from a file."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic import files
+from dubins_traffic.cars.state import Command, Observation
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.observations.flat import FlatObserver
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+FORMAT: Final = "dubins-traffic policy"
+"""What the array `format` of a policy's file says."""
+MOST: Final = 1 << 24
+"""Most bytes of such a file."""
+_DAMAGED: Final = (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error)
+"""What NumPy raises for files that are not what they claim."""
+_ARRAYS: Final = ("names", "cars", "frame_skip", "hidden", "hidden_bias", "out", "out_bias")
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A network of one hidden layer: actions are ``tanh(out tanh(hidden v + hidden_bias) + out_bias)``.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The numbers of the flat observation that it is shown, v, by their names (`observations.flat.Layout`).
+    cars : int
+        Other cars that the flat observation shows.
+    frame_skip : int
+        Ticks for which an action is held.
+    hidden, hidden_bias, out, out_bias : (H, V), (H,), (2, H), (2,)
+        The weights.
+    """
+
+    names: tuple[str, ...]
+    cars: int
+    frame_skip: int
+    hidden: Floats
+    hidden_bias: Floats
+    out: Floats
+    out_bias: Floats
+
+    def __post_init__(self) -> None:
+        width, seen = len(self.hidden_bias), len(self.names)
+        shapes = {"hidden": (width, seen), "hidden_bias": (width,), "out": (2, width), "out_bias": (2,)}
+        for name, shape in shapes.items():
+            found: Floats = getattr(self, name)
+            if found.shape != shape or not np.isfinite(found).all():
+                raise InputError(
+                    "not a policy", field=name, value=found.shape, expected=f"finite numbers {shape}"
+                )
+        if self.frame_skip < 1 or self.cars < 0:
+            raise InputError("not a policy", field="frame_skip", value=self.frame_skip, expected=">= 1")
+
+    def act(self, seen: npt.NDArray[Any]) -> Floats:
+        """Return the action, shares of speed and yaw rate, for what is seen, (V,)."""
+        return np.tanh(self.out @ np.tanh(self.hidden @ seen + self.hidden_bias) + self.out_bias)
+
+    def save(self, path: str | Path) -> None:
+        """Write the policy to a file."""
+        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in _ARRAYS}
+
+        def write(neighbour: Path) -> None:
+            with neighbour.open("wb") as stream:
+                np.savez(stream, allow_pickle=False, format=np.array(FORMAT), **arrays)
+
+        files.replace_file(Path(path), write)
+
+
+def is_policy(path: str | Path) -> bool:
+    """Tell whether the file at `path` says that it is a policy."""
+    return _format(path) == FORMAT
+
+
+def load(path: str | Path) -> Policy:
+    """Return the policy in a file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    try:
+        if Path(path).stat().st_size > MOST:
+            raise InputError("too large", file=str(path), expected=f"at most {MOST} bytes")
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
+            arrays = {name: found[name] for name in _ARRAYS}
+        return _policy(arrays)
+    except InputError as error:
+        raise error.within(file=str(path)) from None
+    except FileNotFoundError:
+        raise InputError("no such file", file=str(path)) from None
+    except _DAMAGED as error:
+        raise InputError(f"can't be read as a policy ({error})", file=str(path)) from None
+
+
+def _policy(arrays: Mapping[str, Any]) -> Policy:
+    weights = {name: np.asarray(arrays[name], dtype=np.float64) for name in _ARRAYS[3:]}
+    names = tuple(str(name) for name in cast("list[str]", arrays["names"].tolist()))
+    return Policy(names, int(arrays["cars"]), int(arrays["frame_skip"]), **weights)
+
+
+def _format(path: str | Path) -> str:
+    try:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
+            return str(found["format"]) if "format" in found else ""
+    except _DAMAGED:
+        return ""
+
+
+class Learned:
+    """Drives as a policy says.
+
+    Parameters
+    ----------
+    policy : Policy
+        What says it.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+
+    def start(self, problem: Problem) -> None:
+        """Look up what the policy is shown.
+
+        Raises
+        ------
+        InputError
+            If the problem's observations lack something of it.
+        """
+        self._observe = FlatObserver(problem, self._policy.cars)
+        places = {name: k for k, name in enumerate(self._observe.layout.names)}
+        missing = [name for name in self._policy.names if name not in places]
+        if missing:
+            raise InputError(
+                "not in the observation", field="names", value=missing[0], expected="a name of Layout"
+            )
+        self._places = np.array([places[name] for name in self._policy.names], dtype=np.int64)
+        bounds = problem.car.bounds
+        low = -bounds.speed if bounds.speed_min is None else bounds.speed_min
+        self._half = 0.5 * (bounds.speed - low), bounds.yaw_rate
+        self._middle = 0.5 * (bounds.speed + low)
+        self._command = Command(0.0, 0.0)
+
+    def act(self, observation: Observation) -> Command:
+        """Decide, or hold what has been decided."""
+        seen = self._observe(observation)
+        if observation.tick % self._policy.frame_skip == 0:
+            speed, turn = self._policy.act(seen[self._places]).tolist()
+            self._command = Command(speed * self._half[0] + self._middle, turn * self._half[1])
+        return self._command
+
+
+def player(path: str | Path) -> Learned:
+    """Return the controller of the policy in a file."""
+    return Learned(load(path))

@@ -1,0 +1,74 @@
+"""What a car is told of the ego beside what it senses: where it is and goes; and what each car has done."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.envs.step_kernel import count_tick
+from dubins_traffic.envs.tables import StepTables
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.observations.flat_kernel import near_far, sweep, within, write_flat
+from dubins_traffic.observations.outlook import OutlookTables
+
+NAMES = (
+    "is_ego", "bearing_cos", "bearing_sin", "distance", "heading_cos", "heading_sin", "speed", "yaw_rate",
+    "goal_bearing_cos", "goal_bearing_sin", "goal_distance", "route",
+)  # fmt: skip
+"""The numbers told of the ego, in order, each from -1 to 1."""
+Flats = npt.NDArray[np.float32]
+
+
+@jit
+def count_cars(rows: Ints, tick: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count, for the cars of some `rows` (K,), what the tick has brought that ended in frame `tick`."""
+    for k in range(rows.shape[0]):
+        row: int = rows[k]
+        count_tick(row, row, outlook, steps)
+        sweep(row, tick, outlook)
+
+
+@jit
+def tell_cars(rows: Ints, cars: int, told: Flats, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the cars of some `rows` (K,) observe, and into `told` (V, T) what they are told of the ego.
+
+    `cars` (count) is how many rows a trial has; its first row is the ego's.
+    """
+    for k in range(rows.shape[0]):
+        row: int = rows[k]
+        write_flat(row, EGO, steps.flat[row], outlook)
+        number = row % cars
+        _tell(row, row - number, 0 if number == 0 else 1, told[row], outlook, steps)
+
+
+@jit
+def _tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the car of a row is told of the ego, which stands in a place of it, and in the row `first`."""
+    state, own, ego = outlook.state, outlook.trial[row], outlook.trial[first]
+    x, y, c, s = state.x[row, EGO], state.y[row, EGO], state.c[row, EGO], state.s[row, EGO]
+    ec, es = state.c[row, place], state.s[row, place]
+    out[0] = 1.0 if row == first else 0.0
+    _bearing(state.x[row, place] - x, state.y[row, place] - y, c, s, own.sight, out[1:4])
+    out[4] = within(c * ec + s * es)
+    out[5] = within(c * es - s * ec)
+    out[6] = within(state.speed[row, place] / own.speed)
+    out[7] = within(state.yaw_rate[row, place] / own.yaw_rate)
+    out[8] = out[9] = out[10] = out[11] = 0.0
+    if ego.target >= 0:
+        vertex: int = outlook.roads.vert_off[ego.net] + outlook.goal[ego.target].vertex
+        goal = outlook.roads.vertex[vertex]
+        _bearing(goal.x - x, goal.y - y, c, s, own.sight, out[8:11])
+        out[11] = near_far(steps.stride[first].route, own.sight)
+
+
+@jit_inline
+def _bearing(dx: float, dy: float, c: float, s: float, sight: float, out: Flats) -> None:
+    """Write the direction of a point in a car's frame, as cosine and sine, and how far it is."""
+    away = sqrt(dx * dx + dy * dy)
+    out[0] = within((c * dx + s * dy) / away) if away > 0.0 else 0.0
+    out[1] = within((c * dy - s * dx) / away) if away > 0.0 else 0.0
+    out[2] = near_far(away, sight)

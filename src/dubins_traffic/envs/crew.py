@@ -1,0 +1,222 @@
+"""Trials whose cars learners drive, some or all: stepped together, each car observed, counted and blamed by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.controllers import registry
+from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.engine.controlled import Controlled
+from dubins_traffic.engine.group import Group
+from dubins_traffic.envs.about_ego import NAMES, count_cars, tell_cars
+from dubins_traffic.envs.bank import Board
+from dubins_traffic.envs.blame import Blame
+from dubins_traffic.envs.step_kernel import begin_trials
+from dubins_traffic.envs.tables import StepTables, Stride
+from dubins_traffic.envs.terms import AT_FAULT, COSTS
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import table
+from dubins_traffic.observations.outlook import new_outlook
+from dubins_traffic.observations.viewpoints import Viewpoints
+from dubins_traffic.problem.instance import EAgent, Instance
+from dubins_traffic.problem.kinds import REMOTE
+from dubins_traffic.rules.breach_log import COLLISION, RULES
+from dubins_traffic.rules.referee import Breach, accused
+from dubins_traffic.scoring.verdict import ASSUMPTIONS
+from dubins_traffic.shield.car_shields import CarShields
+
+if TYPE_CHECKING:
+    from dubins_traffic.cars.state import Contact
+    from dubins_traffic.envs.settings import Settings
+    from dubins_traffic.shield.tables import Overtakes
+
+LEARNER: Final = "learner/policy"
+"""The type of an e-agent that a learner drives."""
+PARTS: Final = (*COSTS, *ASSUMPTIONS)
+"""What can be broken, by number: by the ego a rule, or being at fault; by an e-agent a part of E1 to E6."""
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass
+class Cast:
+    """Who drives what in the trials of a crew.
+
+    Parameters
+    ----------
+    learned : sequence of int
+        Numbers of the cars that learners drive.
+    ego : str or None
+        The controller that drives the ego, by its name; None if a learner does.
+    shields : dict
+        Of cars under a shield, by number, when they may cross the centre line.
+    excuses : bool
+        Whether what one side breaks after the other costs nothing (`envs.blame`).
+    """
+
+    learned: Sequence[int]
+    ego: str | None = None
+    shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
+    excuses: bool = True
+
+
+class Crew:
+    """Some trials of one configuration, from their first frames on.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial; all have as many cars.
+    cast : Cast
+        Who drives what.
+    settings : Settings
+        What the environments of the trials have in common.
+
+    Attributes
+    ----------
+    group : Group
+        The trials.
+    terms : (B, N, T)
+        Terms of `envs.terms` of each car in the last step, but for breaches.
+    broken : (B, N, P)
+        How often each car has broken each of `PARTS` in the last step, where that counts (`envs.blame`).
+    stepped_in : (B, N)
+        In how many ticks of the last step a shield has changed each car's command.
+    given : list of (B, N, 2)
+        The commands of all cars in each tick so far.
+    blame : list of Blame
+        Of each trial, whose breaches count.
+    """
+
+    def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
+        own = [with_learners(instance, cast.learned) for instance in instances]
+        controlled = cast.ego not in (None, COMPILED)
+        self._egos = Controlled(own, partial(registry.load, str(cast.ego))) if controlled else None
+        self.group = self._egos.group if self._egos else Group(own, keeps_rules=cast.ego == COMPILED)
+        self._cars = len(instances[0].starts)
+        trials, places = self.group.state.x.shape
+        problems = [instance.problem for instance in instances]
+        self._views = Viewpoints(self.group.state, self.group.labels)
+        each = [problem for problem in problems for _ in range(places)]
+        nets: Ints = np.repeat(np.ascontiguousarray(self.group.world.rules["net"]), places)
+        bodies = pack_cars([problem.car for problem in each]), pack_obstacles([one.obstacles for one in each])
+        around = self._views.state, self._views.labels, *bodies
+        self.outlook = new_outlook(each, nets, self.group.world.roads, around, settings.layout.cars)
+        board: dict[str, Any] = Board(len(each), settings).arrays
+        self._steps = StepTables(stride=table(Stride, len(each)), **board)
+        self._flat, self._told = board["flat"], np.zeros((len(each), len(NAMES)), dtype=np.float32)
+        self.terms: Floats = board["terms"].reshape(trials, places, -1)
+        self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
+        self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
+        self.given: list[Floats] = []
+        self.blame = [Blame(problem, excuses=cast.excuses) for problem in problems]
+        self._known = [(0, 0)] * trials
+        self._learned = list(cast.learned)
+        self._shields = self._shielded(problems, cast)
+        self._count, self._tell = bound(count_cars), bound(tell_cars)
+        begin_trials(self.outlook, self._steps)
+        self._charge(np.arange(trials, dtype=np.int64))
+        self.broken[:] = 0
+        self._observe(np.arange(trials, dtype=np.int64))
+
+    def _shielded(self, problems: Any, cast: Cast) -> list[CarShields]:
+        found: list[CarShields] = []
+        for overtakes in dict.fromkeys(cast.shields.values()):
+            cars: Bools = np.zeros(self.group.state.x.shape, dtype=np.bool_)
+            cars[:, [car for car, own in cast.shields.items() if own == overtakes]] = True
+            found.append(CarShields(problems, self._views, cars, overtakes=overtakes))
+        return found
+
+    def step(self, asked: Floats, ticks: int) -> None:
+        """Take all trials that have not ended up to `ticks` ticks farther.
+
+        Parameters
+        ----------
+        asked : (B, N, 2)
+            What the cars that learners drive are to do, speed, m/s, and yaw rate, rad/s.
+        ticks : int
+            For how long.
+        """
+        self.terms[:] = 0.0
+        self.broken[:] = 0
+        self.stepped_in[:] = 0
+        begun = self.group.active
+        for _ in range(ticks):
+            if not len(self.group.active):
+                break
+            self._tick(asked)
+        self._observe(begun)
+
+    def _tick(self, asked: Floats) -> None:
+        group, commands = self.group, self.group.commands
+        commands[:, self._learned] = asked[:, self._learned]
+        if self._egos is not None:
+            self._egos.ask_each()
+        running = group.active
+        for shields in self._shields:
+            ticks: Ints = np.full(len(group.instances), -1)
+            ticks[running] = group.ticks[running]
+            self.stepped_in += shields.filter(ticks, commands) != 0
+        before = group.ticks.copy()
+        group.advance()
+        self.given.append(commands.copy())
+        moved: Ints = np.flatnonzero(group.ticks > before)
+        if not len(moved):
+            return
+        self._views.look(moved)
+        self._count(self._rows(moved), int(group.ticks[moved[0]]), self.outlook, self._steps)
+        self._charge(moved)
+
+    def _rows(self, trials: Ints) -> Ints:
+        places = self.group.state.x.shape[1]
+        return (trials[:, None] * places + np.arange(self._cars)).reshape(-1)
+
+    def _charge(self, trials: Ints) -> None:
+        """Count what has been broken since the last time, where that counts."""
+        for b in map(int, trials):
+            breaches, contacts = self.group.breaches[b], self.group.contacts[b]
+            seen, met = self._known[b]
+            if len(breaches) == seen and len(contacts) == met:
+                continue
+            self._known[b] = len(breaches), len(contacts)
+            fresh = contacts[met:]
+            for breach, part in self.blame[b].of([*breaches[seen:], *accused(fresh)]):
+                self.broken[b, breach.car, PARTS.index(part)] += 1
+                if breach.car == EGO and breach.rule == RULES[COLLISION]:
+                    self.broken[b, EGO, AT_FAULT] += _guilty(breach, fresh)
+
+    def _observe(self, trials: Ints) -> None:
+        self._tell(self._rows(trials), self.group.state.x.shape[1], self._told, self.outlook, self._steps)
+
+    @property
+    def observed(self) -> npt.NDArray[np.float32]:
+        """What each car observes, (B, N, F)."""
+        whole = np.concatenate([self._flat, self._told], axis=1)
+        return whole.reshape(*self.group.state.x.shape, -1)
+
+
+def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
+    """Return an instance in which learners drive the e-agents of these numbers."""
+    agents = tuple(
+        EAgent(REMOTE, agent.name, LEARNER) if car in learned else agent
+        for car, agent in enumerate(instance.e_agents, start=1)
+    )
+    return replace(instance, e_agents=agents)
+
+
+def _guilty(breach: Breach, contacts: Sequence[Contact]) -> int:
+    """Return in how many contacts of the tick of a collision the ego is at fault."""
+    own = [one for one in contacts if one.tick == breach.tick]
+    return sum(
+        guilty and car == EGO
+        for one in own
+        for car, guilty in zip((one.car, one.other), one.at_fault, strict=True)
+    )

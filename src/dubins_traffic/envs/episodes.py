@@ -1,0 +1,154 @@
+"""Which trial each episode of an environment is: a function of a seed, of the environment and of the episode's number.
+
+Episode k of environment i under the base seed s is trial ``4096 k + i`` of seed s. With a pool of levels its road
+network is that of a level, drawn from the same numbers; all else is drawn as ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem import limits
+from dubins_traffic.problem.configuration import Configuration
+from dubins_traffic.problem.draw import check_numbers, draw, draw_many
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+MOST_ENVS: Final = 4096
+"""So many environments have trials of their own under one seed."""
+TEST: Final = 1 << 31
+"""Levels to train on are drawn as trials from 0 on, those to test on as trials from here on."""
+LEVEL_DRAW: Final = 260
+"""The number by which a level is drawn for a trial."""
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """A pool of road networks that are drawn once.
+
+    Parameters
+    ----------
+    count : int
+        How many there are.
+    seed : int
+        What they are drawn from.
+    split : str
+        ``train``, or ``test`` for as many others, none of which is drawn for training.
+    """
+
+    count: int
+    seed: int = 0
+    split: str = "train"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.count, bool) or not 1 <= self.count < TEST:
+            raise InputError(
+                "not a number of levels", field="levels.count", value=self.count, expected=">= 1"
+            )
+        check_numbers(self.seed, 0)
+        if self.split not in ("train", "test"):
+            raise InputError(
+                "no such set of levels", field="levels.split", value=self.split, expected="train or test"
+            )
+
+    @staticmethod
+    def of(given: Levels | Mapping[str, Any] | int | None) -> Levels | None:
+        """Return the pool that a number, or a mapping of the parameters, stands for."""
+        if given is None or isinstance(given, Levels):
+            return given
+        if isinstance(given, int):
+            return Levels(given)
+        unknown = given.keys() - {"count", "seed", "split"}
+        if unknown or "count" not in given:
+            raise InputError(
+                "not a pool of levels", field="levels", value=dict(given), expected="count, seed, split"
+            )
+        return Levels(**given)
+
+
+class Episodes:
+    """Draws the trials of episodes.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        What they are drawn from.
+    levels : Levels, optional
+        The pool of road networks; by default each trial has the network that its configuration says.
+
+    Raises
+    ------
+    InputError
+        If the configuration asks for what environments do not have.
+    """
+
+    def __init__(self, configuration: Configuration, levels: Levels | None = None) -> None:
+        self.configuration = configuration
+        self._levels = levels
+        self._level = cache(self._drawn)
+
+    def draw(self, wanted: Iterable[tuple[int, int, int]]) -> list[Instance]:
+        """Return the trials of some episodes, each given by base seed, environment and number.
+
+        Raises
+        ------
+        InputError
+            If an environment or an episode has too large a number, or a trial can't be drawn.
+        """
+        numbered = [(seed, trial_of(env, episode)) for seed, env, episode in wanted]
+        groups: dict[tuple[int, int], list[int]] = {}
+        for place, (seed, trial) in enumerate(numbered):
+            groups.setdefault((seed, self._level_of(seed, trial)), []).append(place)
+        found: dict[int, Instance] = {}
+        for (seed, level), places in groups.items():
+            own = self.configuration if level < 0 else self._level(level)
+            drawn = draw_many(own, seed, [numbered[place][1] for place in places])
+            found.update(zip(places, drawn, strict=True))
+        return [found[place] for place in range(len(numbered))]
+
+    def _level_of(self, seed: int, trial: int) -> int:
+        """Return the number of a trial's level, -1 without a pool."""
+        if self._levels is None:
+            return -1
+        from dubins_traffic.kernels.random import below
+
+        chosen = below(np.uint64(seed), trial, 0, 0, LEVEL_DRAW, self._levels.count)
+        return int(chosen) + (TEST if self._levels.split == "test" else 0)
+
+    def _drawn(self, level: int) -> Configuration:
+        """Return the configuration with the network of a level."""
+        seed = 0 if self._levels is None else self._levels.seed
+        network = draw(self.configuration, seed, level).problem.network
+        settings = self.configuration.settings.model_copy(update={"network": None})
+        return replace(self.configuration, settings=settings, network=network)
+
+
+def trial_of(env: int, episode: int) -> int:
+    """Return the number of the trial that an episode of an environment is."""
+    trial = MOST_ENVS * episode + env
+    if not (0 <= env < MOST_ENVS and 0 <= trial < limits.TRIALS):
+        raise InputError(
+            "no such episode",
+            field="episode",
+            value=(env, episode),
+            expected=f"an environment below {MOST_ENVS}, and an episode below {limits.TRIALS // MOST_ENVS}",
+        )
+    return trial
+
+
+def seeds_of(seed: int | Sequence[int | None], envs: int) -> list[tuple[int, int]]:
+    """Return the base seed and number of each environment: i under one seed for all, 0 under seeds of their own."""
+    if isinstance(seed, int | np.integer):
+        return [(int(seed), env) for env in range(envs)]
+    if len(seed) != envs:
+        raise InputError(
+            "not one seed for each environment", field="seed", value=len(seed), expected=str(envs)
+        )
+    return [(int(cast(int, own)), 0) for own in seed]

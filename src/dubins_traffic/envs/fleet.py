@@ -1,0 +1,190 @@
+"""Environments that are stepped together, without Gymnasium's names for it: each is in one trial after another."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from dubins_traffic.engine.batch_kernel import RUNNING
+from dubins_traffic.envs.bank import Bank, Board
+from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.problem.draw import check_numbers
+from dubins_traffic.protocols import End, Ending
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from dubins_traffic.engine.group import Outcome
+    from dubins_traffic.envs.settings import Settings
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.scoring.formulas import Status
+
+AHEAD: Final = 4
+"""So many trials wait for each environment, at most."""
+
+
+class Fleet:
+    """Some environments.
+
+    Parameters
+    ----------
+    settings : Settings
+        What they have in common.
+    envs : int
+        How many there are.
+
+    Attributes
+    ----------
+    board : Board
+        What the last step has given.
+    ended : (E,) bool
+        Which environments are in a trial that has ended, or in none yet.
+    waiting : bool
+        Whether there are any such.
+    """
+
+    def __init__(self, settings: Settings, envs: int) -> None:
+        self.settings = settings
+        self.board = Board(envs, settings)
+        self.ended = np.ones(envs, dtype=np.bool_)
+        self.waiting = True
+        self._who: list[tuple[int, int]] = [(0, env) for env in range(envs)]
+        self._next = [0] * envs
+        self._ready: list[deque[tuple[Bank, int]]] = [deque() for _ in range(envs)]
+        self._seats: list[tuple[Bank, int] | None] = [None] * envs
+        self._parts: list[tuple[Bank, Ints, Ints]] | None = None
+
+    def __len__(self) -> int:
+        return len(self._next)
+
+    def seed(self, env: int, who: tuple[int, int], episode: int = 0) -> None:
+        """Let the next trial of an environment be `episode` of `who`: a base seed, and a number under it.
+
+        Raises
+        ------
+        InputError
+            If the seed is out of range.
+        """
+        check_numbers(who[0], 0)
+        self._who[env], self._next[env] = who, episode
+        self._ready[env].clear()
+
+    def begin(self, envs: Iterable[int]) -> None:
+        """Put environments into their next trials, and observe the first frames of these."""
+        some = list(envs)
+        if any(not self._ready[env] for env in some):
+            self._fill(some)
+        for env in some:
+            bank, row = self._seats[env] = self._ready[env].popleft()
+            if self.settings.formulas:
+                bank.watch(row, self.settings.formulas)
+            self.ended[env] = False
+            self.board.arrays["status"][env] = RUNNING
+        self.waiting = bool(self.ended.any())
+        self._parts = None
+        for bank, rows, places in self._grouped(some):
+            bank.observe(rows, places)
+
+    def step(self, actions: Any) -> None:
+        """Take all environments whose trials have not ended through a step.
+
+        Parameters
+        ----------
+        actions : (E, ...)
+            One each, elements of the space of actions.
+
+        Raises
+        ------
+        InputError
+            If they are no actions.
+        """
+        self.settings.actions.put(actions, self.board.arrays["asked"])
+        if self._parts is None:
+            self._parts = self._grouped(np.flatnonzero(~self.ended).tolist())
+        ended = False
+        for bank, rows, places in self._parts:
+            ended |= bank.step(rows, places, self.settings.frame_skip)
+        if ended:
+            self.ended |= self.board.arrays["status"] != RUNNING
+            self.waiting = bool(self.ended.any())
+            self._parts = None
+
+    def seat(self, env: int) -> tuple[Bank, int]:
+        """Return the bank and the row in it of an environment's trial.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If it is in none.
+        """
+        found = self._seats[env]
+        if found is None:
+            raise DubinsTrafficError("an environment has to be reset before it is used")
+        return found
+
+    def instance(self, env: int) -> Instance:
+        """Return the instance of an environment's trial."""
+        bank, row = self.seat(env)
+        return bank.group.instances[row]
+
+    def states(self, env: int) -> dict[str, Status]:
+        """Return what is said of each formula, in the present frame of an environment's trial."""
+        bank, row = self.seat(env)
+        return bank.watches[row].states
+
+    def tick(self, env: int) -> int:
+        """Return the present frame of an environment's trial."""
+        bank, row = self.seat(env)
+        return int(bank.group.ticks[row])
+
+    def ending(self, env: int) -> Ending | None:
+        """Return how an environment's trial has ended, None while it runs."""
+        bank, row = self.seat(env)
+        return bank.group.endings[row]
+
+    def is_terminal(self, env: int) -> bool:
+        """Tell whether an environment's trial has come to an end of its own, and not to that of its time."""
+        ending = self.ending(env)
+        return ending is not None and ending.end is End.COLLISION
+
+    def outcomes(self, envs: Sequence[int]) -> list[Outcome]:
+        """Return what came of the trials of environments, which have ended."""
+        found: dict[int, Outcome] = {}
+        for bank, rows, places in self._grouped(envs):
+            found.update(zip(places.tolist(), bank.group.outcomes(rows.tolist(), "env"), strict=True))
+        return [found[env] for env in envs]
+
+    def _grouped(self, envs: Sequence[int]) -> list[tuple[Bank, Ints, Ints]]:
+        """Return the banks of some environments, with the rows and environments of each."""
+        found: dict[int, tuple[Bank, list[int], list[int]]] = {}
+        for env in envs:
+            bank, row = self.seat(env)
+            _, rows, places = found.setdefault(id(bank), (bank, [], []))
+            rows.append(row)
+            places.append(env)
+        return [(bank, np.array(rows), np.array(places)) for bank, rows, places in found.values()]
+
+    def _fill(self, envs: Sequence[int]) -> None:
+        """Draw trials for environments that have none ahead, and for others while at it.
+
+        The first time each gets one trial; afterwards all get some, so that few banks are under way at a time.
+        """
+        wanted: list[tuple[int, int]] = []
+        first = {env for env in envs if not self._next[env] and not self._ready[env]}
+        for env in envs if first else range(len(self)):
+            count = 1 if first else AHEAD
+            missing = count - len(self._ready[env])
+            wanted += [(env, self._next[env] + k) for k in range(missing)]
+            self._next[env] += max(0, missing)
+        drawn = self.settings.episodes.draw([(*self._who[env], episode) for env, episode in wanted])
+        bank = Bank(drawn, self.board, self.settings.layout.cars)
+        for row, (env, _) in enumerate(wanted):
+            self._ready[env].append((bank, row))
+
+
+def masked(envs: int, mask: Any) -> list[int]:
+    """Return the environments that a mask names, (E,) bool; all without one."""
+    return list(range(envs)) if mask is None else np.flatnonzero(np.asarray(mask, dtype=bool)).tolist()

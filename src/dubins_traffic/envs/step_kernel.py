@@ -1,0 +1,195 @@
+"""A step of environments, compiled: ticks, observation, terms of the reward.
+
+The ticks are those of `engine.batch_kernel`; docs/semantics.md has their order, docs/design/088-envs.md what is
+counted when.
+"""
+
+from __future__ import annotations
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.engine.batch_kernel import COLLIDED, ENDED, FAULTY, RUNNING, World, run_trials
+from dubins_traffic.envs.tables import StepTables
+from dubins_traffic.envs.terms import AT_FAULT, BREACHES, COMFORT, PROGRESS, ROUNDS, TIME, VISITS
+from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
+from dubins_traffic.observations.outlook import OutlookTables
+from dubins_traffic.observations.seeking import metres_to_goal, seek
+from dubins_traffic.rules.breach_log import COLLISION
+from dubins_traffic.rules.propositions import BREACH3, LEFT, OVERTAKING
+
+
+@jit
+def begin_trials(outlook: OutlookTables, steps: StepTables) -> None:
+    """Look at the first frame of every trial of a bank: what is visited there, what is sought, what the laser meets."""
+    for b in range(outlook.trial.shape[0]):
+        seek(b, outlook)
+        sweep(b, 0, outlook)
+        own = steps.stride[b]
+        own.route = _route(b, outlook)
+        own.speed = outlook.state.speed[b, EGO]
+        own.yaw_rate = outlook.state.yaw_rate[b, EGO]
+
+
+@jit
+def observe_trials(rows: Ints, envs: Ints, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the egos of the trials `rows` (K,) observe as that of the environments `envs` (K,)."""
+    for k in range(rows.shape[0]):
+        write_flat(rows[k], EGO, steps.flat[envs[k]], outlook)
+
+
+@jit_wide
+def step_trials(
+    rows: Ints,
+    envs: Ints,
+    ticks: int,
+    commands: Floats,
+    world: World,
+    outlook: OutlookTables,
+    steps: StepTables,
+) -> int:
+    """Take some trials through a step; return how many of them have to be looked at, -1 if an action is not finite.
+
+    Those have ended, pause, or stand still since there is no room for something. The step of the others goes on in
+    another call with 0 ticks.
+
+    Parameters
+    ----------
+    rows, envs : (K,)
+        Trials of the bank, and the environment of each.
+    ticks : int
+        Ticks of the step that begins; 0 to go on with one.
+    commands : (B, N, 2)
+        Speed and yaw rate of every car, m/s and rad/s; those of the egos are written here.
+    world, outlook, steps
+        The tables of the bank's trials.
+    """
+    special = 0
+    if ticks > 0 and not _begin(rows, envs, ticks, commands, steps):
+        return -1
+    for k in range(rows.shape[0]):
+        b: int = rows[k]
+        own = steps.stride[b]
+        if own.left == 0:
+            continue
+        steps.one[0] = b
+        status = RUNNING
+        pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
+        while own.left > max(pause, 0) and status == RUNNING:
+            status = _tick(b, envs[k], commands, world, outlook, steps)
+        steps.status[envs[k]] = status
+        if status in (ENDED, COLLIDED, FAULTY):
+            own.left = 0
+        special += 0 if status == RUNNING and own.left == 0 else 1
+        _close(b, envs[k], outlook, steps)
+    return special
+
+
+@jit_inline
+def _begin(rows: Ints, envs: Ints, ticks: int, commands: Floats, steps: StepTables) -> bool:
+    """Begin a step: write down what the actions command, and count from nothing; False if an action is not finite."""
+    for e in range(steps.asked.shape[0]):
+        both = steps.asked[e, 0] + steps.asked[e, 1]
+        if both - both != 0.0:
+            return False
+    scale = steps.scale[0]
+    for k in range(rows.shape[0]):
+        b: int = rows[k]
+        e: int = envs[k]
+        commands[b, EGO, 0] = within(steps.asked[e, 0]) * scale.speed + scale.middle
+        commands[b, EGO, 1] = within(steps.asked[e, 1]) * scale.yaw_rate
+        steps.stride[b].left = ticks
+        for j in range(steps.terms.shape[1]):
+            steps.terms[e, j] = 0.0
+    return True
+
+
+@jit_inline
+def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables, steps: StepTables) -> int:
+    """Take trial b through a tick, and count what it has brought; return why it stands still, if it does."""
+    period = steps.scale[0].period
+    breaches, contacts = world.breach_log.filled[0], world.work.found[0]
+    tick = world.progress.trial[b].tick
+    run_trials(steps.one, 1, period, commands, world)
+    if world.progress.trial[b].tick > tick:
+        steps.stride[b].left -= 1
+        count_tick(b, e, outlook, steps)
+        _charge(e, breaches, contacts, world, steps)
+        sweep(b, tick + 1, outlook)
+    return world.progress.trial[b].status
+
+
+@jit_inline
+def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Sum up the reward of a step, and observe."""
+    total = 0.0
+    for j in range(steps.weights.shape[0]):
+        weighted = steps.weights[j] * steps.terms[e, j]
+        steps.weighted[e, j] = weighted
+        total += weighted
+    steps.reward[e] = total
+    write_flat(b, EGO, steps.flat[e], outlook)
+
+
+@jit_inline
+def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
+    """Count what a tick has brought, but breaches and collisions; `b` and `e` (row): the trial's, and of its terms."""
+    own, seen = steps.stride[b], outlook.trial[b]
+    rounds, sought = seen.rounds, seen.target
+    left = INFINITE
+    there = False
+    if sought >= 0:
+        goal = outlook.goal[sought]
+        there = outlook.labels.at[b, EGO] == goal.vertex and goal.fresh != 0
+        left = 0.0 if there else metres_to_goal(b, EGO, sought, outlook)
+    if own.route < INFINITE and left < INFINITE:
+        steps.terms[e, PROGRESS] += own.route - left
+    visited = seek(b, outlook)
+    steps.terms[e, VISITS] += visited
+    steps.terms[e, ROUNDS] += seen.rounds - rounds
+    own.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
+    speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
+    faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
+    steps.terms[e, COMFORT] += faster * faster + turned * turned
+    own.speed, own.yaw_rate = speed, yaw_rate
+    steps.terms[e, TIME] += steps.scale[0].period
+
+
+@jit_inline
+def _route(b: int, outlook: OutlookTables) -> float:
+    """Return how far the ego has to go to the goal that it seeks, metres; inf without one."""
+    target = outlook.trial[b].target
+    return metres_to_goal(b, EGO, target, outlook) if target >= 0 else INFINITE
+
+
+@jit_inline
+def _charge(e: int, breaches: int, contacts: int, world: World, steps: StepTables) -> None:
+    """Count the ego's breaches and collisions among those found from the given rows on."""
+    log, work = world.breach_log, world.work
+    for k in range(breaches, log.filled[0]):
+        if log.row[k].car == EGO:
+            steps.terms[e, BREACHES + log.row[k].rule] += 1.0
+    for k in range(contacts, work.found[0]):
+        if work.contact[k].car == EGO or work.contact[k].other == EGO:
+            steps.terms[e, BREACHES + COLLISION] += 1.0
+            steps.terms[e, BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
+
+
+@jit
+def _guilty(k: int, world: World) -> bool:
+    """Tell whether the ego is at fault in contact k, as `rules.fault.with_fault_by` does."""
+    contact, note = world.work.contact[k], world.progress.contact[k]
+    if contact.other < 0:
+        return contact.moved != 0
+    first = contact.moved != 0 and contact.closing > 0.0
+    second = contact.other_moved != 0 and contact.other_closing > 0.0
+    first_breaks = first and _in_breach(note.bits)
+    second_breaks = second and _in_breach(note.other_bits)
+    if first_breaks or second_breaks:
+        return first_breaks if contact.car == EGO else second_breaks
+    return first if contact.car == EGO else second
+
+
+@jit_inline
+def _in_breach(bits: int) -> bool:
+    return bits & (LEFT | OVERTAKING) == LEFT or bits & BREACH3 != 0

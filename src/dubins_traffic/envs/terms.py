@@ -1,0 +1,60 @@
+"""What rewards are made of: terms by name, with weights; and costs by rule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.rules.breach_log import CLEARANCE, RULES
+
+COSTS: Final = (*RULES[: CLEARANCE + 1], "at_fault")
+"""Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
+AT_FAULT: Final = len(COSTS) - 1
+
+VISITS: Final = 0
+ROUNDS: Final = 1
+PROGRESS: Final = 2
+COMFORT: Final = 3
+TIME: Final = 4
+BREACHES: Final = 5
+"""The first of the terms that are costs."""
+TERMS: Final = ("visits", "rounds", "progress", "comfort", "time", *COSTS)
+"""Terms of the reward, by number."""
+
+WEIGHTS: Final[Mapping[str, float]] = {
+    "visits": 1.0,
+    "rounds": 0.0,
+    "progress": 0.1,
+    "comfort": -0.01,
+    "time": 0.0,
+    **dict.fromkeys(COSTS, -1.0),
+    "at_fault": -5.0,
+}
+"""What each term counts unless it is said otherwise.
+
+`visits` of goals; `rounds` through all of them; `progress` toward the goal that is sought, metres along lanes;
+`comfort`: sum over ticks of the squared changes of speed and yaw rate, as shares of the car's bounds; `time`, seconds;
+the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`: collisions in which it is at fault.
+"""
+
+
+def weights_of(given: Mapping[str, float] | None) -> Floats:
+    """Return the weight of each term, (T,), where `given` names those that are not as in `WEIGHTS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such term, or a weight is no finite number.
+    """
+    own = dict(WEIGHTS)
+    for name, value in (given or {}).items():
+        if name not in own:
+            raise InputError("no such term", field="reward", value=name, expected=", ".join(TERMS))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InputError("not a weight", field=f"reward.{name}", value=value, expected="a finite number")
+        own[name] = float(value)
+    return np.array([own[name] for name in TERMS])

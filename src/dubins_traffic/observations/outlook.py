@@ -1,0 +1,207 @@
+"""What flat observations are made from, as tables: each trial's scales, its goals, and the ways to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from dubins_traffic.cars.sensing import Ray, Surroundings, rays_at
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.tables import CarTable, ObstacleTable
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.routing.tours import lane_graph
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+
+@record
+class Outlook:
+    """What the flat observations of one trial are scaled by, and what its ego seeks."""
+
+    net: int
+    """The trial's road network."""
+    first_goal: int
+    """Its first row of `OutlookTables.goal`."""
+    last_goal: int
+    """The row after its last."""
+    target: int = -1
+    """The row of the goal that the ego seeks, -1 without goals."""
+    last_at: int = -1
+    """The intersection whose disc has held the ego's centre last, -1: none."""
+    visits: int
+    """Visits of goals so far."""
+    rounds: int
+    """Rounds through all goals so far."""
+    swept: int = -1
+    """Number of the laser's last sweep, -1 before the first."""
+    radius: float
+    """Of the intersections' discs, metres."""
+    sight: float
+    """The sensing radius, metres."""
+    sight2: float
+    """Its square, or more where all that is listed is seen."""
+    half_width: float
+    """Of the roads, 2w, metres."""
+    speed: float
+    """The car's top speed, m/s."""
+    yaw_rate: float
+    """Its top yaw rate, rad/s."""
+
+
+@record
+class SoughtGoal:
+    """A goal of a trial."""
+
+    vertex: int
+    """Its intersection."""
+    done: int
+    """1 if it has been visited in the present round."""
+    fresh: int = 1
+    """1 if coming into its disc is a visit: there was none yet, or the ego has been in another disc since."""
+    route: int
+    """The row of `OutlookTables.metres` with the way to it."""
+
+
+@record
+class Sweeps:
+    """The laser of a batch; `rate` is 0 without one."""
+
+    rate: float
+    """Sweeps a second."""
+    control: float = 1.0
+    """Ticks a second."""
+    shortest: float
+    """Metres."""
+    longest: float
+    """Metres."""
+
+
+class OutlookTables(Tables):
+    """All that flat observations of a batch are made from.
+
+    Attributes
+    ----------
+    state, labels : State, Labels
+        The present frame, (B, N).
+    roads : RoadTable
+        The roads of the batch.
+    trial : (B,) Outlook
+        Scales of each trial, and what its ego seeks.
+    goal : (G,) SoughtGoal
+        The goals of one trial after another, each once.
+    metres : (M, L)
+        From the start of each lane to a goal, for each distinct pair of network and goal; inf where there is no way.
+    near : (K,)
+        Scratch: the cars that are shown, nearest first.
+    apart : (K,)
+        Scratch: the squares of their distances, square metres.
+    laser : (1,) Sweeps
+        The laser.
+    rays : (R,) Ray
+        Directions of its rays.
+    ranges : (B, R)
+        What the last sweep of each ego has met, metres.
+    around : Surroundings
+        What rays may meet.
+    """
+
+    state: State
+    labels: Labels
+    roads: RoadTable
+    trial: Rows[Outlook]
+    goal: Rows[SoughtGoal]
+    metres: Floats
+    near: Ints
+    apart: Floats
+    laser: Rows[Sweeps]
+    rays: Rows[Ray]
+    ranges: Floats
+    around: Surroundings
+
+
+def new_outlook(
+    problems: Sequence[Problem],
+    nets: Ints,
+    roads: RoadTable,
+    around: tuple[State, Labels, CarTable, ObstacleTable],
+    shown: int,
+) -> OutlookTables:
+    """Return the tables of a batch before its first frame.
+
+    Parameters
+    ----------
+    problems
+        One a trial; with one laser, or none.
+    nets, roads
+        The number of each trial's network in the table of the roads.
+    around
+        State and labels, and the cars and obstacles of the batch.
+    shown
+        How many other cars are shown.
+    """
+    state, labels, cars, obstacles = around
+    trial = table(Outlook, len(problems))
+    trial["net"] = nets
+    trial["radius"] = [own.intersection_radius for own in problems]
+    trial["sight"] = [own.sensing_radius for own in problems]
+    trial["sight2"] = [own.sensing_radius * own.sensing_radius for own in problems]
+    trial["half_width"] = [own.car.lane_width for own in problems]
+    trial["speed"] = [own.car.bounds.speed for own in problems]
+    trial["yaw_rate"] = [own.car.bounds.yaw_rate for own in problems]
+    goal, metres = _goals(problems, trial)
+    laser, rays = _laser(problems[0])
+    return OutlookTables(
+        state=state, labels=labels, roads=roads, trial=trial, goal=goal, metres=metres,
+        near=np.zeros(max(1, shown), dtype=np.int64), apart=np.zeros(max(1, shown)),
+        laser=laser, rays=rays, ranges=np.full((len(problems), len(rays)), np.inf),
+        around=Surroundings(state, cars, obstacles),
+    )  # fmt: skip
+
+
+def _goals(problems: Sequence[Problem], trial: Rows[Outlook]) -> tuple[Rows[SoughtGoal], Floats]:
+    """Return the goals of the trials, and the ways to them; note in `trial` which are whose."""
+    ways: list[Floats] = []
+    known: dict[tuple[int, int], int] = {}
+    rows: list[tuple[int, int]] = []
+    for b, problem in enumerate(problems):
+        trial[b].first_goal = len(rows)
+        for vertex in dict.fromkeys(problem.goal_vertices):
+            key = id(problem.network), vertex
+            if key not in known:
+                known[key] = len(ways)
+                ways.append(metres_to_vertex(problem.network, vertex))
+            rows.append((vertex, known[key]))
+        trial[b].last_goal = len(rows)
+    goal = table(SoughtGoal, len(rows))
+    goal["vertex"], goal["route"] = [vertex for vertex, _ in rows], [way for _, way in rows]
+    metres = np.full((len(ways), max((len(way) for way in ways), default=1)), np.inf)
+    for k, way in enumerate(ways):
+        metres[k, : len(way)] = way
+    return goal, metres
+
+
+def metres_to_vertex(network: RoadNetwork, vertex: int) -> Floats:
+    """Return the metres from the start of each lane to an intersection along lanes, (L,); inf where there is no way."""
+    found = cast("Floats | None", network.known.get((Outlook, vertex)))
+    if found is None:
+        graph = lane_graph(network)
+        ways = [graph.metres_to(target) for target in graph.into[vertex]]
+        found = network.known[Outlook, vertex] = np.min(ways, axis=0) + np.array(graph.length)
+    return found
+
+
+def _laser(problem: Problem) -> tuple[Rows[Sweeps], Rows[Ray]]:
+    sweeps, laser = table(Sweeps, 1), problem.laser
+    if laser is None:
+        return sweeps, table(Ray, 0)
+    own = sweeps[0]
+    own.rate, own.control = laser.rate, problem.rate
+    own.shortest, own.longest = laser.range_min, laser.range_max
+    return sweeps, rays_at(np.linspace(laser.angle_min, laser.angle_max, laser.rays))

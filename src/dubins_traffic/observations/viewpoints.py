@@ -1,0 +1,87 @@
+"""Trials as each of their cars sees them: rows of a batch in which another car stands in the ego's place.
+
+What is written for egos, such as the shield and flat observations, serves any car in its own row: itself first, then
+the others in their order, as in what a driver is told (`observations.senses`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.tables import Tables
+
+
+class ViewTables(Tables):
+    """The frame of a batch, (B, N), and what each car sees of it: row ``b N + n`` is trial b as car n sees it."""
+
+    state: State
+    labels: Labels
+    own_state: State
+    """(B N, N)."""
+    own_labels: Labels
+    """(B N, N)."""
+
+
+@jit
+def turn_round(trials: Ints, views: ViewTables) -> None:
+    """Write what the cars of some `trials` (K,) see in the present frame."""
+    for k in range(trials.shape[0]):
+        b: int = trials[k]
+        count = views.state.count[b]
+        for n in range(count):
+            row = b * views.state.x.shape[1] + n
+            views.own_state.count[row] = count
+            _put(b, n, row, 0, views)
+            for j in range(n):
+                _put(b, j, row, j + 1, views)
+            for j in range(n + 1, count):
+                _put(b, j, row, j, views)
+
+
+@jit
+def _put(b: int, car: int, row: int, place: int, views: ViewTables) -> None:
+    """Copy a car of a trial into a place of a row."""
+    state, labels, own, named = views.state, views.labels, views.own_state, views.own_labels
+    own.x[row, place] = state.x[b, car]
+    own.y[row, place] = state.y[b, car]
+    own.c[row, place] = state.c[b, car]
+    own.s[row, place] = state.s[b, car]
+    own.speed[row, place] = state.speed[b, car]
+    own.yaw_rate[row, place] = state.yaw_rate[b, car]
+    named.segment[row, place] = labels.segment[b, car]
+    named.at[row, place] = labels.at[b, car]
+    named.crosses[row, place] = labels.crosses[b, car]
+    named.lane[row, place] = labels.lane[b, car]
+    named.bits[row, place] = labels.bits[b, car]
+
+
+class Viewpoints:
+    """What each car of some trials sees.
+
+    Parameters
+    ----------
+    state, labels : State, Labels
+        The present frame of the trials, (B, N), as it is now and will be.
+
+    Attributes
+    ----------
+    state, labels : State, Labels
+        The same as each car sees it, (B N, N), when it was looked at last; rows of cars that a trial does not have
+        hold nothing.
+    """
+
+    def __init__(self, state: State, labels: Labels) -> None:
+        trials, cars = state.x.shape
+        self.state, self.labels = State.zeros(trials * cars, cars), Labels.zeros(trials * cars, cars)
+        self._tables = ViewTables(state, labels, self.state, self.labels)
+        self._turn = bound(turn_round)
+        every: Ints = np.arange(trials, dtype=np.int64)
+        self.look(every)
+
+    def look(self, trials: Ints) -> None:
+        """Look at the present frame of some trials, (K,)."""
+        self._turn(trials, self._tables)

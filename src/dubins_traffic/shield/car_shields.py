@@ -1,0 +1,111 @@
+"""Shields of any cars of trials that are stepped together, e-agents among them: they keep E1 and E2, egos rules 1 to 3.
+
+A car's shield is that of the ego (`shield.nearest_command`, docs/shield.md) in the row in which the car stands in the
+ego's place. Its argument names no ego: a car under it breaks none of rules 2 and 3, stays on the road and is at fault
+in nothing, which is E1 and E2, whatever all others do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.tables import Traffic, scratch
+from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.shield.nearest_command import shield
+from dubins_traffic.shield.tables import NOTHING, REASONS, Overtakes, check_overtakes, egos, guards
+
+if TYPE_CHECKING:
+    from dubins_traffic.observations.viewpoints import Viewpoints
+    from dubins_traffic.problem.instance import Problem
+
+
+class CarShields:
+    """Keeps some cars of some trials within the rules, whatever they are asked to do.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        One a trial, B.
+    views : Viewpoints
+        What the cars of these trials see.
+    cars : (B, N) bool
+        Which of them are kept.
+    overtakes : {"sure", "law", "never"}
+        When they may cross the centre line, as for `ShieldFilter`.
+
+    Raises
+    ------
+    InputError
+        If the cars can't keep the rules, or `overtakes` is something else.
+    """
+
+    def __init__(
+        self,
+        problems: Sequence[Problem],
+        views: Viewpoints,
+        cars: npt.NDArray[np.bool_],
+        *,
+        overtakes: Overtakes = "sure",
+    ) -> None:
+        for problem in {id(problem): problem for problem in problems}.values():
+            check_fit(problem, owes=False)
+        self._views = views
+        self._places = cars.shape[1]
+        self._rows: Ints = np.flatnonzero(cars)
+        own = [problem for problem in problems for _ in range(self._places)]
+        roads, net = pack_distinct(
+            [problem.network for problem in own], [problem.car.lane_width for problem in own]
+        )
+        longest = max(len(problem.network.segments) for problem in problems)
+        self._traffic = Traffic(
+            views.state,
+            views.labels,
+            roads,
+            pack_obstacles([problem.obstacles for problem in own]),
+            egos(own, self._places, net),
+            scratch(self._places, longest),
+        )
+        self._guards = guards(own, self._traffic, overtakes=check_overtakes(overtakes))
+        self._tick: Ints = np.full(len(own), -1)
+        self._commands = np.zeros((len(own), self._places, 2))
+        self._shield = bound(shield)
+
+    def filter(self, ticks: Ints, commands: Floats) -> Ints:
+        """Put what these cars do in place of what they are asked to do, for the tick that begins in the frame seen.
+
+        Parameters
+        ----------
+        ticks : (B,)
+            Number of the present frame of each trial, -1 for trials to leave alone; none may be left out.
+        commands : (B, N, 2)
+            Speed, m/s, and yaw rate, rad/s, of all cars; those of the cars that are kept are changed in place.
+
+        Returns
+        -------
+        reasons : (B, N) int64
+            Why each car's command was changed (a place in `shield.tables.REASONS`), 0 where it was not.
+        """
+        rows = self._rows
+        self._tick[rows] = ticks[rows // self._places]
+        flat = commands.reshape(-1, 2)
+        self._commands[rows, EGO] = flat[rows]
+        self._shield(self._tick, False, self._traffic, self._guards, self._commands)
+        running = rows[self._tick[rows] >= 0]
+        flat[running] = self._commands[running, EGO]
+        found: Any = np.full(len(flat), NOTHING, dtype=np.int64)
+        found[running] = self._guards.ego["reason"][running]
+        return found.reshape(commands.shape[:2])
+
+    @staticmethod
+    def name(reason: int) -> str:
+        """Return the rule that was at stake, for what `filter` returns."""
+        return REASONS[reason]

@@ -1,0 +1,235 @@
+"""Frames of a trial as arrays of pixels, thousands a second: the roads are drawn once, the cars in a kernel.
+
+They look like the replay page: the same colours, the same marks, the same goals, lit where they have been visited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dubins_traffic.cars.body import Disc, DiscObstacle
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.viewer import palette
+from dubins_traffic.viewer.marks import goal_numbers
+from dubins_traffic.viewer.raster_ground import Cover, blend, rgb
+from dubins_traffic.viewer.raster_kernel import MARK, Image, View, paint
+from dubins_traffic.viewer.scene import centre_lines, extent, lane_hints, obstacle_points
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
+
+SIZES: Final = (16, 4096)
+"""Fewest and most pixels of a side."""
+MARGIN: Final = 0.3
+"""Metres around the roads."""
+GOAL_INK: Final = "#00684B"
+COLOURS: Final = (
+    palette.INK_COLOUR,
+    "#FFFFFF",
+    palette.EGO_COLOUR,
+    palette.CONTACT_COLOUR,
+    *palette.BREACH_COLOURS,
+    *(palette.car_colour(car) for car in range(1 + len(palette.AGENT_COLOURS))),
+)
+"""Of what the kernel paints, in its order."""
+MOST_GROUNDS: Final = 64
+"""Pictures of the roads, with other goals lit, that are kept."""
+NO_MARKS: Final = np.zeros((0, MARK))
+
+
+class Raster:
+    """Draws frames of the trials of one problem as arrays of pixels.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose roads, goals, obstacles and cars are drawn.
+    width, height : int
+        Pixels of a frame.
+    chosen : int
+        Number of the car that has a ring about it; -1 for none.
+
+    Raises
+    ------
+    InputError
+        If a side has fewer or more pixels than `SIZES`.
+
+    Examples
+    --------
+    >>> raster = Raster(problem, width=400, height=400)                 # doctest: +SKIP
+    >>> picture = raster.frame(state.x[0], state.y[0], state.c[0], state.s[0])      # doctest: +SKIP
+    """
+
+    def __init__(self, problem: Problem, *, width: int = 400, height: int = 400, chosen: int = 0) -> None:
+        for name, side in (("width", width), ("height", height)):
+            if not SIZES[0] <= side <= SIZES[1]:
+                raise InputError(
+                    "not a size of pictures",
+                    field=name,
+                    value=side,
+                    expected=f"{SIZES[0]} to {SIZES[1]} pixels",
+                )
+        self.width, self.height = width, height
+        self._problem = problem
+        self._view = _view(problem, width, height, chosen)
+        self._numbers = goal_numbers(problem)
+        self._base = self._roads()
+        self._grounds: dict[tuple[int, ...], Image] = {}
+        self._paint = bound(paint)
+
+    def frame(
+        self,
+        x: Floats,
+        y: Floats,
+        c: Floats,
+        s: Floats,
+        *,
+        lit: Sequence[int] = (),
+        marks: Floats = NO_MARKS,
+        out: Image | None = None,
+    ) -> Image:
+        """Return the picture of a frame, (H, W, 3) uint8; equal frames give equal bytes.
+
+        Parameters
+        ----------
+        x, y, c, s : (N,)
+            Poses of the cars, the ego first: metres, and cosines and sines of their headings, world frame.
+        lit : sequence of int
+            Intersections of the goals that the ego has visited in this round.
+        marks : (M, 4)
+            Contacts and breaches so far, each x and y, metres, its kind (`raster_kernel.CONTACT`, `OWN`, `OTHERS`) and
+            its age, seconds.
+        out : (H, W, 3) uint8
+            Where the picture is written, if it need not be a new array.
+        """
+        ground = self.ground(lit)
+        if out is None:
+            out = ground.copy()
+        else:
+            out[...] = ground
+        self._paint(out, x, y, c, s, marks, self._view)
+        return out
+
+    def ground(self, lit: Sequence[int] = ()) -> Image:
+        """Return the picture without cars, in which these goals are lit; it must not be written to."""
+        key = tuple(vertex for vertex in self._numbers if vertex in lit)
+        kept = self._grounds.get(key)
+        if kept is None:
+            if len(self._grounds) >= MOST_GROUNDS:
+                self._grounds.clear()
+            kept = self._grounds[key] = self._with_goals(key)
+        return kept
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a point of the world, metres, lies in the picture: pixels from the left, and from above."""
+        view = self._view
+        return (x - view.left) * view.scale, (view.top - y) * view.scale
+
+    def _cover(self) -> Cover:
+        return Cover(self.width, self.height)
+
+    def _roads(self) -> Image:
+        """Return roads with kerbs, centre lines, directions of lanes and stop lines."""
+        problem, scale = self._problem, self._view.scale
+        network, car = problem.network, problem.car
+        picture = np.broadcast_to(rgb(palette.GROUND_COLOUR), (self.height, self.width, 3)).copy()
+        half = 0.5 * car.road_width * scale
+        for colour, wide in (
+            (palette.KERB_COLOUR, half + max(0.03 * scale, 0.8)),
+            (palette.ROAD_COLOUR, half),
+        ):
+            roads = self._cover()
+            for first, last in network.points[network.ends]:
+                roads.line(self.at(*first), self.at(*last), wide)
+            blend(picture, roads, colour)
+        lines, hints = self._cover(), self._cover()
+        thin = 0.5 * max(0.045 * scale, 0.8)
+        for first, last in centre_lines(network, 0.5 * car.road_width):
+            lines.dashes(self.at(*first), self.at(*last), thin, 0.2 * scale, 0.16 * scale)
+        for first, last in stop_lines(problem):
+            lines.dashes(self.at(*first), self.at(*last), 1.4 * thin, car.road_width * scale, 1.0)
+        for hint in lane_hints(network, car.w):
+            hints.path([self.at(*point) for point in hint], 0.5 * max(0.04 * scale, 0.7))
+        blend(picture, hints, palette.HINT_COLOUR, min(1.0, scale / 20.0))
+        blend(picture, lines, palette.LINE_COLOUR)
+        return (picture + 0.5).astype(np.uint8)
+
+    def _with_goals(self, lit: Sequence[int]) -> Image:
+        """Return the roads with goals, those of some intersections lit, and obstacles."""
+        picture = self._base.astype(np.float64)
+        points, stroke = self._problem.network.points, self._view.stroke
+        radius = self._problem.intersection_radius * self._view.scale
+        for vertex, numbers in self._numbers.items():
+            x, y = self.at(*points[vertex])
+            inner, ring = self._cover(), self._cover()
+            inner.disc(x, y, radius)
+            ring.ring(x, y, radius, *((1.5 * stroke, 0.0) if vertex in lit else (0.9 * stroke, 5.0)))
+            blend(picture, inner, palette.GOAL_COLOUR, 0.42 if vertex in lit else 0.16)
+            blend(picture, ring, palette.GOAL_COLOUR)
+            size = min(14.0, 0.5 * radius)
+            if size >= 6.0:
+                for colour, half in (("#FFFFFF", 0.09 * size + 1.3), (GOAL_INK, 0.09 * size)):
+                    words = self._cover()
+                    words.digits(numbers, x, y, size, half)
+                    blend(picture, words, colour)
+        self._obstacles(picture)
+        return (picture + 0.5).astype(np.uint8)
+
+    def _obstacles(self, picture: Floats) -> None:
+        scale = self._view.scale
+        for colour, wide in ((palette.INK_COLOUR, 0.6), (palette.OBSTACLE_COLOUR, -0.6)):
+            cover = self._cover()
+            for obstacle in self._problem.obstacles:
+                if isinstance(obstacle, DiscObstacle):
+                    cover.disc(*self.at(obstacle.x, obstacle.y), obstacle.radius * scale + wide)
+                else:
+                    cover.polygon([self.at(*point) for point in obstacle.vertices], wide)
+            blend(picture, cover, colour)
+
+
+def stop_lines(problem: Problem) -> list[tuple[Floats, Floats]]:
+    """Return the lines at which cars stop before crossings, from the middle of the road to its edge, metres."""
+    if not problem.rules:
+        return []
+    network = problem.network
+    least = RuleParameters.from_mapping(problem.rules).crossing_degree
+    found: list[tuple[Floats, Floats]] = []
+    for ends, tangent in zip(network.ends, network.tangents, strict=True):
+        for vertex, away in ((int(ends[0]), tangent), (int(ends[1]), -tangent)):
+            if network.degrees[vertex] >= least:
+                middle = network.points[vertex] + problem.intersection_radius * away
+                right = np.array([-away[1], away[0]])
+                found.append((middle, middle + 0.5 * problem.car.road_width * right))
+    return found
+
+
+def _view(problem: Problem, width: int, height: int, chosen: int) -> View:
+    """Return how all roads, goals and obstacles of a problem just fit into a picture."""
+    network, reach, body = problem.network, problem.intersection_radius, problem.car.body
+    goals = network.points[list(problem.goal_vertices)].reshape(-1, 2)
+    fixed = [goals - reach, goals + reach, *(obstacle_points(one) for one in problem.obstacles)]
+    box = extent(network, 0.5 * problem.car.road_width, *fixed)
+    scale = min(width / (box.width + 2.0 * MARGIN), height / (box.height + 2.0 * MARGIN))
+    side = float(min(width, height))
+    grow = max(1.0, min(5.0, 0.0125 * side) / (body.reach * scale))
+    size = grow * scale
+    disc = isinstance(body, Disc)
+    return View(
+        scale=scale,
+        left=0.5 * (box.left + box.right) - 0.5 * width / scale,
+        top=0.5 * (box.bottom + box.top) + 0.5 * height / scale,
+        half_length=0.0 if disc else 0.5 * body.length * size,
+        half_width=0.0 if disc else 0.5 * body.width * size,
+        rounding=body.reach * size if disc else 0.0,
+        edge=min(0.6, 0.08 * body.reach * size),
+        mark=max(0.42 * problem.car.w * scale, min(6.5, 0.016 * side)),
+        stroke=min(1.0, side / 300.0),
+        chosen=chosen,
+        colour=np.stack([rgb(colour) for colour in COLOURS]),
+    )

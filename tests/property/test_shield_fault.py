@@ -1,0 +1,84 @@
+"""What the shield's look at other bodies lets through brings about no contact in which the car is at fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dubins_traffic.cars.body import Body, Car, Disc, Rectangle
+from dubins_traffic.cars.state import Labels, Pose
+from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.policies.rules.tables import Traffic, scratch, vehicles_of
+from dubins_traffic.policies.safety import body_at
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.roads.table import pack
+from dubins_traffic.shield.checks import gather_close, may_touch
+from dubins_traffic.shield.tables import egos
+from dubins_traffic.simulators.embedded import Embedded
+
+PAIRS, WORST = 3000, 40
+
+
+def pairs(body: Body, seed: int) -> list[Any]:
+    """Return trials of two cars that stand side by side anyhow, at gaps of up to five centimetres."""
+    document = {
+        "version": 1, "problem_domain": "dubins_traffic", "network": {"grid": {"rows": 2, "columns": 2}},
+        "e-agents": [{"type": "lawful"}], "number_trials": 1, "duration": 5, "rules": True,
+    }  # fmt: skip
+    one = draw(load_config(document), 1, 0)
+    problem = replace(one.problem, car=Car(body=body))
+    vehicle: Any = vehicles_of([problem])[0]
+    chance = np.random.default_rng(seed)
+    found: list[Any] = []
+    while len(found) < PAIRS:
+        turn, bearing, apart = chance.uniform(0.0, 2.0 * np.pi, 3)
+        apart = 2.0 * body.reach * (0.45 + 0.65 * apart / (2.0 * np.pi))
+        own = Pose(0.0, 0.0, 1.0, 0.0)
+        other = Pose(apart * np.cos(bearing), apart * np.sin(bearing), np.cos(turn), np.sin(turn))
+        if 0.0 < separation(body_at(own, vehicle), body_at(other, vehicle))[0] < 0.05:
+            found.append(replace(one, problem=problem, starts=(own, other)))
+    return found
+
+
+@pytest.mark.parametrize("body", [Rectangle(0.4, 0.25), Rectangle(0.5, 0.2), Disc(0.177)])
+def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(body: Body) -> None:
+    chance = np.random.default_rng(3)
+    trials = pairs(body, 5)
+    problem = trials[0].problem
+    state = Embedded().reset(trials)
+    traffic = Traffic(
+        state, Labels.zeros(PAIRS, 2), pack([problem.network], [0.6]), pack_obstacles([()] * PAIRS),
+        egos([one.problem for one in trials], 2, np.zeros(PAIRS, dtype=np.int64)), scratch(2, 8),
+    )  # fmt: skip
+    vehicle: Any = vehicles_of([problem])[0]
+    bounds = problem.car.bounds
+    asked = (
+        chance.uniform(-1.0, 1.0, (PAIRS, 2)) * chance.choice([0.1, 1.0], (PAIRS, 2)) * (0.7, bounds.yaw_rate)
+    )
+    asked[chance.random(PAIRS) < 0.3, 1] = 0.0
+    let = []
+    for b, (speed, yaw_rate) in enumerate(asked.tolist()):
+        near = gather_close(b, state, -1.0, vehicle, traffic.scratch)
+        if near and not may_touch(b, speed, yaw_rate, near, traffic, vehicle):
+            let.append(b)
+    assert len(let) > 30
+    touched = 0
+    for _ in range(WORST):
+        simulator = Embedded()
+        simulator.reset([trials[b] for b in let])
+        worst = chance.choice([-1.0, 0.0, 1.0], (len(let), 2)) * (0.7, bounds.yaw_rate)
+        commands = np.stack([asked[let], worst], axis=1)
+        for b, contacts in zip(let, simulator.step(commands), strict=True):
+            for one in contacts:
+                touched += one.time > 0.0
+                k = (one.car, one.other).index(0)
+                assert one.time == 0.0 or not (one.moved[k] and one.closing[k] > 0.0), (
+                    asked[b],
+                    trials[b].starts,
+                )
+    assert touched > 10

@@ -1,0 +1,63 @@
+"""Whose breaches count: those that are not excused by what others have broken before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from dubins_traffic.envs.blame import Blame
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.rules.referee import Breach
+
+
+def breach(rule: str, car: int, tick: int) -> Breach:
+    return Breach(rule, car, tick, tick, 0.0, 0.0, -1, -1)
+
+
+def counted(
+    breaches: Sequence[Sequence[Breach]], excuses: bool = True, **rules: Any
+) -> tuple[list[tuple[str, int]], int | None]:
+    """Return what counts, part and car, of breaches that come in some calls, and who broke first."""
+    document = {
+        "version": 1, "problem_domain": "dubins_traffic", "network": {"grid": {"rows": 2, "columns": 2}},
+        "e-agents": [{"type": "lawful", "name": f"a{k}"} for k in range(3)], "number_trials": 1, "duration": 5,
+        "rules": rules or True,
+    }  # fmt: skip
+    blame = Blame(draw(load_config(document), 1, 0).problem, excuses=excuses)
+    found = [(part, one.car) for own in breaches for one, part in blame.of(own)]
+    return found, blame.first
+
+
+def test_the_ego_is_charged_while_the_others_keep_their_part() -> None:
+    assert counted([[breach("2.left", 0, 5)], [breach("3.stop", 0, 9)]]) == (
+        [("2.left", 0), ("3.stop", 0)],
+        0,
+    )
+
+
+def test_what_the_ego_breaks_after_others_is_excused_and_in_the_same_frame_they_move_first() -> None:
+    assert counted([[breach("3.stop", 2, 5)], [breach("2.left", 0, 6)]]) == ([("E1", 2)], 2)
+    assert counted([[breach("1.collision", 0, 5), breach("E2", 1, 5)]]) == ([("E2", 1)], 1)
+
+
+def test_what_others_break_after_the_ego_is_excused_but_not_in_the_same_frame() -> None:
+    assert counted([[breach("1.road", 0, 5)], [breach("E4", 1, 6)]]) == ([("1.road", 0)], 0)
+
+
+def test_each_e_agent_answers_for_itself() -> None:
+    assert counted([[breach("E4", 1, 5)], [breach("E2", 3, 9)], [breach("E5", 1, 9)]])[0] == [
+        ("E4", 1), ("E2", 3), ("E5", 1),
+    ]  # fmt: skip
+
+
+def test_without_excuses_each_side_answers_for_all_that_it_breaks() -> None:
+    both = [[breach("1.road", 0, 5)], [breach("E4", 1, 6)], [breach("2.left", 0, 9)]]
+    assert counted(both, excuses=False) == ([("1.road", 0), ("E4", 1), ("2.left", 0)], 0)
+    assert counted(both[1:], excuses=False) == ([("E4", 1), ("2.left", 0)], 1)
+
+
+def test_what_is_not_assumed_and_what_is_allowed_cost_nothing() -> None:
+    assert counted([[breach("E5", 1, 5)], [breach("2.left", 0, 9)]], assume_e5=0) == ([("2.left", 0)], 0)
+    allowed = [[breach("3.stop", 1, 5)], [breach("3.stop", 2, 9)], [breach("2.left", 1, 50)]]
+    assert counted(allowed, exceptions=1) == ([("E1", 1)], 1)
