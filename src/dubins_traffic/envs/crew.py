@@ -29,7 +29,7 @@ from dubins_traffic.observations.outlook import new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.rules.breach_log import COLLISION, RULES
+from dubins_traffic.rules.breach_log import RULE, RULES
 from dubins_traffic.rules.referee import Breach, accused
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
 from dubins_traffic.shield.car_shields import CarShields
@@ -190,7 +190,7 @@ class Crew:
             fresh = contacts[met:]
             for breach, part in self.blame[b].of([*breaches[seen:], *accused(fresh)]):
                 self.broken[b, breach.car, PARTS.index(part)] += 1
-                if breach.car == EGO and breach.rule == RULES[COLLISION]:
+                if breach.car == EGO and breach.rule == RULES[RULE.COLLISION]:
                     self.broken[b, EGO, AT_FAULT] += _guilty(breach, fresh)
 
     def _observe(self, trials: Ints) -> None:

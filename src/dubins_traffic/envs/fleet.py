@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.engine.batch_kernel import RUNNING
+from dubins_traffic.engine.batch_kernel import STATUS
 from dubins_traffic.envs.bank import Bank, Board
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Ints
@@ -82,7 +82,7 @@ class Fleet:
             if self.settings.formulas:
                 bank.watch(row, self.settings.formulas)
             self.ended[env] = False
-            self.board.arrays["status"][env] = RUNNING
+            self.board.arrays["status"][env] = STATUS.RUNNING
         self.waiting = bool(self.ended.any())
         self._parts = None
         for bank, rows, places in self._grouped(some):
@@ -108,7 +108,7 @@ class Fleet:
         for bank, rows, places in self._parts:
             ended |= bank.step(rows, places, self.settings.frame_skip)
         if ended:
-            self.ended |= self.board.arrays["status"] != RUNNING
+            self.ended |= self.board.arrays["status"] != STATUS.RUNNING
             self.waiting = bool(self.ended.any())
             self._parts = None
 

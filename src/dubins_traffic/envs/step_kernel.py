@@ -7,7 +7,7 @@ counted when.
 from __future__ import annotations
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.engine.batch_kernel import COLLIDED, ENDED, FAULTY, RUNNING, World, run_trials
+from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
 from dubins_traffic.envs.tables import StepTables
 from dubins_traffic.envs.terms import AT_FAULT, BREACHES, COMFORT, PROGRESS, ROUNDS, TIME, VISITS
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
@@ -15,8 +15,8 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
 from dubins_traffic.observations.outlook import OutlookTables
 from dubins_traffic.observations.seeking import metres_to_goal, seek
-from dubins_traffic.rules.breach_log import COLLISION
-from dubins_traffic.rules.propositions import BREACH3, LEFT, OVERTAKING
+from dubins_traffic.rules.breach_log import RULE
+from dubins_traffic.rules.propositions import FLAG
 
 
 @jit
@@ -73,14 +73,14 @@ def step_trials(
         if own.left == 0:
             continue
         steps.one[0] = b
-        status = RUNNING
+        status = STATUS.RUNNING
         pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
-        while own.left > max(pause, 0) and status == RUNNING:
+        while own.left > max(pause, 0) and status == STATUS.RUNNING:
             status = _tick(b, envs[k], commands, world, outlook, steps)
         steps.status[envs[k]] = status
-        if status in (ENDED, COLLIDED, FAULTY):
+        if status in (STATUS.ENDED, STATUS.COLLIDED, STATUS.FAULTY):
             own.left = 0
-        special += 0 if status == RUNNING and own.left == 0 else 1
+        special += 0 if status == STATUS.RUNNING and own.left == 0 else 1
         _close(b, envs[k], outlook, steps)
     return special
 
@@ -171,7 +171,7 @@ def _charge(e: int, breaches: int, contacts: int, world: World, steps: StepTable
             steps.terms[e, BREACHES + log.row[k].rule] += 1.0
     for k in range(contacts, work.found[0]):
         if work.contact[k].car == EGO or work.contact[k].other == EGO:
-            steps.terms[e, BREACHES + COLLISION] += 1.0
+            steps.terms[e, BREACHES + RULE.COLLISION] += 1.0
             steps.terms[e, BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
 
 
@@ -192,4 +192,4 @@ def _guilty(k: int, world: World) -> bool:
 
 @jit_inline
 def _in_breach(bits: int) -> bool:
-    return bits & (LEFT | OVERTAKING) == LEFT or bits & BREACH3 != 0
+    return bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT or bits & FLAG.BREACH3 != 0

@@ -9,9 +9,9 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.rules.breach_log import CLEARANCE, RULES
+from dubins_traffic.rules.breach_log import RULE, RULES
 
-COSTS: Final = (*RULES[: CLEARANCE + 1], "at_fault")
+COSTS: Final = (*RULES[: RULE.CLEARANCE + 1], "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
 

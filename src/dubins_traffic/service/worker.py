@@ -201,7 +201,9 @@ class Worker:
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
         packed = gzip.compress(page.encode(), 6, mtime=0)
         try:
-            return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))["digest"]
+            return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))[
+                "digest"
+            ]
         except RefusalError as error:  # too large for the service: the result counts without it
             log.warning("a replay is refused", trial=judged.number, error=str(error))
             return None

@@ -21,7 +21,7 @@ from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.roads.table import pack_distinct
 from dubins_traffic.shield.nearest_command import shield
-from dubins_traffic.shield.tables import NOTHING, REASONS, Overtakes, check_overtakes, egos, guards
+from dubins_traffic.shield.tables import REASON, REASONS, Overtakes, check_overtakes, egos, guards
 
 if TYPE_CHECKING:
     from dubins_traffic.observations.viewpoints import Viewpoints
@@ -101,7 +101,7 @@ class CarShields:
         self._shield(self._tick, False, self._traffic, self._guards, self._commands)
         running = rows[self._tick[rows] >= 0]
         flat[running] = self._commands[running, EGO]
-        found: Any = np.full(len(flat), NOTHING, dtype=np.int64)
+        found: Any = np.full(len(flat), REASON.NOTHING, dtype=np.int64)
         found[running] = self._guards.ego["reason"][running]
         return found.reshape(commands.shape[:2])
 

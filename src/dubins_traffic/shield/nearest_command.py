@@ -205,7 +205,7 @@ def _nearest(
     if (
         vehicle.half_length > 0.0
         and _apart(refused, straight, vehicle) < least
-        and refusal(b, straight.speed, 0.0, near, traffic, guards) == NOTHING
+        and refusal(b, straight.speed, 0.0, near, traffic, guards) == REASON.NOTHING
     ):
         best = straight
         least = _apart(refused, straight, vehicle)
