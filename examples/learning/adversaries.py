@@ -16,7 +16,7 @@ import numpy as np
 from dubins_traffic.envs.about_ego import NAMES
 from dubins_traffic.envs.crew import PARTS, Cast, Crew
 from dubins_traffic.envs.settings import Settings
-from dubins_traffic.envs.terms import PROGRESS, VISITS, WEIGHTS
+from dubins_traffic.envs.terms import TERM, WEIGHTS
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
 
@@ -66,7 +66,7 @@ def drive(ego: str, policies: Sequence[Floats] | None, seed: int, trials: Sequen
             shares = np.tanh(np.einsum("bni,bij->bnj", seen, stacked[:, :-1]) + stacked[:, None, -1])
             asked[:] = np.clip(shares, [-0.2, -1.0], 1.0) * [bounds.speed, bounds.yaw_rate]
         crew.step(asked, SKIP)
-        task = crew.terms[:, 0, [VISITS, PROGRESS]] @ [WEIGHTS["visits"], WEIGHTS["progress"]]
+        task = crew.terms[:, 0, [TERM.VISITS, TERM.PROGRESS]] @ [WEIGHTS["visits"], WEIGHTS["progress"]]
         charged = crew.broken[:, 1:, len(PARTS) - len(ASSUMPTIONS) :].sum(axis=1)
         broken += crew.broken[:, 1:].sum(axis=1)
         paid -= task + charged @ PRICES / CARS

@@ -23,7 +23,7 @@ from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.live import png
 from dubins_traffic.viewer.raster import Raster, stop_lines
 from dubins_traffic.viewer.raster_ground import rgb
-from dubins_traffic.viewer.raster_kernel import CONTACT, OTHERS, OWN, Image
+from dubins_traffic.viewer.raster_kernel import MARKS, Image
 from tests.synthetic import instance, obstacles_beside
 
 GRID = RoadNetwork.grid(3, 4)
@@ -133,7 +133,7 @@ def test_marks_have_their_colours_and_rings_fade(trial: Instance) -> None:
     raster = Raster(trial.problem, width=800, height=800)
     nobody = columns(np.zeros((0, 4)))
     inks = (palette.CONTACT_COLOUR, palette.BREACH_COLOURS[0], "#FFFFFF")
-    for kind, ink in zip((CONTACT, OWN, OTHERS), inks, strict=True):
+    for kind, ink in zip((MARKS.CONTACT, MARKS.OWN, MARKS.OTHERS), inks, strict=True):
         young, old = (
             raster.frame(*nobody, marks=np.array([[2.2, 1.1, float(kind), age]])) for age in (0.3, 9.0)
         )

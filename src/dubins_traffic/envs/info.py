@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.envs.terms import BREACHES, COSTS, TERMS
+from dubins_traffic.envs.terms import COSTS, TERM, TERMS
 from dubins_traffic.kernels.arrays import Floats
 
 _TERMS = np.dtype([(name, np.float64) for name in TERMS])
@@ -17,7 +17,7 @@ def of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
     """Return the info of a step of one environment, whose terms, (T,), are given without and with weights."""
     return {
         "reward_terms": dict(zip(TERMS, weighted.tolist(), strict=True)),
-        "cost": dict(zip(COSTS, terms[BREACHES:].tolist(), strict=True)),
+        "cost": dict(zip(COSTS, terms[TERM.BREACHES :].tolist(), strict=True)),
     }
 
 
@@ -43,6 +43,6 @@ class StepInfo:
         """
         return {
             "reward_terms": weighted.copy().view(_TERMS)[:, 0],
-            "cost": terms[:, BREACHES:].copy().view(_COSTS)[:, 0],
+            "cost": terms[:, TERM.BREACHES :].copy().view(_COSTS)[:, 0],
             **self._masks,
         }

@@ -12,7 +12,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.rules.referee import accused
 from dubins_traffic.viewer.live import LiveView
 from dubins_traffic.viewer.raster import NO_MARKS, Raster
-from dubins_traffic.viewer.raster_kernel import CONTACT, OTHERS, OWN, Image
+from dubins_traffic.viewer.raster_kernel import MARKS, Image
 
 if TYPE_CHECKING:
     from dubins_traffic.engine.group import Group
@@ -116,9 +116,9 @@ def _marks(group: Group, b: int) -> Floats:
     if not contacts and not breaches:
         return NO_MARKS
     rate, now = group.instances[b].problem.rate, int(group.ticks[b])
-    found = [(one.x, one.y, CONTACT, (now - one.tick) / rate) for one in contacts]
+    found = [(one.x, one.y, MARKS.CONTACT, (now - one.tick) / rate) for one in contacts]
     found += [
-        (one.x, one.y, OWN if one.car == EGO else OTHERS, (now - one.tick) / rate)
+        (one.x, one.y, MARKS.OWN if one.car == EGO else MARKS.OTHERS, (now - one.tick) / rate)
         for one in (*breaches, *accused(contacts))
     ]
     return np.array(found, dtype=np.float64)

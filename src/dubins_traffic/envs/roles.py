@@ -10,7 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs import terms
 from dubins_traffic.envs.crew import PARTS, Crew
-from dubins_traffic.envs.terms import BREACHES, COSTS, PROGRESS, ROUNDS, TERMS, VISITS
+from dubins_traffic.envs.terms import COSTS, TERM, TERMS
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
@@ -29,7 +29,7 @@ ADVERSARY: Final[Mapping[str, float]] = {
 ego's that count; and its own breaches that count, by the part of the assumption.
 """
 PEER: Final[Mapping[str, float]] = {
-    **{name: terms.WEIGHTS[name] for name in TERMS[:BREACHES]},
+    **{name: terms.WEIGHTS[name] for name in TERMS[: TERM.BREACHES]},
     **dict.fromkeys(ASSUMPTIONS, -1.0),
     "E2": -5.0,
 }
@@ -71,13 +71,13 @@ class Pay:
         """Return the reward of a car of trial b in the last step, and what it says of it: its terms, and costs."""
         if car == EGO:
             broken: Floats = crew.broken[b, EGO, :_FIRST].astype(np.float64)
-            own = np.concatenate([crew.terms[b, EGO, :BREACHES], broken])
+            own = np.concatenate([crew.terms[b, EGO, : TERM.BREACHES], broken])
             weighted: list[float] = (own * self._ego).tolist()
             costs = dict(zip(COSTS, broken.tolist(), strict=True))
             return sum(weighted), {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": costs}
         parts = dict(zip(ASSUMPTIONS, map(float, crew.broken[b, car, _FIRST:]), strict=True))
         done: dict[str, float] = dict(
-            zip(TERMS[:BREACHES], crew.terms[b, car, :BREACHES].tolist(), strict=True)
+            zip(TERMS[: TERM.BREACHES], crew.terms[b, car, : TERM.BREACHES].tolist(), strict=True)
         )
         if self._spoils:
             done["spoiled"] = -self._task(crew, b)
@@ -87,7 +87,9 @@ class Pay:
 
     def _task(self, crew: Crew, b: int) -> float:
         """Return what the ego's visits, rounds and progress have counted for it."""
-        return float(sum(crew.terms[b, EGO, k] * self._ego[k] for k in (VISITS, ROUNDS, PROGRESS)))
+        return float(
+            sum(crew.terms[b, EGO, k] * self._ego[k] for k in (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS))
+        )
 
 
 def _checked(usual: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
 from dubins_traffic.envs.tables import StepTables
-from dubins_traffic.envs.terms import AT_FAULT, BREACHES, COMFORT, PROGRESS, ROUNDS, TIME, VISITS
+from dubins_traffic.envs.terms import AT_FAULT, TERM
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
@@ -143,16 +143,16 @@ def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> Non
         there = outlook.labels.at[b, EGO] == goal.vertex and goal.fresh != 0
         left = 0.0 if there else metres_to_goal(b, EGO, sought, outlook)
     if own.route < INFINITE and left < INFINITE:
-        steps.terms[e, PROGRESS] += own.route - left
+        steps.terms[e, TERM.PROGRESS] += own.route - left
     visited = seek(b, outlook)
-    steps.terms[e, VISITS] += visited
-    steps.terms[e, ROUNDS] += seen.rounds - rounds
+    steps.terms[e, TERM.VISITS] += visited
+    steps.terms[e, TERM.ROUNDS] += seen.rounds - rounds
     own.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
     speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
     faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
-    steps.terms[e, COMFORT] += faster * faster + turned * turned
+    steps.terms[e, TERM.COMFORT] += faster * faster + turned * turned
     own.speed, own.yaw_rate = speed, yaw_rate
-    steps.terms[e, TIME] += steps.scale[0].period
+    steps.terms[e, TERM.TIME] += steps.scale[0].period
 
 
 @jit_inline
@@ -168,11 +168,11 @@ def _charge(e: int, breaches: int, contacts: int, world: World, steps: StepTable
     log, work = world.breach_log, world.work
     for k in range(breaches, log.filled[0]):
         if log.row[k].car == EGO:
-            steps.terms[e, BREACHES + log.row[k].rule] += 1.0
+            steps.terms[e, TERM.BREACHES + log.row[k].rule] += 1.0
     for k in range(contacts, work.found[0]):
         if work.contact[k].car == EGO or work.contact[k].other == EGO:
-            steps.terms[e, BREACHES + RULE.COLLISION] += 1.0
-            steps.terms[e, BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
+            steps.terms[e, TERM.BREACHES + RULE.COLLISION] += 1.0
+            steps.terms[e, TERM.BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
 
 
 @jit

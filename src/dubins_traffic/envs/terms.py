@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -15,13 +15,20 @@ COSTS: Final = (*RULES[: RULE.CLEARANCE + 1], "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
 
-VISITS: Final = 0
-ROUNDS: Final = 1
-PROGRESS: Final = 2
-COMFORT: Final = 3
-TIME: Final = 4
-BREACHES: Final = 5
-"""The first of the terms that are costs."""
+
+class _Term(NamedTuple):
+    """Where each term of the reward stands."""
+
+    VISITS: int = 0
+    ROUNDS: int = 1
+    PROGRESS: int = 2
+    COMFORT: int = 3
+    TIME: int = 4
+    BREACHES: int = 5
+    """The first of the terms that are costs."""
+
+
+TERM: Final = _Term()
 TERMS: Final = ("visits", "rounds", "progress", "comfort", "time", *COSTS)
 """Terms of the reward, by number."""
 

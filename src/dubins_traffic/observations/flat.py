@@ -22,7 +22,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import EGO, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.observations.flat_kernel import CAR, CROSSING, GOAL, LANE, OWN, write_flat
+from dubins_traffic.observations.flat_kernel import SIZE, write_flat
 from dubins_traffic.observations.outlook import new_outlook
 from dubins_traffic.observations.seeking import seek
 from dubins_traffic.roads.table import pack
@@ -75,15 +75,20 @@ class Layout:
     def parts(self) -> dict[str, slice]:
         """Where each part stands, by its name; without those that are empty."""
         sizes = {
-            "own": OWN, "lane": LANE, "crossing": CROSSING, "goal": GOAL, "cars": CAR * self.cars, "laser": self.rays,
-        }  # fmt: skip
+            "own": SIZE.OWN,
+            "lane": SIZE.LANE,
+            "crossing": SIZE.CROSSING,
+            "goal": SIZE.GOAL,
+            "cars": SIZE.CAR * self.cars,
+            "laser": self.rays,
+        }
         ends = np.cumsum([0, *sizes.values()]).tolist()
         return {name: slice(ends[k], ends[k + 1]) for k, name in enumerate(sizes) if sizes[name]}
 
     @property
     def size(self) -> int:
         """How many numbers a vector has."""
-        return OWN + LANE + CROSSING + GOAL + CAR * self.cars + self.rays
+        return SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL + SIZE.CAR * self.cars + self.rays
 
     @property
     def names(self) -> tuple[str, ...]:

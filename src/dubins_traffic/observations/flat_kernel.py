@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +15,23 @@ from dubins_traffic.observations.seeking import lane_of, metres_to_goal, next_la
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.routing.lane_graph import frame
 
-FLAGS = 18
-"""Flags of a car's propositions, lowest bit first."""
-OWN, LANE, CROSSING, GOAL, CAR = 2 + FLAGS, 6, 6, 8, 9 + FLAGS
-"""Numbers in each part: of the ego itself, its lane, the next crossing, its goal, and each other car."""
+
+class _Size(NamedTuple):
+    """How many numbers there are in each part."""
+
+    FLAGS: int = 18
+    """Flags of a car's propositions, lowest bit first."""
+    OWN: int = 20
+    """The car itself, with its flags."""
+    LANE: int = 6
+    CROSSING: int = 6
+    """The next one."""
+    GOAL: int = 8
+    CAR: int = 27
+    """Each other car, with its flags."""
+
+
+SIZE: Final = _Size()
 
 
 @jit_inline
@@ -48,23 +61,23 @@ def write_flat(b: int, n: int, out: npt.NDArray[np.float32], tables: OutlookTabl
     _lane(b, n, lane, at, out, tables)
     _crossing(b, n, ahead, out, tables)
     _goal(b, n, own, out, tables)
-    place = OWN + LANE + CROSSING + GOAL
-    shown = (out.shape[0] - place - tables.rays.shape[0]) // CAR
+    place = SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL
+    shown = (out.shape[0] - place - tables.rays.shape[0]) // SIZE.CAR
     count = _nearest(b, n, shown, own.sight2, tables)
     for k in range(shown):
         if k < count:
             _car(b, n, tables.near[k], place, out, tables)
             _relation(b, tables.near[k], lane, ahead, place, out, tables)
         else:
-            for j in range(CAR):
+            for j in range(SIZE.CAR):
                 out[place + j] = 0.0
-        place += CAR
+        place += SIZE.CAR
     _laser(b, place, out, tables)
 
 
 @jit_inline
 def _flags(bits: Any, place: int, out: npt.NDArray[np.float32]) -> None:
-    for k in range(FLAGS):
+    for k in range(SIZE.FLAGS):
         out[place + k] = (bits >> k) & 1
 
 
@@ -76,12 +89,12 @@ def _lane(b: int, n: int, lane: int, at: int, out: npt.NDArray[np.float32], tabl
     ax, ay, tx, ty, length = frame(tables.roads, own.net, lane)
     rx, ry = state.x[b, n] - ax, state.y[b, n] - ay
     along = rx * tx + ry * ty
-    out[OWN] = 1.0 if at < 0 else 0.0
-    out[OWN + 1] = within((tx * ry - ty * rx) / own.half_width)
-    out[OWN + 2] = within(tx * state.c[b, n] + ty * state.s[b, n])
-    out[OWN + 3] = within(tx * state.s[b, n] - ty * state.c[b, n])
-    out[OWN + 4] = min(max(along / length, 0.0), 1.0)
-    out[OWN + 5] = near_far(length - along, own.radius)
+    out[SIZE.OWN] = 1.0 if at < 0 else 0.0
+    out[SIZE.OWN + 1] = within((tx * ry - ty * rx) / own.half_width)
+    out[SIZE.OWN + 2] = within(tx * state.c[b, n] + ty * state.s[b, n])
+    out[SIZE.OWN + 3] = within(tx * state.s[b, n] - ty * state.c[b, n])
+    out[SIZE.OWN + 4] = min(max(along / length, 0.0), 1.0)
+    out[SIZE.OWN + 5] = near_far(length - along, own.radius)
 
 
 @jit_inline
@@ -92,7 +105,7 @@ def _crossing(b: int, n: int, v: int, out: npt.NDArray[np.float32], tables: Outl
     row: int = roads.vert_off[own.net] + v
     dx, dy = roads.vertex[row].x - state.x[b, n], roads.vertex[row].y - state.y[b, n]
     c, s = state.c[b, n], state.s[b, n]
-    place = OWN + LANE
+    place = SIZE.OWN + SIZE.LANE
     out[place] = within((c * dx + s * dy) / own.sight)
     out[place + 1] = within((c * dy - s * dx) / own.sight)
     out[place + 2] = 0.25 * roads.degree[row]
@@ -109,8 +122,8 @@ def _crossing(b: int, n: int, v: int, out: npt.NDArray[np.float32], tables: Outl
 def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: OutlookTables) -> None:
     """Write where the goal is that the ego seeks, and which way leads there."""
     roads, state = tables.roads, tables.state
-    place = OWN + LANE + CROSSING
-    for k in range(GOAL):
+    place = SIZE.OWN + SIZE.LANE + SIZE.CROSSING
+    for k in range(SIZE.GOAL):
         out[place + k] = 0.0
     if own.target < 0:
         return

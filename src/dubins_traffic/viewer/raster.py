@@ -103,7 +103,7 @@ class Raster:
         lit : sequence of int
             Intersections of the goals that the ego has visited in this round.
         marks : (M, 4)
-            Contacts and breaches so far, each x and y, metres, its kind (`raster_kernel.CONTACT`, `OWN`, `OTHERS`) and
+            Contacts and breaches so far, each x and y, metres, its kind (`raster_kernel.MARKS`) and
             its age, seconds.
         out : (H, W, 3) uint8
             Where the picture is written, if it need not be a new array.

@@ -13,15 +13,36 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 
 Image = npt.NDArray[np.uint8]
 
-CONTACT, OWN, OTHERS = 0, 1, 2
-"""Kinds of marks: a contact, a breach of the ego's, and one of an e-agent's."""
+
+class _Marks(NamedTuple):
+    """Kinds of marks."""
+
+    CONTACT: int = 0
+    OWN: int = 1
+    """A breach of the ego's."""
+    OTHERS: int = 2
+    """A breach of an e-agent's."""
+
+
+class _Row(NamedTuple):
+    """Rows of colours."""
+
+    INK: int = 0
+    WHITE: int = 1
+    ACCENT: int = 2
+    CONTACT_INK: int = 3
+    """Those of breaches follow."""
+    FIRST_TINT: int = 6
+    """From here on, of the ego and the others in turn."""
+
+
+MARKS: Final = _Marks()
+ROW: Final = _Row()
 RING_SECONDS: Final = 1.2
 """For how long a mark is young: a ring grows about it."""
 HALF_ROOT: Final = 0.7071067811865476
 MARK: Final = 4
 """Numbers of a mark: its place x and y, world frame, metres, its kind, and its age in seconds."""
-INK, WHITE, ACCENT, CONTACT_INK, FIRST_TINT = 0, 1, 2, 3, 6
-"""Rows of colours: those of breaches follow that of contacts; from the last on, of the ego and the others in turn."""
 
 
 class View(NamedTuple):
@@ -113,10 +134,10 @@ def _car(image: Image, spot: Spot, c: float, s: float, which: int, view: View) -
             u = dx * c - dy * s
             v = dx * s + dy * c
             distance = _body(u, v, view)
-            _blend(image, row, column, view, INK, _cover(distance - view.edge))
+            _blend(image, row, column, view, ROW.INK, _cover(distance - view.edge))
             _blend(image, row, column, view, which, _cover(distance + view.edge))
             flank = (side * (u - tip) + (tip - base) * abs(v)) / slant
-            _blend(image, row, column, view, WHITE, _cover(max(flank, base - u)))
+            _blend(image, row, column, view, ROW.WHITE, _cover(max(flank, base - u)))
 
 
 @jit
@@ -144,8 +165,8 @@ def _cross(image: Image, spot: Spot, view: View) -> None:
             beyond = max(max(u, v) - 2.0 * HALF_ROOT * arm, 0.0)
             near = min(u, v)
             away = sqrt(beyond * beyond + near * near)
-            _blend(image, row, column, view, WHITE, _cover(away - 2.25 * view.stroke))
-            _blend(image, row, column, view, CONTACT_INK, _cover(away - 1.2 * view.stroke))
+            _blend(image, row, column, view, ROW.WHITE, _cover(away - 2.25 * view.stroke))
+            _blend(image, row, column, view, ROW.CONTACT_INK, _cover(away - 1.2 * view.stroke))
 
 
 @jit
@@ -160,10 +181,10 @@ def _triangle(image: Image, spot: Spot, kind: int, view: View) -> None:
             dy = row + 0.5 - spot.y
             flank = (1.6 * abs(dx) - 0.9 * (dy + size)) / slant
             away = max(flank, dy - 0.6 * size)
-            _blend(image, row, column, view, WHITE, 0.9 * _cover(away - 2.5 * view.stroke))
-            _blend(image, row, column, view, CONTACT_INK + kind, _cover(away - view.stroke))
-            if kind != OWN:
-                _blend(image, row, column, view, WHITE, _cover(away + view.stroke))
+            _blend(image, row, column, view, ROW.WHITE, 0.9 * _cover(away - 2.5 * view.stroke))
+            _blend(image, row, column, view, ROW.CONTACT_INK + kind, _cover(away - view.stroke))
+            if kind != MARKS.OWN:
+                _blend(image, row, column, view, ROW.WHITE, _cover(away + view.stroke))
 
 
 @jit
@@ -171,14 +192,14 @@ def _mark(image: Image, number: int, marks: Floats, view: View) -> None:
     """Paint a mark, and the ring about it while it is young."""
     spot = Spot((marks[number, 0] - view.left) * view.scale, (view.top - marks[number, 1]) * view.scale)
     kind = int(marks[number, 2])
-    if kind == CONTACT:
+    if kind == MARKS.CONTACT:
         _cross(image, spot, view)
     else:
         _triangle(image, spot, kind, view)
     age = marks[number, 3] / RING_SECONDS
     if 0.0 <= age < 1.0:
         radius = (1.5 + 1.5 * age) * 1.6 * view.mark
-        _ring(image, spot, radius, 1.5 * view.stroke, CONTACT_INK + kind, view, 1.0 - age)
+        _ring(image, spot, radius, 1.5 * view.stroke, ROW.CONTACT_INK + kind, view, 1.0 - age)
 
 
 @jit
@@ -198,11 +219,11 @@ def paint(image: Image, x: Floats, y: Floats, c: Floats, s: Floats, marks: Float
     """
     for number in range(marks.shape[0]):
         _mark(image, number, marks, view)
-    others = view.colour.shape[0] - FIRST_TINT - 1
+    others = view.colour.shape[0] - ROW.FIRST_TINT - 1
     for k in range(x.shape[0]):
         car = x.shape[0] - 1 - k
         spot = Spot(float((x[car] - view.left) * view.scale), float((view.top - y[car]) * view.scale))
         if car == view.chosen:
-            _ring(image, spot, _reach(view) + 0.75 * view.mark, 0.8 * view.stroke, ACCENT, view, 1.0)
-        which = FIRST_TINT if car == 0 else FIRST_TINT + 1 + (car - 1) % others
+            _ring(image, spot, _reach(view) + 0.75 * view.mark, 0.8 * view.stroke, ROW.ACCENT, view, 1.0)
+        which = ROW.FIRST_TINT if car == 0 else ROW.FIRST_TINT + 1 + (car - 1) % others
         _car(image, spot, float(c[car]), float(s[car]), which, view)
