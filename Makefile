@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 
 BIN := .venv/bin
-WORKERS ?= 2
+WORKERS ?= 3
 SETUP := pyproject.toml constraints.txt scripts/setup.sh
 
 .PHONY: help setup demo test test-all golden check format bench clean

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[1]
 PROGRAM = "linux.uml"
 REASON = "needs user-mode-linux; scripts/system-packages.sh installs it"
 LIMIT_S = 3000.0
@@ -24,12 +25,13 @@ BEGIN = """#!/bin/bash
 mount -t proc proc /proc
 mount -t sysfs sys /sys
 mount -t cgroup2 cgroup2 /sys/fs/cgroup
-for place in /tmp /run /var/tmp; do mount -t tmpfs -o mode=1777 tmpfs $place; done
 mkdir -p /dev/shm
 mount -t tmpfs -o mode=1777 tmpfs /dev/shm
-ip link set lo up 2>/dev/null
-cd /tmp
+mount -t tmpfs -o mode=1777 tmpfs /run
 """
+EMPTIED = ("/tmp", "/var/tmp")
+"""Folders of which it sees nothing, but for the project and its interpreter, where these lie there."""
+READY = "ip link set lo up 2>/dev/null\ncd /tmp\n"
 SITUATIONS = {
     "root": "",
     "beside": """
@@ -77,7 +79,8 @@ def run(command: Sequence[str], situation: str, *, user: int = 0) -> tuple[int, 
     sets = "".join(f"export {name}={shlex.quote(value)}\n" for name, value in kept.items())
     with tempfile.NamedTemporaryFile("w", prefix="user-mode-", suffix=".sh", dir="/var/tmp") as script:
         script.write(
-            f"{BEGIN}{sets}{SITUATIONS[situation]}{opened}\n{words}\necho {DONE} $?\n/sbin/poweroff -f\nsleep 9\n"
+            f"{BEGIN}{_emptied()}{READY}{sets}{SITUATIONS[situation]}{opened}\n{words}\n"
+            f"echo {DONE} $?\n/sbin/poweroff -f\nsleep 9\n"
         )
         script.flush()
         Path(script.name).chmod(0o755)
@@ -95,6 +98,18 @@ def run(command: Sequence[str], situation: str, *, user: int = 0) -> tuple[int, 
     said, found, rest = done.stdout.decode(errors="replace").rpartition(DONE)
     assert found, rest
     return int(rest.split()[0]), said
+
+
+def _emptied() -> str:
+    """Return the steps that empty the folders in EMPTIED, but for what is needed."""
+    needed = [
+        own for own in sorted({ROOT, Path(sys.prefix)}) if any(own.is_relative_to(place) for place in EMPTIED)
+    ]
+    needed = [own for own in needed if not any(other in own.parents for other in needed)]
+    steps = [f"mkdir /run/kept-{k} && mount --bind {own} /run/kept-{k}" for k, own in enumerate(needed)]
+    steps += [f"mount -t tmpfs -o mode=1777 tmpfs {place}" for place in EMPTIED]
+    steps += [f"mkdir -p {own} && mount --move /run/kept-{k} {own}" for k, own in enumerate(needed)]
+    return "\n".join([*steps, ""])
 
 
 def _opened(folder: Path) -> str:

@@ -27,6 +27,24 @@ COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 PATIENT = ("--lockstep", "--deadline", "600", "--begin", "600")
 """In lockstep what is not answered is sent again each second: a lost message ends no trial, a busy machine might."""
 PYTHON = [sys.executable, str(ROOT / "examples" / "lcm" / "controller.py")]
+UNHURRIED = [
+    sys.executable,
+    "-c",
+    f"""
+import runpy, time
+from dubins_traffic.transports.lcm.dubins_traffic_lcm import command_t
+
+at_once = command_t.encode
+
+def encode(self):
+    time.sleep(0.03)
+    return at_once(self)
+
+command_t.encode = encode
+runpy.run_path({PYTHON[-1]!r}, run_name="__main__")
+""",
+]
+"""The same, at such a pace that somebody who listens can keep up."""
 
 
 @pytest.fixture(autouse=True)
@@ -173,7 +191,7 @@ def logged(folder: Path) -> tuple[Path, list[Path]]:
     log, config = folder / "trial.log", folder / "short.json"
     config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [2, 2]}))
     url = os.environ["LCM_DEFAULT_URL"]
-    with running(logger, "-l", url, "--quiet", str(log)) as logging, running(*PYTHON):
+    with running(logger, "-l", url, "--quiet", str(log)) as logging, running(*UNHURRIED):
         until_logged("BEFORE", log)
         for trials in ("1", "2"):
             options = (*PATIENT, "--trials", trials, "--records", str(folder / trials))

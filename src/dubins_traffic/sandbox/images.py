@@ -96,11 +96,15 @@ def unpacked(archive: Path, store: Path | None = None) -> Image:
     return Image(str(place / "root"), command, environment, document["folder"])
 
 
-@cache
 def why_not() -> str:
     """Return why images can't be unpacked on this machine, "" if they can."""
-    if shutil.which("podman") is None:
-        return "podman is not installed"
+    program = shutil.which("podman")
+    return "podman is not installed" if program is None else _why_not(program)
+
+
+@cache
+def _why_not(_program: str) -> str:
+    """Return why a podman that is installed is of no use."""
     with tempfile.TemporaryDirectory(prefix="dubins-traffic-") as folder:
         try:
             _Podman(Path(folder), folder)("info")

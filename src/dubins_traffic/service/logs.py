@@ -12,7 +12,7 @@ import structlog
 
 
 class Tolerant(io.TextIOBase):
-    """A stream on which a line that can't be written, as on a full disk, is lost: no request fails for its log.
+    """A stream on which a line that can't be written is lost, as on a full disk: nothing fails for its log.
 
     Parameters
     ----------
@@ -25,13 +25,13 @@ class Tolerant(io.TextIOBase):
 
     def write(self, text: str) -> int:
         """Write what can be written."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ValueError):  # the second: it is closed
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
         """Let it go on, if it can."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ValueError):  # the second: it is closed
             self._stream.flush()
 
 
