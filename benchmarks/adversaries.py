@@ -65,8 +65,7 @@ def measure(episodes: int = EPISODES, jobs: int = 2) -> list[Row]:
 
 def _driven(pool: ProcessPoolExecutor, ego: str, weights: Floats | None, episodes: int) -> dict[str, Floats]:
     """Return what came of the first episodes, in their order."""
-    starts = range(FIRST, FIRST + episodes, CHUNK)
-    chunks = [range(start, min(start + CHUNK, FIRST + episodes)) for start in starts]
+    chunks = [range(first, min(first + CHUNK, episodes)) for first in range(0, episodes, CHUNK)]
     parts = list(_told(pool.map(partial(_drive, ego, weights), chunks), ego, len(chunks)))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -77,9 +76,11 @@ def _told(parts: Iterable[dict[str, Floats]], ego: str, count: int) -> Iterable[
         yield part
 
 
-def _drive(ego: str, weights: Floats | None, trials: Sequence[int]) -> dict[str, Floats]:
-    policies = None if weights is None else [weights] * len(trials)
-    return _example().drive(ego, policies, SEED, list(trials))
+def _drive(ego: str, weights: Floats | None, episodes: Sequence[int]) -> dict[str, Floats]:
+    """Drive a chunk: a seed has as many trials as chunks go into."""
+    policies = None if weights is None else [weights] * len(episodes)
+    seed, first = SEED + episodes[0] // FIRST, FIRST + episodes[0] % FIRST
+    return _example().drive(ego, policies, seed, range(first, first + len(episodes)))
 
 
 def _example() -> Any:
