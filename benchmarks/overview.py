@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from benchmarks import campaign, generation, monitors, peers, queries
+from benchmarks import campaign, envs, generation, monitors, peers, queries
 from benchmarks.table import Row, show
 from dubins_traffic.files import write_text
 
@@ -25,6 +25,7 @@ def measure() -> list[Row]:
     """Return the rows of this benchmark."""
     return [
         *peers.measure(),
+        *envs.measure(),
         *monitors.measure(),
         *queries.measure(),
         *generation.measure(),
