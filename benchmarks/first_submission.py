@@ -77,7 +77,7 @@ def followed(course: Course, folder: Path) -> None:
     """Follow the page from nothing to the table."""
     ours = ("PYTHONPATH", "NUMBA_CACHE_DIR", "VIRTUAL_ENV")
     around = {key: value for key, value in os.environ.items() if key not in ours}
-    with course.step("pip install '.[service]'"):
+    with course.step("pip install of the package with its extra service"):
         install(folder, around)
     around |= {"XDG_CONFIG_HOME": str(folder / "config"), "XDG_CACHE_HOME": str(folder / "cache")}
     with browsing(folder / "profile") as browser:
@@ -100,9 +100,14 @@ def measure() -> list[Row]:
         subprocess.run([sys.executable, "-m", "venv", str(folder / "env")], check=True)
         before = used()
         followed(course, folder)
-        figure = (
-            f"{course.total:.0f} s; {used() - before:.0f} s of processor time, load {os.getloadavg()[0]:.1f}"
-        )
-    name = "from pip install to the first place in the table"
-    bar = f"at most {MOST_S:.0f} s on a quiet machine"
-    return [*course.rows, Row(name, figure, bar, course.total <= MOST_S)]
+        work = used() - before
+    name, bar = (
+        "from pip install to the first place in the table",
+        f"at most {MOST_S:.0f} s on a quiet machine",
+    )
+    clock = f"{course.total:.0f} s; load {os.getloadavg()[0]:.1f}"
+    return [
+        *course.rows,
+        Row("processor time of all of it", f"{work:.0f} s", f"at most {MOST_S:.0f} s", work <= MOST_S),
+        Row(name, clock, bar, course.total <= MOST_S),
+    ]
