@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,8 +9,8 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.step_kernel import count_tick
 from dubins_traffic.envs.tables import StepTables
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.observations.flat_kernel import near_far, sweep, within, write_flat
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.observations.flat_kernel import near_far, sweep, within, write_bearing, write_flat
 from dubins_traffic.observations.outlook import OutlookTables
 
 NAMES = (
@@ -52,7 +50,7 @@ def _tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, 
     x, y, c, s = state.x[row, EGO], state.y[row, EGO], state.c[row, EGO], state.s[row, EGO]
     ec, es = state.c[row, place], state.s[row, place]
     out[0] = 1.0 if row == first else 0.0
-    _bearing(state.x[row, place] - x, state.y[row, place] - y, c, s, own.sight, out[1:4])
+    write_bearing(state.x[row, place] - x, state.y[row, place] - y, c, s, own.sight, out[1:4])
     out[4] = within(c * ec + s * es)
     out[5] = within(c * es - s * ec)
     out[6] = within(state.speed[row, place] / own.speed)
@@ -61,14 +59,5 @@ def _tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, 
     if ego.target >= 0:
         vertex: int = outlook.roads.vert_off[ego.net] + outlook.goal[ego.target].vertex
         goal = outlook.roads.vertex[vertex]
-        _bearing(goal.x - x, goal.y - y, c, s, own.sight, out[8:11])
+        write_bearing(goal.x - x, goal.y - y, c, s, own.sight, out[8:11])
         out[11] = near_far(steps.stride[first].route, own.sight)
-
-
-@jit_inline
-def _bearing(dx: float, dy: float, c: float, s: float, sight: float, out: Flats) -> None:
-    """Write the direction of a point in a car's frame, as cosine and sine, and how far it is."""
-    away = sqrt(dx * dx + dy * dy)
-    out[0] = within((c * dx + s * dy) / away) if away > 0.0 else 0.0
-    out[1] = within((c * dy - s * dx) / away) if away > 0.0 else 0.0
-    out[2] = near_far(away, sight)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +108,8 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self.observation_spaces = {
             name: spaces.Box(-1.0, 1.0, (size,), np.float32) for name in self.possible_agents
         }
-        self.action_spaces = {name: _space(self.settings) for name in self.possible_agents}
+        actions = self.settings.actions.space  # of which each agent has its own, seeded by itself
+        self.action_spaces = {name: deepcopy(actions) for name in self.possible_agents}
         self._crew: Crew | None = None
         self._seed: int | None = None
         self._episode = 0
@@ -246,14 +248,6 @@ def parallel_env(config: Any, **given: Any) -> TrafficParallelEnv:
 def agent_name(car: int) -> str:
     """Return the name of the agent that drives a car, by the car's number."""
     return f"car_{car}" if car > EGO else f"ego_{EGO}"
-
-
-def _space(settings: Settings) -> spaces.Space[Any]:
-    """Return a space of actions of its own, since each agent's is seeded by itself."""
-    own = settings.actions.space
-    if isinstance(own, spaces.Discrete):
-        return spaces.Discrete(int(own.n))
-    return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
 def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool) -> list[int]:

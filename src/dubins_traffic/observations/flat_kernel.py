@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -44,6 +45,21 @@ def within(value: float) -> float:
 def near_far(metres: float, scale: float) -> float:
     """Return 0 where `metres` (m) is 0, 1/2 where it is `scale` (m), and 1 where it is infinite."""
     return 1.0 - scale / (max(metres, 0.0) + scale)
+
+
+@jit_inline
+def write_bearing(
+    dx: float, dy: float, c: float, s: float, sight: float, out: npt.NDArray[np.float32]
+) -> None:
+    """Write the direction of a point in a car's frame, as cosine and sine, and how far it is, into `out` (3,).
+
+    The point is `dx` (m) and `dy` (m) away; `c` and `s` are the car's heading (unit vector), `sight` (m) is how far it
+    sees.
+    """
+    away = sqrt(dx * dx + dy * dy)
+    out[0] = within((c * dx + s * dy) / away) if away > 0.0 else 0.0
+    out[1] = within((c * dy - s * dx) / away) if away > 0.0 else 0.0
+    out[2] = near_far(away, sight)
 
 
 @jit
@@ -131,12 +147,8 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
     row: int = roads.vert_off[own.net] + goal.vertex
     dx, dy = roads.vertex[row].x - state.x[b, n], roads.vertex[row].y - state.y[b, n]
     c, s = state.c[b, n], state.s[b, n]
-    away = np.sqrt(dx * dx + dy * dy)
     out[place] = 1.0
-    if away > 0.0:
-        out[place + 1] = within((c * dx + s * dy) / away)
-        out[place + 2] = within((c * dy - s * dx) / away)
-    out[place + 3] = near_far(away, own.sight)
+    write_bearing(dx, dy, c, s, own.sight, out[place + 1 : place + 4])
     out[place + 4] = near_far(metres_to_goal(b, n, own.target, tables), own.sight)
     turn = next_lane(b, n, own.target, tables)
     if turn >= 0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell
+from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell, lane_direction, lane_length
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import Kept, TrialRules
 
@@ -124,8 +124,7 @@ def keep_arm(
     mine = 0
     for i in range(roads):
         arm: int = t.arms[row, i]
-        length: float = t.segment[int(t.seg_off[net]) + (arm >> 1)].length
-        shortest = min(shortest, length)
+        shortest = min(shortest, lane_length(t, net, arm))
         if arm >> 1 == segment:
             mine = i
     room = shortest - CERTAIN
@@ -133,9 +132,9 @@ def keep_arm(
         _trust(block, k, 1.0)
         return
     block.ring_high[k] = min(block.ring_high[k], room * room)
-    ux, uy = _bearing(t.arms[row, mine], t, net)
-    vx, vy = _bearing(t.arms[row, mine - 1 if mine > 0 else roads - 1], t, net)
-    wx, wy = _bearing(t.arms[row, mine + 1 if mine < roads - 1 else 0], t, net)
+    ux, uy = lane_direction(t, net, t.arms[row, mine])
+    vx, vy = lane_direction(t, net, t.arms[row, mine - 1 if mine > 0 else roads - 1])
+    wx, wy = lane_direction(t, net, t.arms[row, mine + 1 if mine < roads - 1 else 0])
     block.arm_x[k], block.arm_y[k] = ux, uy
     block.right_x[k], block.right_y[k] = ux - vx, uy - vy
     block.left_x[k], block.left_y[k] = ux - wx, uy - wy
@@ -148,11 +147,3 @@ def _trust(block: Kept, k: int, least: float) -> None:
     block.arm_x[k] = block.arm_y[k] = block.right_x[k] = block.right_y[k] = 0.0
     block.left_x[k] = block.left_y[k] = 0.0
     block.arm_least[k] = least
-
-
-@jit_inline
-def _bearing(arm: int, t: RoadTable, net: int) -> tuple[float, float]:
-    """Return the unit vector along a lane out of an intersection."""
-    own = t.segment[int(t.seg_off[net]) + (arm >> 1)]
-    sign = -1.0 if arm & 1 != 0 else 1.0
-    return sign * own.tx, sign * own.ty
