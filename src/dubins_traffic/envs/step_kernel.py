@@ -16,7 +16,10 @@ from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
 from dubins_traffic.observations.outlook import OutlookTables
 from dubins_traffic.observations.seeking import metres_to_goal, seek
 from dubins_traffic.rules.breach_log import RULE
-from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.fault import blamed, in_breach
+
+_blamed = jit_inline(blamed)
+_in_breach = jit_inline(in_breach)
 
 
 @jit
@@ -183,13 +186,5 @@ def _guilty(k: int, world: World) -> bool:
         return contact.moved != 0
     first = contact.moved != 0 and contact.closing > 0.0
     second = contact.other_moved != 0 and contact.other_closing > 0.0
-    first_breaks = first and _in_breach(note.bits)
-    second_breaks = second and _in_breach(note.other_bits)
-    if first_breaks or second_breaks:
-        return first_breaks if contact.car == EGO else second_breaks
-    return first if contact.car == EGO else second
-
-
-@jit_inline
-def _in_breach(bits: int) -> bool:
-    return bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT or bits & FLAG.BREACH3 != 0
+    guilty, other_guilty = _blamed(first, second, _in_breach(note.bits), _in_breach(note.other_bits))
+    return guilty if contact.car == EGO else other_guilty

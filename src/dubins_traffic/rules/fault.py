@@ -14,6 +14,14 @@ def in_breach(bits: int) -> bool:
     return bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT or bits & FLAG.BREACH3 != 0
 
 
+def blamed(first: bool, second: bool, first_breaks: bool, second_breaks: bool) -> tuple[bool, bool]:
+    """Return which of two cars is at fault, given which of them closed and which are in breach."""
+    first_guilty, second_guilty = first and first_breaks, second and second_breaks
+    if first_guilty or second_guilty:
+        return first_guilty, second_guilty
+    return first, second
+
+
 def with_fault(contact: Contact, bits: Bits) -> Contact:
     """Return `contact` with `at_fault` filled in.
 
@@ -37,7 +45,7 @@ def with_fault_by(contact: Contact, own: int, other: int) -> Contact:
     """Do as `with_fault`, given the flags of `contact.car` and of the other car."""
     if contact.other < 0:
         return replace(contact, at_fault=(contact.moved[0], False))
-    closed = [moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True)]
-    guilty = [closes and in_breach(flags) for closes, flags in zip(closed, (own, other), strict=True)]
-    first, second = guilty if any(guilty) else closed
-    return replace(contact, at_fault=(first, second))
+    first, second = (
+        moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True)
+    )
+    return replace(contact, at_fault=blamed(first, second, in_breach(own), in_breach(other)))
