@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import subprocess
 import tempfile
 import time
@@ -13,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+from tests.ports import kept_port
 
 BINARIES = Path("/usr/lib/postgresql/15/bin")
 REASON = "needs postgresql-15; scripts/system-packages.sh installs it"
@@ -97,14 +98,12 @@ def cluster(disk: Path | None = None) -> Iterator[Cluster]:
         if os.environ.get("CI") == "true":
             pytest.fail(REASON)
         pytest.skip(REASON)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
     with tempfile.TemporaryDirectory(prefix="postgres-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         if os.geteuid() == 0:
             shutil.chown(folder, USER, "nogroup")
             shutil.chown(disk or folder, USER, "nogroup")
-        made = Cluster(folder, port, disk or folder)
+        made = Cluster(folder, kept_port(), disk or folder)
         made.make()
         made.start()
         try:

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -22,6 +21,7 @@ import pytest
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
 from dubins_traffic.transports.ros1.master import answers
 from dubins_traffic.transports.ros1.messages import write_python
+from tests.ports import kept_port
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -40,19 +40,12 @@ def need_ros() -> None:
         pytest.skip(reason)
 
 
-def free_port() -> int:
-    """Return a port that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 class Graph:
     """What runs on one ROS master; `close` ends all of it."""
 
     def __init__(self, folder: Path, port: int | None = None) -> None:
         self.folder = folder
-        self.port = port or free_port()
+        self.port = port or kept_port()
         self.uri = f"http://127.0.0.1:{self.port}/"
         self.processes: list[subprocess.Popen[str]] = []
         self.environment = {

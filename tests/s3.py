@@ -15,6 +15,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.ports import kept_port
 from tests.services import wait_until
 
 REASON = "needs juicefs; the extra `dev` installs it"
@@ -27,8 +28,7 @@ class Store:
 
     def __init__(self, folder: Path, juicefs: str) -> None:
         self._folder, self._juicefs = folder, juicefs
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port: int = free.getsockname()[1]
+        self.port: int = kept_port()
         self._meta = f"sqlite3://{folder / 'meta.db'}"
         data = f"{folder / 'data'}/"
         made = [

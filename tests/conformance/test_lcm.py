@@ -3,6 +3,7 @@ import socket
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.inbox import Inbox
 from dubins_traffic.transports.lcm import connection
+from dubins_traffic.transports.lcm.connection import url_of_its_own
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     command_t,
     end_t,
@@ -41,13 +43,13 @@ from tests.conformance.transport import UntypedConformance, frames, slalom
 from tests.recordings import make_instance
 
 ROOT = Path(__file__).resolve().parents[2]
+KEPT = ExitStack()
+"""Ports of URLs that were given out."""
 
 
 def free_url() -> str:
-    """Return a URL of multicast within this machine that nobody else uses."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return f"udpm://239.255.76.67:{probe.getsockname()[1]}?ttl=0"
+    """Return a URL of multicast within this machine that nobody else uses while the tests run."""
+    return KEPT.enter_context(url_of_its_own())
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -191,6 +193,21 @@ def test_a_second_session_at_one_url_is_refused() -> None:
     finally:
         first.close()
         pool.shutdown()
+
+
+def test_the_port_of_a_url_of_its_own_is_kept() -> None:
+    with url_of_its_own() as url:
+        port = int(url.split(":")[2].split("?")[0])
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+            pytest.raises(OSError, match="in use"),
+        ):
+            stranger.bind(("", port))
+        here, there, heard = LCM(url), LCM(url), list[bytes]()
+        there.subscribe("A", lambda _, data: heard.append(data))
+        here.publish("A", b"word")
+        while not heard:
+            there.handle_timeout(1000)
 
 
 @pytest.mark.parametrize("url", ["nonsense", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:port"])

@@ -16,7 +16,8 @@ import pytest
 import typer
 
 from dubins_traffic.cli.main import app
-from tests.ros import PATIENCE, ROOT, Graph, configuration, free_port, graph, need_ros, read_until
+from tests.ports import kept_port
+from tests.ros import PATIENCE, ROOT, Graph, configuration, graph, need_ros, read_until
 
 
 def commands(group: Any) -> Iterator[Any]:
@@ -109,7 +110,7 @@ def test_the_launch_file_works_as_typed(tmp_path: Path) -> None:
         f'#!/bin/sh\nPYTHONPATH={ROOT / "src"}:$PYTHONPATH exec {sys.executable} -m dubins_traffic.cli "$@"\n'
     )
     own.chmod(0o755)
-    around = Graph(tmp_path, free_port()).environment
+    around = Graph(tmp_path, kept_port()).environment
     around.pop("PYTHONPATH", None)
     around["PATH"] = f"{own.parent}:{around['PATH']}"
     process = subprocess.Popen(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import socket
 import ssl
 import subprocess
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.ports import kept_port
 from tests.services import STANDING, Person, competition_text, serving, wait_until
 
 NGINX, OPENSSL = shutil.which("nginx", path="/usr/sbin:/usr/bin"), shutil.which("openssl")
@@ -51,8 +51,7 @@ def test_people_and_clients_come_by_https(tmp_path: Path) -> None:
          "-addext", "subjectAltName=DNS:localhost", "-keyout", "cert.key", "-out", "cert.pem"],
         cwd=tmp_path, check=True, capture_output=True,
     )  # fmt: skip
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = kept_port()
     url = f"https://localhost:{port}"
     (tmp_path / "short.toml").write_text(competition_text())
     arguments = ("--workers", "0", "--competition", str(tmp_path / "short.toml"))

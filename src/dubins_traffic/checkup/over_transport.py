@@ -6,7 +6,6 @@ import os
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -174,17 +173,15 @@ def _dismiss(program: subprocess.Popen[bytes]) -> str:
 
 @contextmanager
 def _over_lcm(maestro: Maestro) -> Generator[Meeting]:
-    from dubins_traffic.transports.lcm.connection import DEFAULT_GROUP
+    from dubins_traffic.transports.lcm.connection import url_of_its_own
     from dubins_traffic.transports.lcm.transport import Lcm
 
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        url = f"udpm://{DEFAULT_GROUP}:{probe.getsockname()[1]}?ttl=0"
-    transport = Lcm(url, maestro)
-    try:
-        yield Meeting(transport, {"LCM_DEFAULT_URL": url})
-    finally:
-        transport.close()
+    with url_of_its_own() as url:
+        transport = Lcm(url, maestro)
+        try:
+            yield Meeting(transport, {"LCM_DEFAULT_URL": url})
+        finally:
+            transport.close()
 
 
 @contextmanager

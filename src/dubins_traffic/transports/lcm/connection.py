@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -40,6 +42,24 @@ def command(car: str) -> str:
 def usual_url() -> str:
     """Return the URL that is taken where none is given: that of the environment, as for every LCM program."""
     return os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
+
+
+@contextmanager
+def url_of_its_own() -> Generator[str]:
+    """Give a URL of multicast within this machine, and keep its port from every program that does not share ports.
+
+    LCM binds its port with ``SO_REUSEADDR``. The socket that keeps the port allows that, too, so LCM can bind the
+    port while nobody gets it by asking for any free port.
+
+    Yields
+    ------
+    str
+        A URL; its port is kept until the context ends.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as keeper:
+        keeper.bind(("", 0))
+        keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        yield f"udpm://{DEFAULT_GROUP}:{keeper.getsockname()[1]}?ttl=0"
 
 
 def connect(url: str) -> LCM:
