@@ -8,7 +8,7 @@ BIN := .venv/bin
 WORKERS ?= 3
 SETUP := pyproject.toml constraints.txt scripts/setup.sh
 
-.PHONY: help setup demo test test-all golden check format bench clean
+.PHONY: help setup demo test test-all golden docs check format bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
@@ -36,6 +36,9 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json
 	$(BIN)/python -m tests.golden.hashes
+
+docs: .venv/.installed-dev ## the site of the documentation, in build/site; warnings are errors
+	$(BIN)/python website/build.py
 
 check: .venv/.installed-dev ## format, lint, types and layers
 	$(BIN)/ruff format --check .

@@ -67,7 +67,7 @@ class Bounds:
     speed_min : float, optional
         Smallest speed, m/s. With ``speed_min > 0`` and `turning_radius` the car follows Dubins curves.
     turning_radius : float
-        Smallest turning radius, metres: |yaw rate| <= |speed| / turning_radius. 0 for none.
+        Smallest turning radius, metres: ``abs(yaw rate)`` <= ``abs(speed)`` / turning_radius. 0 for none.
     """
 
     speed: float = 0.7

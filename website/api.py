@@ -1,0 +1,75 @@
+"""The pages of the API: every public name, with what its docstring says."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import dubins_traffic
+
+GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "networks": ("Road networks", ("RoadNetwork", "generate_network")),
+    "problems": (
+        "Configurations, problems and instances",
+        (
+            "load_config", "Configuration", "draw", "load_instance", "instance_from_document", "instance_to_document",
+            "Instance", "Problem", "EAgent", "Car", "Bounds", "Disc", "Rectangle", "DiscObstacle", "PolygonObstacle",
+        ),
+    ),
+    "trials": ("Trials", ("run_trial", "Trial", "Result", "run_trials", "Job", "Plan", "plan", "End", "Ending")),
+    "driving": (
+        "Controllers, and what they see",
+        ("Controller", "Observation", "SensedCar", "Pose", "Twist", "Command", "Contact", "Shield"),
+    ),
+    "batches": ("Batches", ("run_batch", "Batch")),
+    "campaigns": ("Campaigns", ("run_campaign", "CampaignResults", "load_results")),
+    "records": (
+        "Records",
+        ("load", "load_record", "Record", "RecordWriter", "Frames", "verify", "Verification", "Difference"),
+    ),
+    "scores": (
+        "Scores and verdicts",
+        ("score", "Score", "ScoreSheet", "Scorer", "Verdict", "Judging", "Metric", "Column"),
+    ),
+    "pictures": ("Pictures and replays", ("plot", "write_plot", "write_replay")),
+    "seams": ("Seams", ("Simulator", "Sink")),
+    "errors": ("Errors", ("DubinsTrafficError", "InputError", "ControllerError", "RecordError")),
+}  # fmt: skip
+"""Page: its heading and names."""
+
+
+def write_api(folder: Path) -> None:
+    """Write a page for each group of names, and the page above them.
+
+    Raises
+    ------
+    SystemExit
+        If a public name stands on no page.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    named = {name for _, names in GROUPS.values() for name in names}
+    if missing := set(dubins_traffic.__all__) - named - {"__version__"}:
+        raise SystemExit(f"website/api.py: on no page stand {', '.join(sorted(missing))}")
+    for page, (heading, names) in GROUPS.items():
+        parts = [f"# {heading}", "", *(_entry(name) for name in names)]
+        (folder / f"{page}.md").write_text("\n".join(parts), encoding="utf-8")
+    (folder / "index.md").write_text(_index(), encoding="utf-8")
+
+
+def _entry(name: str) -> str:
+    value = getattr(dubins_traffic, name)
+    kind = "autofunction" if inspect.isroutine(value) else "autoclass"
+    if inspect.isclass(value) and issubclass(value, BaseException):
+        kind = "autoexception"
+    options = "" if kind == "autofunction" else "   :members:\n"
+    return f"## {name}\n\n```{{eval-rst}}\n.. currentmodule:: dubins_traffic\n\n.. {kind}:: {name}\n{options}```\n"
+
+
+def _index() -> str:
+    rows = [
+        f"| [{heading}]({page}.md) | {', '.join(f'`{name}`' for name in names)} |"
+        for page, (heading, names) in GROUPS.items()
+    ]
+    contents = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
+    head = "# API\n\nThe public names of `dubins_traffic`; each is loaded when it is first used."
+    return "\n".join([head, "", "| page | names |", "|---|---|", *rows, "", contents, ""])

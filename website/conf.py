@@ -1,0 +1,50 @@
+"""What Sphinx is told; `website/build.py` gathers the sources and calls it."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from dubins_traffic import __version__
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+project = "dubins-traffic"
+author = "The dubins-traffic developers"
+copyright = author
+version = release = __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
+source_suffix = {".md": "markdown"}
+root_doc = "index"
+nitpicky = True
+nitpick_ignore_regex = [
+    (
+        r"py:.*",
+        r"(numpy|np|npt|pathlib|collections|typing|matplotlib|pandas|os|IO|types|gymnasium|pettingzoo|datetime)(\..*)?",
+    ),
+    (
+        r"py:.*",
+        r"(Path|Any|Callable|Iterable|Iterator|Sequence|Mapping|Generator|Literal|Self|ArrayLike|NDArray)",
+    ),
+    (r"py:class", r"Body|Event|Floats|Link|MetricSpec|Propositions|Run|Subject"),
+    (r"py:.*", r"dubins_traffic\.(?!envs)[a-z_]+\..*"),
+]
+"""Standard and foreign libraries, whose inventories this page would have to fetch, and types that are not public."""
+suppress_warnings = ["myst.header"]
+
+myst_enable_extensions = ["attrs_inline", "attrs_block", "colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+
+autosummary_generate = False
+autodoc_member_order = "bysource"
+autodoc_class_signature = "mixed"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+numpydoc_class_members_toctree = False
+
+html_theme = "furo"
+html_title = f"dubins-traffic {release}"
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
