@@ -8,7 +8,7 @@ BIN := .venv/bin
 WORKERS ?= 3
 SETUP := pyproject.toml constraints.txt scripts/setup.sh
 
-.PHONY: help setup demo test test-all golden docs check format bench clean
+.PHONY: help setup demo test test-all golden docs release check format bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
@@ -39,6 +39,9 @@ golden: .venv/.installed-dev ## compare what trials, batches, campaigns and game
 
 docs: .venv/.installed-dev ## the site of the documentation, in build/site; warnings are errors
 	$(BIN)/python website/build.py
+
+release: .venv/.installed-dev ## wheel and source distribution in dist/, each tried in an environment of its own for every Python here
+	@scripts/release.sh
 
 check: .venv/.installed-dev ## format, lint, types and layers
 	$(BIN)/ruff format --check .

@@ -40,6 +40,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "verdicts",
         "competitions/file",
         "glossary",
+        "stability",
         "changelog",
     ),
     "Explanation": (

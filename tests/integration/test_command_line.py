@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from dubins_traffic.cli.tables import NOTE
 from dubins_traffic.controllers import registry
 from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.problem.trial_data import TrialData
+from dubins_traffic.release import sources_hash
 from dubins_traffic.roads.network import RoadNetwork
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
@@ -103,7 +105,10 @@ def test_help_without_a_command(run):
 def test_version(run):
     import dubins_traffic
 
-    assert run("--version") == f"dubins-traffic {dubins_traffic.__version__}\n"
+    version, commit, sources = run("--version").splitlines()
+    assert version == f"dubins-traffic {dubins_traffic.__version__}"
+    assert re.fullmatch(r"commit (unknown|[0-9a-f]{40})", commit)
+    assert sources == f"sources sha256 {sources_hash()}"
 
 
 def test_a_grid_is_printed_in_both_containers(run):

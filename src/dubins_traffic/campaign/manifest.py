@@ -7,7 +7,6 @@ import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +15,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, replace_file
 from dubins_traffic.problem.files import parse_json
+from dubins_traffic.release import sources_hash
 from dubins_traffic.scoring.metric import Column
 
 FORMAT = 0
@@ -58,7 +58,7 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },
-        "code": _hash_of_code(),
+        "code": sources_hash(),
     }
 
 
@@ -186,15 +186,6 @@ def _hash_of_file(place: str) -> str | None:
     """Return the hash of a controller's file, None if it is given by name."""
     path = Path(place.rpartition(":")[0])
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.suffix == ".py" and path.is_file() else None
-
-
-def _hash_of_code() -> str:
-    """Return one hash over the sources of this package."""
-    root = Path(str(resources.files("dubins_traffic")))
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
 
 
 def _writer(data: bytes) -> Callable[[Path], object]:

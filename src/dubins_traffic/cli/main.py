@@ -51,7 +51,9 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def _options(  # pyright: ignore[reportUnusedFunction]
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print version, commit and a hash of the sources, and leave.")
+    ] = False,
     debug: Annotated[  # noqa: ARG001
         bool, typer.Option("--debug", help="Show the traceback of an error. Stands before the command.")
     ] = False,
@@ -61,9 +63,12 @@ def _options(  # pyright: ignore[reportUnusedFunction]
     CONFIG may be a file or the name of a shipped configuration, such as [b]demo[/b]; `-` reads standard input.
     """
     if version:
-        from importlib.metadata import version as installed
+        from dubins_traffic.release import release
 
-        print(f"{faults.PROGRAM} {installed(faults.PROGRAM)}")
+        found = release()
+        print(f"{faults.PROGRAM} {found.version}")
+        print(f"commit {found.commit or 'unknown'}")
+        print(f"sources sha256 {found.sources}")
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())
