@@ -90,7 +90,7 @@ def test_the_rules_of_the_ego() -> None:
     """
     assert conj(*spec.guarantees) is parse(wanted)
     assert spec.assumptions == (parse("[]<> free_2_2"),)
-    assert set(spec.inputs) == {"overtaking_ego", "ahead_ego_1_1", "clear_ego_1_1", "free_2_2"}
+    assert set(spec.inputs) == {"overtaking_ego", "hemmed_ego", "ahead_ego_1_1", "clear_ego_1_1", "free_2_2"}
 
 
 def test_the_assumption() -> None:

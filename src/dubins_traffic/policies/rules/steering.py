@@ -9,7 +9,8 @@ import numpy as np
 from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.policies.rules.narrow import within_lane
+from dubins_traffic.policies.rules.narrow import EDGE, within_lane
+from dubins_traffic.policies.rules.passing import BACK, along, stop_line
 from dubins_traffic.policies.rules.standing import stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
@@ -25,26 +26,19 @@ ASTRAY = 0.18
 """Who is this far left of its way in a disc is astray, metres."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
+CREEPS, SLIDES = 0.05, 0.2
+"""Who has to return and may not drive on faster than the first goes straight to the right at the second, m/s."""
+SQUARE = 0.999
+"""Sine of the angle at which it does."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
 
 @jit_inline
 def move(
-    b: int,
-    n: int,
-    allowed: float,
-    left: float,
-    offset: float,
-    px: float,
-    py: float,
-    bend: float,
-    outside: bool,
-    way: ReferencePath,
-    near: int,
-    trusted: int,
-    traffic: Traffic,
-) -> tuple[float, float]:
+    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
+    way: ReferencePath, near: int, trusted: int, traffic: Traffic,
+) -> tuple[float, float]:  # fmt: skip
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -61,7 +55,12 @@ def move(
     if passes or vehicle.tightest > 0.0:
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+    if safe and outside and offset == 0.0 and near > 0:
+        speed, yaw_rate, safe = come_back(
+            b, n, allowed, speed, yaw_rate, left, px, py, steep, way, near, trusted, traffic
+        )
     if not safe and passes and offset == 0.0:
+        allowed = min(allowed, room_to_return(b, n, way, traffic) / vehicle.period)
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
@@ -77,6 +76,27 @@ def move(
         if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
     return speed, yaw_rate
+
+
+@jit_inline
+def come_back(
+    b: int, n: int, allowed: float, speed: float, yaw_rate: float, left: float, px: float, py: float, steep: float,
+    way: ReferencePath, near: int, trusted: int, traffic: Traffic,
+) -> tuple[float, float, bool]:  # fmt: skip
+    """Return the command of a car that is left and returns among others, given one, and whether it leads anywhere.
+
+    Behind one that keeps it from driving on it goes straight to the right; it does not turn toward who is beside it.
+    """
+    state, labels, vehicle = traffic.state, traffic.labels, traffic.drivers.vehicle[b]
+    if np.int64(labels.bits[b, n]) & FLAG.LEFT == 0 or vehicle.tightest > 0.0:
+        return speed, yaw_rate, True
+    if allowed < CREEPS and is_before_disc(b, n, way, traffic):
+        c, s, limit = state.c[b, n], state.s[b, n], vehicle.yaw_most
+        speed, yaw_rate = steer(c, s, left, px, py, 0.0, SLIDES, SQUARE, NIMBLE, limit, 0.0, vehicle.period)
+        return speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+    if traffic.drivers.car[b, n].aside != 0.0 and speed == 0.0:
+        return speed, yaw_rate, may_turn_to(b, n, left, px, py, steep, allowed, near, trusted, traffic)
+    return speed, yaw_rate, True
 
 
 @jit_inline
@@ -101,6 +121,33 @@ def keep_right(
         return 0.0, 0.0
     speed = min(speed, -vehicle.slowest)
     return -speed, -min(speed / vehicle.tightest, vehicle.yaw_most)
+
+
+@jit_inline
+def room_to_return(b: int, n: int, way: ReferencePath, traffic: Traffic) -> float:
+    """Return how far a car that can't return yet may drive on and still return before the disc, metres."""
+    own = along(way, traffic.state.x[b, n], traffic.state.y[b, n])
+    return max(stop_line(traffic.drivers.vehicle[b]) - BACK - own, 0.0)
+
+
+@jit_inline
+def is_before_disc(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether a car may go straight to the right from where it is, and meets no disc."""
+    vehicle = traffic.drivers.vehicle[b]
+    return along(way, traffic.state.x[b, n], traffic.state.y[b, n]) < -(vehicle.disc + vehicle.reach + EDGE)
+
+
+@jit
+def may_turn_to(
+    b: int, n: int, left: float, px: float, py: float, most: float, speed: float, near: int, trusted: int,
+    traffic: Traffic,
+) -> bool:  # fmt: skip
+    """Tell whether a car, `left` (m) of its line, that turns in place toward it can drive there then."""
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    sine = min(max(-left / HURRY, -most), most)
+    cosine = sqrt(1.0 - sine * sine)
+    pose = Pose(state.x[b, n], state.y[b, n], px * cosine - py * sine, py * cosine + px * sine)
+    return is_safe_from(pose, b, Command(speed, 0.0), near, trusted, traffic, vehicle)
 
 
 @jit_inline
@@ -179,9 +226,17 @@ def is_safe(
     b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
 ) -> bool:
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
-    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
+    state = traffic.state
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-    command = Command(speed, yaw_rate)
+    return is_safe_from(pose, b, Command(speed, yaw_rate), near, trusted, traffic, vehicle)
+
+
+@jit_inline
+def is_safe_from(
+    pose: Pose, b: int, command: Command, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
+) -> bool:
+    """Do as `is_safe`, of a car at a pose."""
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     travel = vehicle.fastest * vehicle.period
     if vehicle.half_length > 0.0:
         travel += vehicle.yaw_most * vehicle.reach * vehicle.period
