@@ -8,13 +8,10 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import LabelTables
 
-PASSES = FLAG.LEFT | FLAG.OVERTAKING
-"""Flags of a car that is left, and may be."""
-
 
 @jit
 def hem_in(b: int, tick: int, tables: LabelTables) -> None:
-    """Find who of trial b is hemmed in, in a frame in which somebody is left."""
+    """Find who of trial b is hemmed in, in a frame in which somebody is left; `tables` (trials, cars)."""
     labels, row = tables.labels, tables.memory.car[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
@@ -22,7 +19,7 @@ def hem_in(b: int, tick: int, tables: LabelTables) -> None:
             row[n].stirred = tick
     for n in range(cars):
         bits = np.int64(labels.bits[b, n])
-        if bits & PASSES == PASSES and _is_hemmed(b, n, tables):
+        if bits & FLAG.LEFT != 0 and bits & FLAG.OVERTAKING != 0 and _is_hemmed(b, n, tables):
             labels.bits[b, n] = bits | FLAG.HEMMED
 
 
