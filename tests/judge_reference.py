@@ -229,7 +229,12 @@ class Judge:
         alone = self.runs(lambda k: past[k][n]["left"] and not past[k][n]["overtaking"])
         since = {run.start: next(long.start for long in left if run.start in long) for run in alone}
         found = {("2.left", n, tick, begin) for tick, begin in since.items()}
-        return found | self.long("2.return", n, self.rules.left_time, lambda k: past[k][n]["left"])
+        return found | self.long(
+            "2.return",
+            n,
+            self.rules.left_time,
+            lambda k: past[k][n]["left"] and not past[k][n]["hemmed"],
+        )
 
     def entries(self, n: int) -> Found:
         found: Found = set()

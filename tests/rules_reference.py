@@ -31,6 +31,8 @@ class Car:
     renewals: int = 0
     first_clear: list[bool] = field(default_factory=list)
     left: bool = False
+    moved: set[int] = field(default_factory=set)
+    """Numbers of the cars that have not been still in some frame since it became left."""
     overtaking: bool = False
     breach3: bool = False
     facts: dict[str, Any] = field(default_factory=dict)
@@ -132,6 +134,8 @@ class Reference:
             self.stand(car)
         for car in self.cars:
             self.overtake(car)
+        for car in self.cars:
+            self.hem_in(car)
 
     def by_heading(self, segment: int, car: Car) -> tuple[int, int]:
         tx, ty = self.direction((segment, 0))
@@ -338,7 +342,19 @@ class Reference:
             car.overtaking = False
         reach = self.lateral_range(car.lane, car)[1]
         if reach > rules["left_set"]:
+            if not car.left:
+                car.moved = set()
             car.left = True
         elif reach < rules["left_release"]:
             car.left = False
         facts.update(left=car.left, overtaking=car.overtaking)
+
+    def hem_in(self, car: Car) -> None:
+        car.moved |= {other.number for other in self.cars if not other.facts["still"]}
+        far = 2.0 * self.problem.car.body.reach + self.rules["overtaking_behind"]
+        near = {
+            other.number
+            for other in self.cars
+            if other is not car and math.dist(car.pose[:2], other.pose[:2]) <= far
+        }
+        car.facts["hemmed"] = car.left and car.overtaking and bool(near & car.moved)

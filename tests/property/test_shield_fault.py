@@ -1,4 +1,4 @@
-"""What the shield's look at other bodies lets through brings about no contact in which the car is at fault."""
+"""What the looks of the shield and of the law let through brings about no contact in which the car is at fault."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.body import Body, Car, Disc, Rectangle
-from dubins_traffic.cars.state import Labels, Pose
+from dubins_traffic.cars.state import Command, Labels, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.boxes import separation
 from dubins_traffic.policies.rules.tables import Traffic, scratch, vehicles_of
-from dubins_traffic.policies.safety import body_at
+from dubins_traffic.policies.safety import body_at, may_meet, travel_of
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.table import pack
@@ -45,8 +45,11 @@ def pairs(body: Body, seed: int) -> list[Any]:
     return found
 
 
+@pytest.mark.parametrize("looks", ["the shield", "the law"])
 @pytest.mark.parametrize("body", [Rectangle(0.4, 0.25), Rectangle(0.5, 0.2), Disc(0.177)])
-def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(body: Body) -> None:
+def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(
+    body: Body, looks: str
+) -> None:
     chance = np.random.default_rng(3)
     trials = pairs(body, 5)
     problem = trials[0].problem
@@ -56,7 +59,7 @@ def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(b
         egos([one.problem for one in trials], 2, np.zeros(PAIRS, dtype=np.int64)), scratch(2, 8),
     )  # fmt: skip
     vehicle: Any = vehicles_of([problem])[0]
-    bounds = problem.car.bounds
+    bounds, travel = problem.car.bounds, travel_of(vehicle)
     asked = (
         chance.uniform(-1.0, 1.0, (PAIRS, 2)) * chance.choice([0.1, 1.0], (PAIRS, 2)) * (0.7, bounds.yaw_rate)
     )
@@ -64,7 +67,12 @@ def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(b
     let = []
     for b, (speed, yaw_rate) in enumerate(asked.tolist()):
         near = gather_close(b, state, -1.0, vehicle, traffic.scratch)
-        if near and not may_touch(b, speed, yaw_rate, near, traffic, vehicle):
+        own, other = trials[b].starts
+        if looks == "the law":
+            touches = may_meet(own, Command(speed, yaw_rate), vehicle, other, travel)
+        else:
+            touches = may_touch(b, speed, yaw_rate, near, traffic, vehicle)
+        if near and not touches:
             let.append(b)
     assert len(let) > 30
     touched = 0

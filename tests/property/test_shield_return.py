@@ -109,16 +109,15 @@ def standing(x: float, left: float, name: str = "other", heading: float = 0.0) -
     return car("parked", name, turned(x, left, heading), vacates_after=None)
 
 
-@pytest.mark.parametrize(
-    ("overtakes", "breaks"), [("law", {"2.return"}), ("sure", set[str]()), ("never", set[str]())]
-)
-def test_a_car_that_keeps_beside_the_ego(overtakes: Overtakes, breaks: set[str]) -> None:
-    """It can keep an ego left for too long, and breaks no rule by it; so by default no car is passed."""
+@pytest.mark.parametrize("overtakes", ["law", "sure", "never"])
+def test_a_car_that_keeps_beside_the_ego(overtakes: Overtakes) -> None:
+    """It can keep an ego left for long, and breaks no rule by it; the ego is hemmed in and breaks none either."""
     instance = on_grid([standing(3.0, -W)], 40.0, START)
     score, spans = opposed(instance, keeps_beside, Shield("rules", overtakes=overtakes))
-    assert broken(score, "ego") == breaks
+    assert broken(score, "ego") == set()
     assert broken(score, "other") & {"2.left", "2.turn", "1.collision", "E2"} == set()
     assert (spans != []) == (overtakes == "law")
+    assert overtakes != "law" or max(spans) * PERIOD > 10.0
 
 
 @pytest.mark.parametrize("x", [0.2, 0.8, 2.2, 4.0, 4.6, 5.2, 5.8, 6.4, 7.0, 7.6])

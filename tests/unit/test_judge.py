@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from dubins_traffic.cars.state import Contact
@@ -106,6 +108,40 @@ def test_overtaking_is_a_reason_for_a_while(roads: RoadNetwork, who: int) -> Non
     assert said(judged(case(roads, 2, **rules), script(31))) == [("2.return", who, 42, 12)]
     assert said(judged(case(roads, 2, rest_time=60.0), script(100))) == []
     assert said(judged(case(roads, 2, rest_time=60.0), script(101))) == [("2.return", who, 112, 12)]
+
+
+@both
+@anybody
+@pytest.mark.parametrize(
+    ("away", "goes", "broken"),
+    [(-EPS, 90, []), (EPS, 90, [(42, 12)]), (-EPS, 40, [(70, 40)])],
+    ids=["stays near", "far", "drives off"],
+)
+def test_the_time_to_return_does_not_run_beside_who_has_moved(
+    roads: RoadNetwork, who: int, away: float, goes: int, broken: list[tuple[int, int]]
+) -> None:
+    """What stands drives on in frame 20, stands again, and drives off in frame `goes`."""
+    lane, gap = lanes_in(roads)[0], 2.0 * RHO + 0.8 + away
+    mine = [on_lane(roads, lane, 1.6, -0.3)] * 12 + [on_lane(roads, lane, 1.6, 0.3)] * 78
+    places = (2.3, 1.6 + math.sqrt(gap * gap - 0.36), 3.0)
+    stood, on, off = (on_lane(roads, lane, place, -0.3) for place in places)
+    its = ([stood] * 20 + [on] * (goes - 20) + [off] * 90)[:90]
+    script = [[own, other] if who == 0 else [other, own] for own, other in zip(mine, its, strict=True)]
+    found = said(judged(case(roads, 2, rest_time=60.0, left_time=3.0), script))
+    assert found == [("2.return", who, *times) for times in broken]
+
+
+@both
+@anybody
+def test_who_is_left_without_a_reason_is_not_hemmed_in(roads: RoadNetwork, who: int) -> None:
+    lane = lanes_in(roads)[0]
+    left, beside = (
+        on_lane(roads, lane, 1.6, 0.3),
+        [on_lane(roads, lane, 1.6 + 0.1 * (k % 3), -0.3) for k in range(40)],
+    )
+    script = [[left, other] if who == 0 else [other, left] for other in beside]
+    found = said(judged(case(roads, 2, left_time=3.0), script))
+    assert found == [("2.left", who, 0, 0), ("2.return", who, 30, 0)]
 
 
 @both

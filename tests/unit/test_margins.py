@@ -13,7 +13,7 @@ import pytest
 from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
-from dubins_traffic.logic.formula import implies, negation, prop
+from dubins_traffic.logic.formula import disj, implies, negation, prop
 from dubins_traffic.logic.robustness import robustness
 from dubins_traffic.logic.temporal import always, eventually
 from dubins_traffic.problem.configuration import load_config
@@ -84,6 +84,7 @@ def test_against_the_robustness_of_the_formulas(seed: int) -> None:
     frames = frames_of(script, made.problem.rate)
     bits = np.where(left + RHO > 0.05, FLAG.LEFT, 0) | FLAG.ON_ROAD
     bits |= np.where(draws.random(count) < 0.3, FLAG.OVERTAKING, 0)
+    bits |= np.where(draws.random(count) < 0.1 * (seed % 2), FLAG.HEMMED, 0)
     lanes = np.where(draws.random(count) < 0.1, -1, lane)
     frames = replace(frames, lane=lanes[:, None], bits=bits[:, None].astype(np.uint32))
     found = of(made, frames, 11)
@@ -91,11 +92,12 @@ def test_against_the_robustness_of_the_formulas(seed: int) -> None:
     signals = {
         "left": np.where(lanes >= 0, beyond, -np.inf),
         "overtaking": np.where(bits & FLAG.OVERTAKING, np.inf, -np.inf),
+        "hemmed": np.where(bits & FLAG.HEMMED, np.inf, -np.inf),
     }
     line, period = prop("left"), made.problem.period
     for rule, then in (
         ("2.left", prop("overtaking")),
-        ("2.return", eventually(negation(line), (0.0, 0.7))),
+        ("2.return", eventually(disj(negation(line), prop("hemmed")), (0.0, 0.7))),
     ):
         value = float(robustness(always(implies(line, then)), signals, period)[0])
         assert found[rule] == pytest.approx(value, abs=1e-12), rule

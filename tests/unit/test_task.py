@@ -84,19 +84,19 @@ def test_the_rules_of_the_ego() -> None:
     spec = of(case(GRID, 1, [(2, 2)], left_time=7.5, crossing_degree=4))
     wanted = """
         [] !collision_ego && [] (Y on_road_ego -> on_road_ego) && []<> visit_ego_2_2
-        && [] (left_ego -> overtaking_ego) && [] (left_ego -> <>[0,7.5] !left_ego)
+        && [] (left_ego -> overtaking_ego) && [] (left_ego -> <>[0,7.5] (!left_ego || hemmed_ego))
         && [] (enter_ego_1_1 -> Y stopped_ego_1_1) && [] (enter_ego_1_1 -> Y !ahead_ego_1_1)
         && [] (enter_ego_1_1 -> Y clear_ego_1_1)
     """
     assert conj(*spec.guarantees) is parse(wanted)
     assert spec.assumptions == (parse("[]<> free_2_2"),)
-    assert set(spec.inputs) == {"overtaking_ego", "ahead_ego_1_1", "clear_ego_1_1", "free_2_2"}
+    assert set(spec.inputs) == {"overtaking_ego", "hemmed_ego", "ahead_ego_1_1", "clear_ego_1_1", "free_2_2"}
 
 
 def test_the_assumption() -> None:
     spec = of(case(GRID, 2, [(0, 0)], crossing_degree=4))
     wanted = """
-        [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] !left_agent0)
+        [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] (!left_agent0 || hemmed_agent0))
         && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
         && [] (enter_agent0_1_1 -> Y clear_agent0_1_1)
         && [] !at_fault_agent0
@@ -192,7 +192,7 @@ def test_spin_with_a_longer_period(command: Command, town: str) -> None:
 
 def test_what_a_format_can_not_say_is_named(command: Command, town: str) -> None:
     error = command(town, "--format", "spin", "--guarantee", status=2)
-    assert "[] (left_ego -> <>[0,10] !left_ego)" in error
+    assert "[] (left_ego -> <>[0,10] (!left_ego || hemmed_ego))" in error
     assert "a bound of 10 s is too long" in error
     assert "a period of at least 0.25 s" in error
     assert command(town, "--format", "spin", "--guarantee", "--period", "0.25")

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 SHOWN = 5
 """Other cars that are shown unless another number is asked for."""
-_OWN = ("speed", "yaw_rate", *NAMES)
+_FLAGS = tuple(NAMES)[: SIZE.FLAGS]
+_OWN = ("speed", "yaw_rate", *_FLAGS)
 _LANE = ("on_lane", "offset", "heading_cos", "heading_sin", "progress", "to_end")
 _CROSSING = ("x", "y", "roads", "crosses", "at", "is_goal")
 _GOAL = ("sought", "bearing_cos", "bearing_sin", "distance", "route", "turn_cos", "turn_sin", "to_do")
@@ -47,7 +48,7 @@ _CAR = (
     "yaw_rate",
     "same_lane",
     "same_crossing",
-    *NAMES,
+    *_FLAGS,
 )
 
 

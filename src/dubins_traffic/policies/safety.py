@@ -11,6 +11,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import nearest_segment
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.shape import half_extent
 
 GUARD = 0.01
 """What is kept free beyond the other's worst motion, metres."""
@@ -79,7 +80,8 @@ def leaves_road(pose: Pose, command: Command, period: float, roads: RoadTable, n
 def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
     """Whether a motion of a car for one tick can't touch another body, or leads away from it.
 
-    No point of the other gets farther than `travel` (m) in the tick, 0 if it can't move.
+    No point of the other gets farther than `travel` (m) in the tick, 0 if it can't move. Where a rectangle and another
+    that moves are close, that is not enough: see `keeps_clear`.
 
     Notes
     -----
@@ -90,6 +92,28 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
         return True
     gap, least, last = gaps(pose, command, car, other, own + travel + GUARD)
     return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
+
+
+@jit_inline
+def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
+    """Whether a motion keeps a car from all that another may reach in the tick, or can only lead away from it.
+
+    A disc leads away if the gap grows. Of a rectangle that turns a corner may swing toward the other while the gap
+    grows, and the other may come to touch another side: so a rectangle leads away only if it drives straight on and all
+    that the other may reach lies behind it. The rest is as in `motion_is_safe`; `travel` (m).
+    """
+    if car.half_length == 0.0:
+        return motion_is_safe(pose, command, car, other, travel)
+    own = moved_by(command, car)
+    _, least, _ = gaps(pose, command, car, other, own + travel + GUARD)
+    if own == 0.0 or least > travel + GUARD:
+        return True
+    x, y, c, s = pose
+    way = 1.0 if command.speed > 0.0 else -1.0
+    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(
+        c, s, other.c, other.s, other.half_length, other.half_width, other.rounding
+    )
+    return command.yaw_rate == 0.0 and ahead + travel <= -car.half_length
 
 
 @jit_inline
@@ -122,14 +146,12 @@ def gaps(pose: Pose, command: Command, car: Mover, other: Box, far: float) -> tu
 def may_meet(pose: Pose, command: Command, car: Mover, other: Pose, travel: float) -> bool:
     """Whether a motion for one tick might touch a car of the same kind at a pose, if that is within NEAR.
 
-    The rest is as in `motion_is_safe`; `travel` (m).
+    The rest is as in `keeps_clear`; `travel` (m).
     """
     dx = other.x - pose.x
     dy = other.y - pose.y
     far = 2.0 * car.reach + NEAR
-    return dx * dx + dy * dy < far * far and not motion_is_safe(
-        pose, command, car, body_at(other, car), travel
-    )
+    return dx * dx + dy * dy < far * far and not keeps_clear(pose, command, car, body_at(other, car), travel)
 
 
 @jit_inline

@@ -104,6 +104,8 @@ class JudgedCar:
     off_road: int = NEVER
     """Run of being off the road (ego); `NEVER` before it has been on one."""
     left_since: int = -1
+    free_since: int = -1
+    """Run of being left and not hemmed in."""
     unblocked_since: int = -1
     """Run of being left and not overtaking."""
     first_since: int = -1

@@ -59,13 +59,17 @@ def when_due(tick: int, since: int, ago: int) -> int:
 def judge_lane(
     car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
 ) -> None:
-    """Rule 2: left only while overtaking, and for a while. `bits` and `lane` are the car's in this frame."""
+    """Rule 2: left only while overtaking, and for a while unless it is hemmed in.
+
+    `bits` and `lane` are the car's in this frame.
+    """
     car.left_since = run(bits & FLAG.LEFT != 0, tick, car.left_since)
+    car.free_since = run(bits & (FLAG.LEFT | FLAG.HEMMED) == FLAG.LEFT, tick, car.free_since)
     car.unblocked_since = run(bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT, tick, car.unblocked_since)
     if lasted(tick, car.unblocked_since) == 0:
         add(log, car, RULE.LEFT_UNBLOCKED, tick, car.left_since, -1, lane)
-    if lasted(tick, car.left_since) == terms.return_ticks:
-        add(log, car, RULE.RETURN, tick, car.left_since, -1, lane)
+    if lasted(tick, car.free_since) == terms.return_ticks:
+        add(log, car, RULE.RETURN, tick, car.free_since, -1, lane)
 
 
 @jit

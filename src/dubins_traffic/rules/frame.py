@@ -1,6 +1,6 @@
 """The propositions of one frame, for all cars of a batch.
 
-Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, overtaking, left.
+Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, overtaking, left, hemmed.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from dubins_traffic.roads.lookup import (
     lane_end,
 )
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
+from dubins_traffic.rules.hemming import hem_in
 from dubins_traffic.rules.label_cache import holds_on, look_who_holds
 from dubins_traffic.rules.location import locate, moved2, put_in_order
 from dubins_traffic.rules.propositions import FLAG
@@ -66,7 +67,7 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
         for n in range(cars):
             labels.bits[b, n] = _who_stands(np.int64(labels.bits[b, n]))
     if some & BESIDE != 0 or tables.obstacles.base[b] >= 0:
-        _look_beside(b, tables)
+        _look_beside(b, tick, tables)
 
 
 @jit
@@ -100,8 +101,8 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
 
 
 @jit
-def _look_beside(b: int, tables: LabelTables) -> None:
-    """Find who of trial b is blocked, overtakes and is left."""
+def _look_beside(b: int, tick: int, tables: LabelTables) -> None:
+    """Find who of trial b is blocked, overtakes, is left and hemmed in."""
     segments, head, row = tables.labels.segment[b], tables.memory.head[b], tables.memory.car[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
@@ -109,11 +110,14 @@ def _look_beside(b: int, tables: LabelTables) -> None:
         first = head[segment]
         row[n].next_on_segment = first.segment
         first.segment = n
+    left = False
     for n in range(cars):
-        _block(b, n, tables)
+        left |= _block(b, n, tick, tables)
     for n in range(cars):
         segment = segments[n]
         head[segment].segment = -1
+    if left:
+        hem_in(b, tick, tables)
 
 
 @jit_inline
@@ -221,15 +225,15 @@ def _who_stands(bits: Any) -> Any:
 
 
 @jit
-def _block(b: int, n: int, tables: LabelTables) -> None:
-    """Find whether the lane of car n is blocked, whether it overtakes, and whether it is left."""
+def _block(b: int, n: int, tick: int, tables: LabelTables) -> bool:
+    """Find whether the lane of car n is blocked, whether it overtakes, and whether it is left, which is returned."""
     labels, t = tables.labels, tables.roads
     own, car = tables.rules[b], tables.memory.car[b, n]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0:
         labels.bits[b, n] = bits & ~(FLAG.OVERTAKING | FLAG.LEFT)
-        return
+        return False
     blocked, beside = _cars_beside(b, n, lane, tables)
     if tables.obstacles.base[b] >= 0:
         place = lane_of(t, own, b, lane)
@@ -251,10 +255,13 @@ def _block(b: int, n: int, tables: LabelTables) -> None:
     if bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
         bits &= ~FLAG.OVERTAKING
     if car.reach > own.left_set:
+        if bits & FLAG.LEFT == 0:
+            car.left_since = tick
         bits |= FLAG.LEFT
     elif car.reach < own.left_release:
         bits &= ~FLAG.LEFT
     labels.bits[b, n] = bits
+    return bits & FLAG.LEFT != 0
 
 
 @jit_inline

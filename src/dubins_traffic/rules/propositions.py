@@ -47,6 +47,8 @@ class _Flag(NamedTuple):
     """The body meets a disc that it did not meet in the frame before (never in frame 0)."""
     LINGERS: int = 131072
     """The largest progress since the lane state was set has grown by less than `linger_distance` in `linger_time`."""
+    HEMMED: int = 262144
+    """Left and overtaking, with a car near that has not been still all the while: the way back may not be free."""
 
 
 FLAG: Final = _Flag()

@@ -34,7 +34,7 @@ from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
 from dubins_traffic.rules.tables import spread
 
 _PENDING = (
-    ("2.return", "left_since"),
+    ("2.return", "free_since"),
     ("E3.enter", "first_since"),
     ("E4", "exit_counts"),
     ("E5", "rest_since"),

@@ -92,6 +92,7 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
         judge_lane(car, bits, lane, tick, tables.terms[b], log)
     else:
         car.left_since = -1
+        car.free_since = -1
         car.unblocked_since = -1
     if bits & ENTERS == ENTERS:
         stopped = False

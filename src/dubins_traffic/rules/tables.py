@@ -68,6 +68,8 @@ class TrialRules:
     overtaking_ahead: float
     linger_growth: float
     """A car whose greatest progress has grown by less in `linger_ticks` lingers."""
+    hem2: float
+    """Squared distance of the centre of a car up to which it may hem in one that overtakes."""
     net: int
     """Number of the trial's roads in the table of the batch."""
     stop_ticks: int
@@ -105,6 +107,10 @@ class CarMemory:
     """First tick of the present run of being first at a clear crossing."""
     wait_since: int = -1
     """Tick of the first stop in this wait."""
+    left_since: int = -1
+    """Tick in which it became left."""
+    stirred: int = -1
+    """Latest tick in which it was not still, of those in which anybody is left."""
     rank: int = -1
     """Place in the order of the crossing ahead, 0 first; -1 without a ticket."""
     zone: int = -1
@@ -309,6 +315,8 @@ def pack_rules(
         own.blocked_ahead = given.blocked_ahead
         own.overtaking_behind = given.overtaking_behind
         own.overtaking_ahead = given.overtaking_ahead
+        hem = 2.0 * float(cars.reach[b]) + given.overtaking_behind
+        own.hem2 = hem * hem
         own.linger_growth = (given.linger_distance - GRAIN) * (1.0 if linger > 0 else NEVER_AGAIN)
         own.stop_ticks = ticks(given.stop_time, rate)
         own.stand_ticks = ticks(given.stand_time, rate)

@@ -9,7 +9,8 @@ i stands for the name of a car, x and y for a lattice point. All mean what docs/
 ``free_x_y``                          no e-agent is at the goal
 ``collision_i``                       i has touched a car or an obstacle since the frame before
 ``on_road_i`` ``left_i``              docs/rules.md#on-road, docs/rules.md#left
-``overtaking_i`` ``at_fault_i``       docs/rules.md#overtaking, docs/rules.md#at-fault
+``overtaking_i`` ``hemmed_i``         docs/rules.md#overtaking, docs/rules.md#hemmed
+``at_fault_i``                        docs/rules.md#at-fault
 ``enter_i_x_y`` ``clear_i_x_y``       i enters the crossing; no other car is in it
 ``stopped_i_x_y``                     i has stopped at the crossing
 ``ahead_i_x_y``                       i has stopped there, and somebody is before it in the order
@@ -32,14 +33,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from dubins_traffic.logic.exports import Specification
-from dubins_traffic.logic.formula import Formula, conj, implies, negation, prop, propositions
+from dubins_traffic.logic.formula import Formula, conj, disj, implies, negation, prop, propositions
 from dubins_traffic.logic.temporal import always, eventually, yesterday
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 
 Point = tuple[int, int]
 
-_OF_ENVIRONMENT = ("overtaking", "clear", "ahead")
+_OF_ENVIRONMENT = ("overtaking", "hemmed", "clear", "ahead")
 """What is said of the ego but is up to the others."""
 
 
@@ -110,9 +111,10 @@ def task(problem: Stated, names: Sequence[str]) -> Specification:
 def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
     """Return rules 2 and 3 for a car."""
     left = prop(f"left_{name}")
+    back = disj(negation(left), prop(f"hemmed_{name}"))
     found = [
         always(implies(left, prop(f"overtaking_{name}"))),
-        always(implies(left, eventually(negation(left), (0.0, rules.left_time)))),
+        always(implies(left, eventually(back, (0.0, rules.left_time)))),
     ]
     for point in crossings:
         enter, stopped, ahead, clear = (

@@ -25,9 +25,9 @@ class Margins:
     """The robustness of the ego's rules 1 and 2 (`logic.robustness`), in metres.
 
     The signals are the gap to the nearest other body, the distance of the centre to the edge of the road, and how far
-    the body reaches beyond the line at which `left` rises (or, once it has risen, falls); `overtaking` is infinite. The
-    robustness of ``[] (left -> overtaking)`` is the least margin to the line while the ego does not overtake, that of
-    ``[] (left -> <>[0,d] !left)`` the least of the greatest margins within d.
+    the body reaches beyond the line at which `left` rises (or, once it has risen, falls); `overtaking` and `hemmed` are
+    infinite. The robustness of ``[] (left -> overtaking)`` is the least margin to the line while the ego does not
+    overtake, that of ``[] (left -> <>[0,d] (!left | hemmed))`` the least of the greatest margins within d.
     """
 
     def begin(self, instance: Instance) -> None:

@@ -128,7 +128,7 @@ def _find_margin(
             segment, square = nearest_segment(roads, net, x, y)
             farthest = max(farthest, square)
         right = -_beyond(b, own, net, tables)
-        signal[f] = right
+        signal[f] = right if bits & FLAG.HEMMED == 0 else INFINITE
         if bits & FLAG.OVERTAKING == 0:
             line = min(line, right)
     found.road = float(half_road) - sqrt(farthest) if begun else INFINITE

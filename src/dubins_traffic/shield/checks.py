@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Pose, State
-from dubins_traffic.kernels.boxes import Box
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
-from dubins_traffic.policies.safety import GUARD, body_at, gaps, may_hit, motion_is_safe, moved_by, travel_of
+from dubins_traffic.policies.safety import GUARD, body_at, keeps_clear, may_hit, travel_of
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
     lane_direction,
@@ -62,7 +61,7 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
 def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
     """Tell whether a command could bring about a contact, were the `near` (count) others to do their worst for a tick.
 
-    `motion_is_safe` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
+    `keeps_clear` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
     """
     state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
@@ -75,31 +74,9 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
     for k in range(near):
         j = scratch.near[k]
         other = body_at(Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j]), vehicle)
-        if not _keeps_clear(pose, command, vehicle, other, travel + between):
+        if not keeps_clear(pose, command, vehicle, other, travel + between):
             return True
     return may_hit(b, pose, command, vehicle, obstacles, travel + between + GUARD, between)
-
-
-@jit_inline
-def _keeps_clear(pose: Pose, command: Command, vehicle: Vehicle, other: Box, travel: float) -> bool:
-    """Tell whether a command keeps a car from all that another may reach in the tick, or can only lead away from it.
-
-    A disc leads away if the gap grows. Of a rectangle that turns a corner may swing toward the other while the gap
-    grows, and the other may come to touch another side: so a rectangle leads away only if it drives straight on and all
-    that the other may reach lies behind it.
-    """
-    if vehicle.half_length == 0.0:
-        return motion_is_safe(pose, command, vehicle, other, travel)
-    own = moved_by(command, vehicle)
-    _, least, _ = gaps(pose, command, vehicle, other, own + travel + GUARD)
-    if own == 0.0 or least > travel + GUARD:
-        return True
-    x, y, c, s = pose
-    way = 1.0 if command.speed > 0.0 else -1.0
-    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(
-        c, s, other.c, other.s, other.half_length, other.half_width, other.rounding
-    )
-    return command.yaw_rate == 0.0 and ahead + travel <= -vehicle.half_length
 
 
 @jit

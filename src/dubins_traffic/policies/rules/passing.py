@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
-from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.rules.propositions import FLAG
@@ -29,8 +29,6 @@ COMES = 0.7
 """Cars that come are taken to drive as fast as the car can, at least at this speed, m/s."""
 SPARE = 0.6
 """Metres to spare before a car that comes."""
-SLOW = 0.05
-"""A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
 FOLLOWED = 1.5
 """Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
 OVERTAKEN = 2.0
@@ -267,71 +265,3 @@ def stands_beside(
         if near and left > 0.0 and abs(left - offset) < wide + part.reach:
             return True
     return False
-
-
-@jit
-def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
-    """Return the speed of a car that passes; end the manoeuvre when it is done or there is nothing left to pass."""
-    state, labels, obstacles, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.obstacles,
-        traffic.drivers,
-        traffic.scratch,
-    )
-    vehicle = drivers.vehicle[b]
-    car = drivers.car[b, n]
-    own = along(way, state.x[b, n], state.y[b, n])
-    left = aside(way, state.x[b, n], state.y[b, n])
-    if own >= car.until:
-        if abs(left) < 0.05:
-            car.aside = 0.0
-        elif labels.bits[b, n] & FLAG.LEFT != 0:
-            pass_again(b, own, way, near, traffic, car, vehicle)
-        return speed
-    if labels.bits[b, n] & (FLAG.OVERTAKING | FLAG.LEFT) == 0 and not within_lane(car.aside, vehicle):
-        car.aside = 0.0
-        return speed
-    length = 2.0 * vehicle.reach
-    for p in range(obstacles.off[b], obstacles.off[b + 1]):
-        part = obstacles.parts[p]
-        key = along(way, part.x, part.y)
-        if (
-            own - part.reach - length < key <= car.until + part.reach
-            and abs(aside(way, part.x, part.y)) < 2.0
-        ):
-            return speed
-    beside = False
-    before = False
-    for k in range(near):
-        j = scratch.near[k]
-        key = along(way, state.x[b, j], state.y[b, j])
-        its = aside(way, state.x[b, j], state.y[b, j])
-        if its > vehicle.middle or abs(its) > 2.0 * vehicle.middle:
-            continue
-        stands = labels.bits[b, j] & FLAG.STANDS != 0 or abs(state.speed[b, j]) < SLOW
-        if stands and own - length < key <= car.until:
-            return speed
-        if abs(key - own) < length + BERTH:
-            beside = True
-            before = before or key >= own - 0.1
-    if not beside:
-        car.aside = 0.0
-        return speed
-    return 0.0 if before else speed
-
-
-@jit
-def pass_again(
-    b: int, own: float, way: ReferencePath, near: int, traffic: Traffic, car: Driver, vehicle: Vehicle
-) -> None:
-    """Go on passing what has moved up meanwhile and stands where the car would return, if there is room."""
-    state, scratch = traffic.state, traffic.scratch
-    length = 2.0 * vehicle.reach + BERTH
-    for k in range(near):
-        j = scratch.near[k]
-        key = along(way, state.x[b, j], state.y[b, j])
-        until = key + SLIP + 2.0 * vehicle.half_length
-        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < vehicle.middle and 0.0 < key - own < length
-        if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(vehicle):
-            car.until = until

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from dubins_traffic.cars.state import Command, Pose
+from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import within_lane
+from dubins_traffic.policies.rules.passing import along
+from dubins_traffic.policies.rules.returning import NARROWLY, last_return
 from dubins_traffic.policies.rules.standing import stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
@@ -25,26 +28,36 @@ ASTRAY = 0.18
 """Who is this far left of its way in a disc is astray, metres."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
+CREEPS, SLIDES = 0.05, 0.2
+"""Who has to return and may not drive on faster than the first goes straight to the right at the second, m/s."""
+SQUARE = 0.999
+"""Sine of the angle at which it does."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
 
+class Line(NamedTuple):
+    """The line that a car drives along: metres that it is left of it, its direction there, and how fast it may, m/s."""
+
+    left: float
+    px: float
+    py: float
+    speed: float
+
+
+class Motion(NamedTuple):
+    """A command, m/s and rad/s, and whether it is safe."""
+
+    speed: float
+    yaw_rate: float
+    safe: bool
+
+
 @jit_inline
 def move(
-    b: int,
-    n: int,
-    allowed: float,
-    left: float,
-    offset: float,
-    px: float,
-    py: float,
-    bend: float,
-    outside: bool,
-    way: ReferencePath,
-    near: int,
-    trusted: int,
-    traffic: Traffic,
-) -> tuple[float, float]:
+    b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
+    way: ReferencePath, near: int, trusted: int, traffic: Traffic,
+) -> tuple[float, float]:  # fmt: skip
     """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -61,7 +74,13 @@ def move(
     if passes or vehicle.tightest > 0.0:
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    if not safe and passes and offset == 0.0:
+    returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
+    if returns and near > 0 and vehicle.tightest == 0.0:
+        motion = Motion(speed, yaw_rate, safe)
+        speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
+    if not safe and offset == 0.0 and (passes or returns):
+        if returns:
+            allowed = min(allowed, room_to_return(b, n, way, traffic) / vehicle.period)
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
@@ -77,6 +96,40 @@ def move(
         if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
     return speed, yaw_rate
+
+
+@jit_inline
+def come_back(
+    b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic
+) -> Motion:
+    """Return what a car does that is left and returns among others, and whether that leads on.
+
+    `motion` (m/s, rad/s) is what it would do, `near` (count) how many cars are listed. It does not turn
+    toward who bars its way back, and goes straight to the right where there is room for that only.
+    """
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    x, y = state.x[b, n], state.y[b, n]
+    safe = motion.safe
+    if safe and motion.speed == 0.0 and line.speed >= CREEPS:
+        pose = Pose(x, y, *heading(line, STEEP))
+        safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
+    if not (safe and line.speed >= CREEPS) and along(way, x, y) < last_return(vehicle) + NARROWLY:
+        pose = Pose(x, y, *heading(line, SQUARE))
+        if is_safe_from(pose, b, Command(SLIDES, 0.0), near, -1, traffic, vehicle):
+            speed, yaw_rate = steer(
+                state.c[b, n], state.s[b, n], line.left, line.px, line.py, 0.0, SLIDES, SQUARE, NIMBLE,
+                vehicle.yaw_most, 0.0, vehicle.period,
+            )  # fmt: skip
+            return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+    return Motion(motion.speed, motion.yaw_rate, safe)
+
+
+@jit_inline
+def heading(line: Line, most: float) -> tuple[float, float]:
+    """Return the direction in which a car drives to its line, at an angle whose sine is `most` (ratio) at most."""
+    sine = min(max(-line.left / HURRY, -most), most)
+    cosine = sqrt(1.0 - sine * sine)
+    return line.px * cosine - line.py * sine, line.py * cosine + line.px * sine
 
 
 @jit_inline
@@ -101,6 +154,17 @@ def keep_right(
         return 0.0, 0.0
     speed = min(speed, -vehicle.slowest)
     return -speed, -min(speed / vehicle.tightest, vehicle.yaw_most)
+
+
+@jit_inline
+def room_to_return(b: int, n: int, way: ReferencePath, traffic: Traffic) -> float:
+    """Return how far a car that can't return yet may drive on and still return before the disc, metres.
+
+    An e-agent takes no place in the order of a crossing meanwhile, since it could not enter on its turn (E3).
+    """
+    vehicle = traffic.drivers.vehicle[b]
+    own = along(way, traffic.state.x[b, n], traffic.state.y[b, n])
+    return max(last_return(vehicle) - (vehicle.approaches if n != EGO else 0.0) - own, 0.0)
 
 
 @jit_inline
@@ -179,9 +243,17 @@ def is_safe(
     b: int, n: int, speed: float, yaw_rate: float, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
 ) -> bool:
     """Tell whether a command can't bring about a contact, whatever the others but `trusted` do in this tick."""
-    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
+    state = traffic.state
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-    command = Command(speed, yaw_rate)
+    return is_safe_from(pose, b, Command(speed, yaw_rate), near, trusted, traffic, vehicle)
+
+
+@jit_inline
+def is_safe_from(
+    pose: Pose, b: int, command: Command, near: int, trusted: int, traffic: Traffic, vehicle: Vehicle
+) -> bool:
+    """Do as `is_safe`, of a car at a pose; `near` (count) cars are listed, `trusted` (index) need not be minded."""
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     travel = vehicle.fastest * vehicle.period
     if vehicle.half_length > 0.0:
         travel += vehicle.yaw_most * vehicle.reach * vehicle.period
