@@ -14,6 +14,7 @@ import llvmlite.binding.ffi  # pyright: ignore[reportMissingTypeStubs]
 from numba.core import (
     base,  # pyright: ignore[reportMissingTypeStubs]
     event,  # pyright: ignore[reportMissingTypeStubs]
+    interpreter,  # pyright: ignore[reportMissingTypeStubs]
     ir,  # pyright: ignore[reportMissingTypeStubs]
     lowering,  # pyright: ignore[reportMissingTypeStubs]
     ssa,  # pyright: ignore[reportMissingTypeStubs]
@@ -25,6 +26,7 @@ from numba.core.typing import context  # pyright: ignore[reportMissingTypeStubs]
 
 _ffi, _base, _event, _ir = cast(Any, llvmlite.binding.ffi), cast(Any, base), cast(Any, event), cast(Any, ir)
 _lowering, _infer, _ssa = cast(Any, lowering), cast(Any, typeinfer), cast(Any, ssa)
+_interpreter = cast(Any, interpreter)
 _settings, _functions, _typing = cast(Any, targetconfig), cast(Any, functions), cast(Any, context)
 
 IMPLEMENTED = "functions", "getattrs", "setattrs", "casts", "constants"
@@ -41,6 +43,7 @@ def shorten() -> None:
     _remember_signatures()
     _refresh_seldom()
     _list_variables_quickly()
+    _leave_whole()
 
 
 class _Nothing:
@@ -62,6 +65,12 @@ def _tell_nobody() -> None:
     for module in (_lowering, _infer):
         module.new_error_context = lambda *_, **__: nothing  # pyright: ignore[reportUnknownLambdaType]
     _ssa._logger = nothing
+    _ir.Assign.__str__ = _no_text  # every statement is written out for a message that nobody asks for
+
+
+def _no_text(_statement: object) -> str:
+    """Return no text."""
+    return ""
 
 
 def _call(own: Any, *args: Any) -> Any:
@@ -151,27 +160,28 @@ def _count(own: Any, lists: tuple[str, ...]) -> int:
 
 def _list_variables_quickly() -> None:
     """List the variables of a statement without a list for each part of it."""
+    _ir.Stmt.list_vars, _ir.Expr.list_vars = _of_statement, _of_expression
 
-    def of_statement(own: Any) -> list[Any]:
-        found: list[Any] = []
-        for value in own.__dict__.values():
-            _gather(value, found)
-        return found
 
-    def of_expression(own: Any) -> list[Any]:
-        found: list[Any] = []
-        for value in own._kws.values():
-            _gather(value, found)
-        return found
+def _of_statement(own: Any) -> list[Any]:
+    found: list[Any] = []
+    for value in own.__dict__.values():
+        _gather(value, found)
+    return found
 
-    _ir.Stmt.list_vars, _ir.Expr.list_vars = of_statement, of_expression
+
+def _of_expression(own: Any) -> list[Any]:
+    found: list[Any] = []
+    for value in own._kws.values():
+        _gather(value, found)
+    return found
 
 
 def _gather(value: Any, found: list[Any]) -> None:
-    kind = cast(Any, type(value))
-    if kind is _ir.Var:
+    kind: Any = value.__class__
+    if kind is _VARIABLE:
         found.append(value)
-    elif kind is _ir.Loc or kind is str or value is None:
+    elif kind in _WITHOUT:
         pass
     elif kind is tuple or kind is list:
         for part in value:
@@ -181,3 +191,18 @@ def _gather(value: Any, found: list[Any]) -> None:
             _gather(part, found)
     elif isinstance(value, _ir.Inst):
         found.extend(value.list_vars())
+
+
+_VARIABLE: Any = _ir.Var
+_WITHOUT = frozenset((_ir.Loc, str, int, type(None), _ir.Scope))
+"""Kinds of parts in which there are no variables."""
+
+
+def _leave_whole() -> None:
+    """Look for no `with` and no dictionaries in what is read of a function: kernels have none."""
+    for name in ("peep_hole_delete_with_exit", "peep_hole_fuse_dict_add_updates"):
+        setattr(_interpreter, name, _same_function)
+
+
+def _same_function(function: Any) -> Any:
+    return function

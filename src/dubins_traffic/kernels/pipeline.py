@@ -1,8 +1,9 @@
 """The steps by which Numba compiles a kernel: those of its usual ones that can find anything to do in a kernel.
 
-Numba's own way has 27 steps, after many of which it works out anew which variable is alive where. Kernels have no
-closures, comprehensions, `with`, `raise`, literal arguments or expressions on whole arrays, for which most of these
-steps are; a function with code inside goes Numba's own way.
+Numba's own way has 27 steps, after many of which it works out anew which variable is alive where, in order to say where
+each ends: there it counts references and clears memory, of which kernels need neither. Nor have kernels closures,
+comprehensions, `with`, `raise`, literal arguments or expressions on whole arrays, for which most other steps are; a
+function with code inside goes Numba's own way.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from numba.core import (
     rewrites,  # pyright: ignore[reportMissingTypeStubs]
     ssa,  # pyright: ignore[reportMissingTypeStubs]
     targetconfig,  # pyright: ignore[reportMissingTypeStubs]
+    transforms,  # pyright: ignore[reportMissingTypeStubs]
     typed_passes,  # pyright: ignore[reportMissingTypeStubs]
     untyped_passes,  # pyright: ignore[reportMissingTypeStubs]
 )
 
 _untyped, _typed, _utils = cast(Any, untyped_passes), cast(Any, typed_passes), cast(Any, ir_utils)
+_transforms = cast(Any, transforms)
 _rewrites, _ssa, _settings = cast(Any, rewrites), cast(Any, ssa), cast(Any, targetconfig)
 _usual = cast(Any, compiler).Compiler
 
@@ -38,6 +41,11 @@ class Pipeline(_usual):
                 step(state)
         state.pipeline = None
         return state.cr
+
+
+def _order(state: Any) -> None:
+    """Join blocks of which one follows another, and leave out those that are never reached."""
+    state.func_ir.blocks = _transforms.canonicalize_cfg(state.func_ir.blocks)
 
 
 def _prune(state: Any) -> None:
@@ -73,14 +81,13 @@ def _join(state: Any) -> None:
 STEPS = (
     _untyped.TranslateByteCode().run_pass,
     _untyped.FixupArgs().run_pass,
-    _untyped.IRProcessing().run_pass,
+    _order,
     _untyped.RewriteSemanticConstants().run_pass,
     _prune,
     _rewrite,
     _assign_once,
     _typed.NopythonTypeInference().run_pass,
     _join,
-    _typed.IRLegalization().run_pass,
     _typed.NativeLowering().run_pass,
     _typed.NoPythonBackend().run_pass,
 )
