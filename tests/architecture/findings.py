@@ -17,6 +17,8 @@ from tests.architecture.kernels import kernels_without_units, wide_kernels
 
 MOST_LINES = 350
 """Lines of a module."""
+MOST_OF_A_FUNCTION = 50
+"""Lines of a function."""
 SAME_LINES = 6
 """So many lines of code that are the same in two places should be one."""
 
@@ -82,6 +84,24 @@ def long_modules() -> Findings:
     """Modules of too many lines."""
     counts = {module.name: module.text.count("\n") for module in modules()}
     return {name: count for name, count in counts.items() if count > MOST_LINES}
+
+
+def long_functions() -> Findings:
+    """Functions of too many lines, their docstrings not counted."""
+    found: dict[str, str | int] = {}
+    for module in modules():
+        for own in module.definitions():
+            if isinstance(own, ast.ClassDef):
+                continue
+            said = own.body[0] if ast.get_docstring(own) else None
+            lines = _lines(own) - (0 if said is None else _lines(said))
+            if lines > MOST_OF_A_FUNCTION:
+                found[f"{module.name}.{own.name}"] = lines
+    return found
+
+
+def _lines(node: ast.stmt) -> int:
+    return (node.end_lineno or node.lineno) - node.lineno + 1
 
 
 def circles() -> Findings:
@@ -200,6 +220,7 @@ CHECKS: Mapping[str, Callable[[], Findings]] = {
     "constants": constants,
     "duplicates": duplicates,
     "kernels without units": kernels_without_units,
+    "long functions": long_functions,
     "long modules": long_modules,
     "wide kernels": wide_kernels,
     "retired names": retired_names,

@@ -23,6 +23,7 @@ MOST_STILL = {
     "constants": 67,
     "duplicates": 6,
     "kernels without units": 102,
+    "long functions": 10,
     "long modules": 0,
     "retired names": 0,
     "wide kernels": 22,

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import dubins_traffic
-from dubins_traffic.kernels import asking, compile, store
+from dubins_traffic.kernels import asking, companion, compile, store
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import Kernel, jit
@@ -127,6 +127,21 @@ def test_a_companion_killed_while_it_is_waited_for_is_begun_again(cache) -> None
     until(lambda: companions(cache) or waiting.poll() is not None)
     end_companions(cache)
     assert waiting.communicate() == (f"{sincos(0.5)}\n", "")
+
+
+def test_a_companion_for_which_nobody_waits_leaves_processors_to_all_others(cache) -> None:
+    assert python(cache, CALL)[0]
+    until(lambda: companions(cache))
+    until(lambda: [os.sched_getscheduler(process) for process in companions(cache)] in ([], [os.SCHED_IDLE]))
+    for process in companions(cache):
+        session = Path(f"/proc/{process}/autogroup")
+        assert os.getpriority(os.PRIO_PROCESS, process) == companion.NICE
+        assert not session.exists() or f"nice {companion.NICE}" in session.read_text()
+    end_companions(cache)
+    waiting = begin(cache, CALL, "compiled")
+    until(lambda: companions(cache))
+    assert [os.sched_getscheduler(process) for process in companions(cache)] == [os.SCHED_OTHER]
+    waiting.communicate()
 
 
 def test_processes_at_once_have_one_companion(cache) -> None:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 NICE = 19
 """How much the companion stands back behind others."""
+SESSION = Path("/proc/self/autogroup")
+"""Where Linux is told how much the processes of a session stand back behind those of others."""
 LINGER = 5.0
 """Seconds for which it waits for more to do."""
 LONGEST = 600.0
@@ -42,7 +44,7 @@ SHARE = 0.6
 def main() -> None:
     """Compile until nothing is asked for, if no other companion is at work."""
     if "--behind" in sys.argv[1:]:
-        os.nice(NICE)
+        _stand_back()
         Thread(target=_make_room, daemon=True).start()
     began = monotonic()
     while monotonic() < began + SETTLE:
@@ -51,6 +53,19 @@ def main() -> None:
                 _work(began)
                 return
         sleep(PAUSE)
+
+
+def _stand_back() -> None:
+    """Leave processors to all other processes, where the system can: run only where one would be idle.
+
+    Some systems share processors among sessions first, and among the processes of each then. The companion has a
+    session of its own, which would get as much as that of the command; so that stands back as well.
+    """
+    os.nice(NICE)
+    with contextlib.suppress(OSError):
+        SESSION.write_text(str(NICE), encoding="ascii")
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 def _make_room() -> None:

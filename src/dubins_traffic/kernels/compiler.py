@@ -8,8 +8,8 @@ entry can be called from outside. What only it calls is put into it, and the oth
 Nor is there code that unpacks Python's arguments one by one: an entry reads numbers and addresses from a frame
 (`kernels.kinds`).
 
-Numba also looks at every index for whether it is negative, and then counts from the end. Kernels never count from the
-end, and an index is the number of an element.
+Numba's front end, typing and writing LLVM's language, takes most of the time: `kernels.pipeline` has fewer steps,
+`kernels.frontend` finds things once, `kernels.elements` writes less.
 
 This rests on inner parts of Numba (`docs/design/015-two-tiers.md`); it is the companion's process alone that they are
 changed in.
@@ -24,16 +24,17 @@ from typing import Any, cast
 import llvmlite.binding  # pyright: ignore[reportMissingTypeStubs]
 import llvmlite.ir  # pyright: ignore[reportMissingTypeStubs]
 import numba
-from numba.core import codegen, config, targetconfig, types  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import codegen, config, types  # pyright: ignore[reportMissingTypeStubs]
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.kernels.codes import take_as_numbers
+from dubins_traffic.kernels.elements import index_plainly
+from dubins_traffic.kernels.frontend import shorten
 from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of, is_place
+from dubins_traffic.kernels.pipeline import Pipeline
 from dubins_traffic.kernels.pointers import TablesType
 
-OURS = "dubins_traffic"
-"""Part of the names of our compiled functions."""
 RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""
 FOREIGN = ("numba", "NRT", "Py", "_Py")
@@ -59,6 +60,14 @@ class Library(_usual):
         """Leave everything as it is."""
         self._finalized = True
 
+    def _optimize_functions(self, module: Any) -> None:
+        """Optimize each function that a module holds, and none that it only calls."""
+        module.data_layout = self._codegen._data_layout
+        for function in module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
+
     def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002  # as Numba calls it
         """Return that there is none yet."""
         return 0
@@ -73,8 +82,8 @@ class Compiler:
         self._codegen = self._context.codegen()
         self._codegen._library_class = Library
         self._codegen.set_env = _leave
-        _index_plainly()
-        _compare_quickly()
+        index_plainly()
+        shorten()
         take_as_numbers()
         gc.set_threshold(SELDOM)
 
@@ -82,7 +91,7 @@ class Compiler:
         """Return what Numba makes of a kernel's function, for others to call and for `machine_code`."""
         made = _numba.njit(
             error_model="numpy", nogil=True, forceinline=inlined, _nrt=False, no_cfunc_wrapper=True,
-            no_cpython_wrapper=True,
+            no_cpython_wrapper=True, pipeline_class=Pipeline,
         )(function)  # fmt: skip
         made.is_wide = wide
         return made
@@ -319,31 +328,3 @@ def _kind_of(own: Any) -> Kind:
 
 def _leave(_name: str, _environment: Any) -> None:
     """Leave the environment of a function alone: no kernel needs any."""
-
-
-def _compare_quickly() -> None:
-    """Let Numba compare its settings, which are part of many keys, by what has been set: a tenth of its time."""
-    settings = cast(Any, targetconfig).TargetConfig
-    thorough = settings.__eq__
-
-    def is_equal(one: Any, other: Any) -> Any:
-        return (type(one) is type(other) and one._values == other._values) or thorough(one, other)
-
-    settings.__eq__ = is_equal
-    settings.__hash__ = _same
-
-
-def _same(_settings: object) -> int:
-    """Return a hash of settings, of which few differ."""
-    return 1
-
-
-def _index_plainly() -> None:
-    wrap = _arrays.fix_integer_index
-
-    def keep_index(context: Any, builder: Any, kind: Any, index: Any, size: Any) -> Any:
-        if kind.signed and OURS in builder.function.name:
-            return context.cast(builder, index, kind, _types.intp)
-        return wrap(context, builder, kind, index, size)
-
-    _arrays.fix_integer_index = keep_index

@@ -11,7 +11,6 @@ from typing import Any, cast
 import numba  # pyright: ignore[reportMissingTypeStubs]
 from llvmlite import ir as _ir  # pyright: ignore[reportMissingTypeStubs]
 from numba import extending as _extending  # pyright: ignore[reportMissingTypeStubs]
-from numba.core import cgutils as _cgutils  # pyright: ignore[reportMissingTypeStubs]
 from numba.core import types as _types  # pyright: ignore[reportMissingTypeStubs]
 from numba.core.typing import templates as _templates  # pyright: ignore[reportMissingTypeStubs]
 
@@ -19,7 +18,7 @@ WORD = 8
 """Bytes of what is known of an array: its address, and each of its lengths."""
 
 library, ir, extending = cast(Any, numba), cast(Any, _ir), cast(Any, _extending)
-cgutils, types, templates = cast(Any, _cgutils), cast(Any, _types), cast(Any, _templates)
+types, templates = cast(Any, _types), cast(Any, _templates)
 
 
 class TablesType(types.Type):
@@ -92,24 +91,21 @@ def _read(context: Any, builder: Any, kind: TablesType, pointer: Any, name: str)
         value.set_metadata("invariant.load", steady)
         return value
 
-    array = context.make_array(field)(context, builder)
-    size = context.get_abi_sizeof(context.get_data_type(field.dtype))
+    size = ir.IntType(64)(context.get_abi_sizeof(context.get_data_type(field.dtype)))
     lengths = [word(1 + k) for k in range(field.ndim)]
-    stride = ir.IntType(64)(size)
-    strides: list[Any] = []
-    for length in reversed(lengths):
-        strides.insert(0, stride)
-        stride = builder.mul(stride, length)
+    strides = [size]
+    for length in reversed(lengths[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
     items = lengths[0]
     for length in lengths[1:]:
         items = builder.mul(items, length)
-    data = builder.load(builder.bitcast(start, array.data.type.as_pointer()), align=WORD)
+    place = context.data_model_manager[field].get_field_position
+    array = ir.Constant(context.get_value_type(field), None)
+    data = builder.load(builder.bitcast(start, array.type.elements[place("data")].as_pointer()), align=WORD)
     data.set_metadata("invariant.load", steady)
-    array.data = data
-    array.shape = cgutils.pack_array(builder, lengths, ty=ir.IntType(64))
-    array.strides = cgutils.pack_array(builder, strides, ty=ir.IntType(64))
-    array.itemsize = ir.IntType(64)(size)
-    array.nitems = items
-    array.meminfo = ir.Constant(array.meminfo.type, None)
-    array.parent = ir.Constant(array.parent.type, None)
-    return array._getvalue()
+    for part, value in (("data", data), ("nitems", items), ("itemsize", size)):
+        array = builder.insert_value(array, value, place(part))
+    for k in range(field.ndim):
+        array = builder.insert_value(array, lengths[k], [place("shape"), k])
+        array = builder.insert_value(array, strides[k], [place("strides"), k])
+    return array

@@ -1,4 +1,9 @@
-"""Plans of runs: the jobs that run the trials of a configuration, an instance or a record."""
+"""Plans of runs: the jobs that run the trials of a configuration, an instance or a record.
+
+All of them are known beforehand, each can run in any process and in any order. A session over a transport is another
+thing, though a user names its trials alike (`sessions.plan`): its trials are drawn one after another, without end if
+need be, for whoever drives, and share one line to them. What is the same of both stands here.
+"""
 
 from __future__ import annotations
 
@@ -50,10 +55,22 @@ class Plan:
             If the file can't be written.
         """
         done = sorted(results, key=lambda result: (result.instance.trial, str(result.record)))
-        if done and self.data is not None and self.configuration is not None:
-            instances = [result.instance for result in done]
-            TrialData.build(self.configuration, instances, self.began).write(self.data)
-        return ScoreSheet(tuple(result.score for result in done))
+        return concluded(done, self.configuration, self.data, self.began)
+
+
+def concluded(
+    results: Sequence[Result], configuration: Configuration | None, data: Path | None, began: datetime
+) -> ScoreSheet:
+    """Return the scores of finished trials, and write the trial data file `data` of a configuration, if it is given.
+
+    Raises
+    ------
+    InputError
+        If the file can't be written.
+    """
+    if results and data is not None and configuration is not None:
+        TrialData.build(configuration, [result.instance for result in results], began).write(data)
+    return ScoreSheet(tuple(result.score for result in results))
 
 
 def plan(
@@ -119,17 +136,15 @@ def plan(
     InputError
         If anything of this is wrong; then nothing has been written.
     """
-    found = load(source, rnd=rnd, seed=seed or 0)
-    if controller is None:
-        controller = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
-    controller = controllers.dressed(controller, shield=shield, sandbox=sandbox)
+    found = load_runnable(source, rnd=rnd, seed=seed or 0)
+    own = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
+    controller = controllers.dressed(
+        own if controller is None else controller, shield=shield, sandbox=sandbox
+    )
     controllers.load(controller)
     scores.columns(metrics)
     _check_deadline(deadline)
     check_choice(records, data, overwrite=overwrite, append=append)
-    if isinstance(found, RoadNetwork):
-        expected = "a trials configuration, a problem instance or a record"
-        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
     if isinstance(found, Configuration):
         configuration = found if simulator is None else found.with_simulator(simulator)
         count = found.number_trials if trials is None else trials
@@ -143,22 +158,33 @@ def plan(
         other_seed = None if seed == instance.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
-    if jobs and jobs[0].instance is not None:
-        check_simulator(
-            "--simulator" if simulator else os.fspath(source), jobs[0].instance.simulator, show=show
-        )
+    if (first := jobs[0].instance) is not None:
+        check_simulator("--simulator" if simulator else os.fspath(source), first.simulator, show=show)
     target = None if data is None else check_data_file(Path(data), overwrite_data)
-    several = [(job, run if repeat > 1 else None) for job in jobs for run in range(repeat)]
-    whole = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job, _ in several]
+    jobs = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job in jobs]
     if records is None:
-        return Plan(tuple(whole), configuration, target)
+        return Plan(tuple(job for job in jobs for _ in range(repeat)), configuration, target)
     folder = check_folder(records)
     kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)
-    left = [
-        _recorded(job, folder / name(job.trial, run)) for job, (_, run) in zip(whole, several, strict=True)
-    ]
-    left = [job for job in left if job.record is not None and job.record.name not in kept]
-    return Plan(tuple(left), configuration, target, len(whole) - len(left))
+    left = [job for job in _recorded(jobs, folder, repeat) if job.record and job.record.name not in kept]
+    return Plan(tuple(left), configuration, target, len(jobs) * repeat - len(left))
+
+
+def load_runnable(
+    source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None, seed: int
+) -> Configuration | Instance | Record:
+    """Return what `sources.load` does, if trials can be run of it.
+
+    Raises
+    ------
+    InputError
+        If it can't be read, or is a road network.
+    """
+    found = load(source, rnd=rnd, seed=seed)
+    if isinstance(found, RoadNetwork):
+        expected = "a trials configuration, a problem instance or a record"
+        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    return found
 
 
 def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:
@@ -183,8 +209,14 @@ def _drawn(configuration: Configuration, controller: str, trials: int, seed: int
     return jobs
 
 
-def _recorded(job: Job, record: Path) -> Job:
-    return replace(job, record=record, overwrite=record.exists())
+def _recorded(jobs: Sequence[Job], folder: Path, repeat: int) -> list[Job]:
+    """Return each job `repeat` times, each with its record in `folder`."""
+    found: list[Job] = []
+    for job in jobs:
+        for run in range(repeat):
+            record = folder / name(job.trial, run if repeat > 1 else None)
+            found.append(replace(job, record=record, overwrite=record.exists()))
+    return found
 
 
 def _refuse(source: str, options: dict[str, object]) -> None:

@@ -1,4 +1,7 @@
-"""Sessions over a transport, from what a user names: a configuration, an instance or a record."""
+"""Sessions over a transport, from what a user names: a configuration, an instance or a record.
+
+Unlike the jobs of a run (`runs.plan`), the trials of a session are drawn one after another, and share one line.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +25,11 @@ from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance, Laser
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
 from dubins_traffic.record.reader import Record
-from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.runs.plan import check_data_file
+from dubins_traffic.runs.plan import check_data_file, concluded, load_runnable
 from dubins_traffic.runs.record_folder import Earlier, check_choice, check_folder, claim
 from dubins_traffic.runs.single import Result, run_trial
-from dubins_traffic.runs.sources import load
 from dubins_traffic.scoring.score import ScoreSheet
 from dubins_traffic.sessions.foreign import run_under
 from dubins_traffic.sessions.remote import Session, hand_over, quiet, run_remote
@@ -209,10 +209,7 @@ class SessionPlan:
 
     def conclude(self, results: Sequence[Result]) -> ScoreSheet:
         """Return the scores, and write the trial data file if one was asked for."""
-        if results and self.data is not None and self.configuration is not None:
-            instances = [result.instance for result in results]
-            TrialData.build(self.configuration, instances, self.began).write(self.data)
-        return ScoreSheet(tuple(result.score for result in results))
+        return concluded(results, self.configuration, self.data, self.began)
 
 
 def session_plan(
@@ -266,10 +263,7 @@ def session_plan(
         If anything of this is wrong; then nothing has been written.
     """
     check_choice(records, data, overwrite=overwrite, append=append)
-    found = load(source, rnd=rnd, seed=seed or 0)
-    if isinstance(found, RoadNetwork):
-        expected = "a trials configuration, a problem instance or a record"
-        raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
+    found = load_runnable(source, rnd=rnd, seed=seed or 0)
     if controller is not None:
         controller = controllers.shielded(controller) if shield else controller
         controllers.load(controller)

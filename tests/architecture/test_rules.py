@@ -1,0 +1,37 @@
+"""What a rule of the road touches is what docs/extending/rule.md says, and nothing of a rule is missing."""
+
+from __future__ import annotations
+
+import re
+
+from dubins_traffic.rules.breach_log import RULE, RULES
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
+from dubins_traffic.viewer import marks
+from tests.architecture.house import PACKAGE, ROOT, modules
+
+PAGE = (ROOT / "docs" / "extending" / "rule.md").read_text(encoding="utf-8")
+LISTED = set(re.findall(r"^\| `src/dubins_traffic/([\w/]+\.py)`", PAGE, re.MULTILINE))
+KNOW_SOME = re.compile(r"(shield|synthesis|envs)/|scoring/margins|rules/duties|scoring/verdict|rules/task")
+"""What knows some rules by name and need not know another, as the page says."""
+
+
+def files_that_know(text: str) -> set[str]:
+    pattern = re.compile(text)
+    return {str(own.path.relative_to(PACKAGE)) for own in modules() if pattern.search(own.text)}
+
+
+def test_a_rule_touches_the_files_that_the_page_lists() -> None:
+    assert 0 < len(LISTED) <= 5
+    assert all((PACKAGE / file).is_file() for file in LISTED)
+    for rule, number in zip(EGO_RULES, RULE._fields, strict=False):
+        found = files_that_know(rf"\"{re.escape(rule)}\"|RULE\.{number}\b")
+        assert {file for file in found if not KNOW_SOME.match(file)} <= LISTED, rule
+        assert {"rules/breach_log.py", "viewer/marks.py"} <= found, rule
+
+
+def test_nothing_of_a_rule_is_missing() -> None:
+    assert len(RULE) == len(RULES)
+    assert set(marks.RULES) == set(RULES)
+    anchors = set(re.findall(r'<a id="([^"]+)">', (ROOT / "docs" / "rules.md").read_text(encoding="utf-8")))
+    assert set(RULES) <= anchors
+    assert {rule.partition(".")[0] for rule in RULES if rule not in EGO_RULES} <= set(ASSUMPTIONS)
