@@ -54,11 +54,11 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         ],
         **({"metrics": metrics, "columns": columns} if metrics else {}),
         "versions": {
-            "dubins-traffic": version("dubins-traffic"),
+            "dubins-traffic": package_version(),
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },
-        "code": _hash_of_code(),
+        "code": hash_of_code(),
     }
 
 
@@ -188,7 +188,12 @@ def _hash_of_file(place: str) -> str | None:
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.suffix == ".py" and path.is_file() else None
 
 
-def _hash_of_code() -> str:
+def package_version() -> str:
+    """Return the version of this package."""
+    return version("dubins-traffic")
+
+
+def hash_of_code() -> str:
     """Return one hash over the sources of this package."""
     root = Path(str(resources.files("dubins_traffic")))
     digest = hashlib.sha256()
