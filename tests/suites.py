@@ -6,6 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.problem.draw import draw
+
 
 def document(**changes: Any) -> dict[str, Any]:
     """Return the document of a suite of two controllers and two cells of two trials, with `changes`."""
@@ -39,6 +43,16 @@ def games(**changes: Any) -> dict[str, Any]:
         {**own, "name": "two", "cars": 2, "assume": "E6", "positions": 1988, "winning": 0},
     ]
     return {"version": 0, "name": "small-games", "title": "Small", "games": entries, **changes}
+
+
+def cases(**changes: Any) -> dict[str, Any]:
+    """Return the document of a suite of three cases, with `changes`."""
+    town = document()["campaign"]["configurations"][0]["document"]
+    instances = [draw(load_config(town), 3, trial) for trial in range(3)]
+    entries = [
+        {"name": f"case-{k}", "document": instance_to_document(one)} for k, one in enumerate(instances)
+    ]
+    return {"version": 0, "name": "small-cases", "title": "Small", "cases": entries, **changes}
 
 
 def written(path: Path, some: dict[str, Any]) -> Path:

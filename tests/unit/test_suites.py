@@ -16,13 +16,14 @@ from referencing import Registry, Resource
 from dubins_traffic.campaign.report.statistics import estimate, share
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.schema import ID, schema_text, shipped_schema
+from dubins_traffic.suites.cases import run_cases
 from dubins_traffic.suites.comparing import compare_trials, open_sources
 from dubins_traffic.suites.games import Solver, agrees, check_command, run_games
 from dubins_traffic.suites.run_suite import run_suite
 from dubins_traffic.suites.schema import result_schema, shipped_suite_schemas, suite_schema
 from dubins_traffic.suites.suite import Suite, load_suite, shipped_suites
 from dubins_traffic.suites.writing import TABLE, results, write_results
-from tests.suites import document, games
+from tests.suites import cases, document, games
 
 FROZEN = {
     "icra2016": "779b298b49a05cdbb1f444621be1f8253f8cb9d5ad46f2c60f965a9ecbcc9057",
@@ -258,3 +259,45 @@ def test_commands_that_are_none_are_refused() -> None:
     assert entry is not None
     with pytest.raises(InputError, match="can't be run"):
         Solver("x", "/nowhere/solver {game}").solve(entry[0])
+
+
+def test_cases_are_run_alike_by_one_worker_and_by_two(tmp_path: Path) -> None:
+    suite = Suite.from_document(cases())
+    paths = [run_cases(suite, tmp_path / str(n), ["rules", "simple"], workers=n) for n in (1, 2)]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    made = results(suite, open_sources([f"ada={paths[0]}", f"bob={paths[1]}"]))
+    assert "| case | ada rules | ada simple | bob rules | bob simple |" in made[TABLE]
+    columns = json.loads(paths[0].read_text())["entries"][0]["columns"]
+    assert f"| clean | {sum(columns['clean'])} of 3 [" in made[TABLE]
+    assert made["index.html"].count("<td data-head=") >= 12
+    with pytest.raises(InputError, match="holds results"):
+        run_cases(suite, tmp_path / "1", ["rules", "simple"])
+
+
+def test_cases_that_are_there_are_not_run_again(tmp_path: Path) -> None:
+    suite = Suite.from_document(cases())
+    path = run_cases(suite, tmp_path, ["simple"])
+    kept = tmp_path / "cases.jsonl"
+    lines = kept.read_text().splitlines(keepends=True)
+    kept.write_text("".join(lines[:2]))
+    told: list[tuple[int, int]] = []
+    before = path.read_bytes()
+    again = run_cases(
+        suite, tmp_path, ["simple"], resume=True, progress=lambda done, total: told.append((done, total))
+    )
+    assert again.read_bytes() == before
+    assert told == [(2, 3), (3, 3)]
+    kept.write_text(lines[0].replace(suite.hash, "0" * 64))
+    with pytest.raises(InputError, match="results of another suite"):
+        run_cases(suite, tmp_path, ["simple"], resume=True)
+
+
+def test_cases_that_leave_something_to_be_drawn_are_refused(tmp_path: Path) -> None:
+    entries = cases()["cases"]
+    del entries[1]["document"]["duration"]
+    suite = Suite.from_document(cases(cases=entries))
+    with pytest.raises(InputError, match=r"case-1\.duration: a case that leaves something to be drawn"):
+        run_cases(suite, tmp_path, ["simple"])
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(InputError, match="a suite without cases"):
+        run_cases(Suite.from_document(games()), tmp_path, ["simple"])

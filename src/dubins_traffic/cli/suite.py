@@ -67,6 +67,8 @@ def show(name: Name, json: options.Json = False) -> None:
 
 def _contents(found: Suite) -> list[str]:
     """Return what is in a suite, a line each."""
+    if found.model.cases is not None:
+        return [f"  {case.name}" for case in found.model.cases]
     if found.model.campaign is None:
         return [
             f"  {game.name}: {game.positions:,} positions, the ego wins from {game.winning:,}"
@@ -142,10 +144,12 @@ def run(
 
     found = load_suite(name)
     _check_options(found, controllers, trials, workers, solver)
-    if found.model.games is None:
-        path = _trials(found, Path(folder), controllers or [], trials, workers, resume=resume)
-    else:
+    if found.model.games is not None:
         path = _games(found, Path(folder), solver, seconds, resume=resume)
+    elif found.model.cases is not None:
+        path = _cases(found, Path(folder), controllers or [], workers, resume=resume)
+    else:
+        path = _trials(found, Path(folder), controllers or [], trials, workers, resume=resume)
     report = Path(folder) / "report"
     print(write_results(found, open_sources([str(path)]), report), end="")
     options.tell(str(path), str(report / PAGE))
@@ -155,11 +159,15 @@ def _check_options(
     found: Suite, controllers: list[str] | None, trials: int | None, workers: int | None, solver: str | None
 ) -> None:
     """Refuse options that say nothing for a suite of this kind."""
-    of_trials = {"--controller": controllers, "--trials": trials, "--workers": workers}
-    of_games = {"--solver": solver}
-    for option, value in (of_games if found.model.games is None else of_trials).items():
-        if value is not None:
-            kind = "trials" if found.model.games is None else "games"
+    given = {"--controller": controllers, "--trials": trials, "--workers": workers, "--solver": solver}
+    kind = "games" if found.model.games else "cases" if found.model.cases else "trials"
+    known = {
+        "trials": ("--controller", "--trials", "--workers"),
+        "cases": ("--controller", "--workers"),
+        "games": ("--solver",),
+    }
+    for option, value in given.items():
+        if value is not None and option not in known[kind]:
             raise InputError(
                 f"nothing for a suite of {kind}", file=option, value=value, expected="no such option"
             )
@@ -185,6 +193,23 @@ def _trials(
             )
     except KeyboardInterrupt:
         faults.tell(f"interrupted; {kept(folder)} trials are kept, --resume goes on")
+        raise typer.Exit(faults.FAILED) from None
+
+
+def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | None, *, resume: bool) -> Path:
+    import os
+
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.suites.cases import run_cases
+
+    if not controllers:
+        raise InputError("missing", file="--controller", expected="who drives in the cases")
+    count = workers or os.cpu_count() or 1
+    try:
+        with progress() as tell:
+            return run_cases(found, folder, controllers, workers=count, resume=resume, progress=tell)
+    except KeyboardInterrupt:
+        faults.tell("interrupted; the cases that are finished are kept, --resume goes on")
         raise typer.Exit(faults.FAILED) from None
 
 

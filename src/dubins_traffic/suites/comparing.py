@@ -75,7 +75,9 @@ def entry_name(source: Source, own: str, count: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Named:
+class Named:
+    """An entry of a source, and what it is called beside the others."""
+
     name: str
     entry: TrialsEntry
     source: Source
@@ -97,7 +99,7 @@ def compare_trials(suite: Suite, sources: Sequence[Source]) -> tuple[Comparison,
         If the suite is another one here, a name stands twice, or a file has not the trials of the suite.
     """
     check_suite(suite, sources)
-    named = _named(sources)
+    named = named_entries(sources)
     names = [one.name for one in named]
     campaign = suite.campaign(names, sources[0].found.trials, places=tuple(names))
     parts = [_part(campaign, k, one) for k, one in enumerate(named)]
@@ -108,8 +110,9 @@ def compare_trials(suite: Suite, sources: Sequence[Source]) -> tuple[Comparison,
     return compare(campaign, results, clock), _made(suite, named)
 
 
-def _named(sources: Sequence[Source]) -> list[_Named]:
-    found: list[_Named] = []
+def named_entries(sources: Sequence[Source]) -> list[Named]:
+    """Return the entries of all sources, named; InputError if a name stands twice."""
+    found: list[Named] = []
     for source in sources:
         for entry in source.found.entries:
             name = entry_name(source, entry.controller, len(source.found.entries))
@@ -117,11 +120,11 @@ def _named(sources: Sequence[Source]) -> list[_Named]:
                 raise InputError(
                     "name taken", file=str(source.path), value=name, expected="NAME=PATH with another name"
                 )
-            found.append(_Named(name, entry, source))
+            found.append(Named(name, entry, source))
     return found
 
 
-def _part(campaign: Campaign, index: int, one: _Named) -> Any:
+def _part(campaign: Campaign, index: int, one: Named) -> Any:
     """Return the trials of an entry with the numbers that they have in a campaign, as controller number `index`."""
     numbers = [
         cell.first + index * cell.count + trial for cell in campaign.cells for trial in range(cell.count)
@@ -134,7 +137,7 @@ def _part(campaign: Campaign, index: int, one: _Named) -> Any:
         raise error.within(file=str(one.source.path), field=one.entry.controller) from None
 
 
-def _made(suite: Suite, named: Sequence[_Named]) -> Mapping[str, Any]:
+def _made(suite: Suite, named: Sequence[Named]) -> Mapping[str, Any]:
     codes = {one.source.found.code: one.source.found.package for one in named}
     (code, package), *others = codes.items()
     versions = {"suite": suite.name, "dubins-traffic": package}

@@ -38,8 +38,15 @@ class GameEntry(Strict):
         return self
 
 
+class CaseEntry(Strict):
+    """A case: an instance in full detail, as `falsify` finds them."""
+
+    name: str = Field(pattern=NAME, max_length=80, description="what it is called in tables")
+    document: dict[str, Any] = Field(description="the instance, version 1, with starts, duration and seed")
+
+
 class SuiteModel(Strict):
-    """A suite: trials as a campaign has them, or games. What it says never changes; a new one gets a new name."""
+    """A suite: trials as a campaign has them, cases, or games. It never changes; what is another gets another name."""
 
     version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
     name: str = Field(pattern=NAME, max_length=40, description="its name, such as rules-2026")
@@ -49,20 +56,24 @@ class SuiteModel(Strict):
         default=None,
         description="its trials; the controllers are those of the page of results, and no part of the hash",
     )
+    cases: Annotated[list[CaseEntry], Field(min_length=1)] | None = Field(
+        default=None, description="its cases, a trial each"
+    )
     games: Annotated[list[GameEntry], Field(min_length=1)] | None = Field(
         default=None, description="its games of cells"
     )
 
     @model_validator(mode="after")
     def _one_kind(self) -> SuiteModel:
-        if (self.campaign is None) == (self.games is None):
-            raise fault("not one kind of suite", "either campaign or games")
+        if [self.campaign, self.cases, self.games].count(None) != 2:
+            raise fault("not one kind of suite", "one of campaign, cases and games")
         if self.metric not in SCORES:
             raise fault("unknown column of a score", "one of " + ", ".join(SCORES), "metric", self.metric)
-        names = [game.name for game in self.games or ()]
+        kind = "games" if self.games else "cases"
+        names = [entry.name for entry in (*(self.games or ()), *(self.cases or ()))]
         for k, name in enumerate(names):
             if name in names[:k]:
-                raise fault("name taken", "a name of its own", f"games[{k}].name", name)
+                raise fault("name taken", "a name of its own", f"{kind}[{k}].name", name)
         if self.campaign is not None and self.campaign.trials is None:
             raise fault("trials left out", "trials of each combination", "campaign.trials")
         return self

@@ -110,7 +110,7 @@ class Suite:
         """
         own = self.document.get("campaign")
         if own is None or self.trials is None:
-            raise InputError("a suite of games, which has no trials", file=self.file or self.name)
+            raise InputError("a suite of another kind, which is no campaign", file=self.file or self.name)
         if trials is not None and not 1 <= trials <= self.trials:
             raise InputError(
                 "not a number of its trials", file="--trials", value=trials, expected=f"1 to {self.trials}"

@@ -8,6 +8,7 @@ from pathlib import Path
 from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.files import make_folder, write_text
+from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
 from dubins_traffic.suites.comparing import Source, compare_trials
 from dubins_traffic.suites.games_page import answers_of, games_page, games_table
 from dubins_traffic.suites.markdown import trials_table
@@ -23,8 +24,11 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     Raises
     ------
     InputError
-        As `compare_trials` and `answers_of`.
+        As `compare_trials`, `columns_of` and `answers_of`.
     """
+    if suite.model.cases is not None:
+        found = columns_of(suite, sources)
+        return {TABLE: cases_table(suite, found), PAGE: cases_page(suite, found)}
     if suite.model.games is not None:
         answers = answers_of(suite, sources)
         return {TABLE: games_table(suite, answers), PAGE: games_page(suite, answers)}
