@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,9 +17,11 @@ from typing import Any
 
 import pytest
 
+from dubins_traffic.campaign.manifest import hash_of_code
 from dubins_traffic.cli import listing, options
 from dubins_traffic.cli.main import main
 from dubins_traffic.cli.tables import NOTE
+from dubins_traffic.cli.version import commit_of
 from dubins_traffic.controllers import registry
 from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.problem.trial_data import TrialData
@@ -103,7 +106,24 @@ def test_help_without_a_command(run):
 def test_version(run):
     import dubins_traffic
 
-    assert run("--version") == f"dubins-traffic {dubins_traffic.__version__}\n"
+    version, commit, code = run("--version").splitlines()
+    assert version == f"dubins-traffic {dubins_traffic.__version__}"
+    assert re.fullmatch(r"commit ([0-9a-f]{40}|unknown)", commit)
+    assert code == f"code {hash_of_code()}"
+
+
+def test_the_commit_of_a_checkout_is_told(tmp_path):
+    assert list(commit_of(tmp_path)) == []
+    git = tmp_path / ".git"
+    git.mkdir()
+    (git / "HEAD").write_text("ref: refs/heads/main\n")
+    (git / "packed-refs").write_text(f"# pack-refs\n{'a' * 40} refs/heads/main\n")
+    assert list(commit_of(tmp_path)) == ["a" * 40]
+    (git / "refs" / "heads").mkdir(parents=True)
+    (git / "refs" / "heads" / "main").write_text(f"{'b' * 40}\n")
+    assert list(commit_of(tmp_path)) == ["b" * 40]
+    (git / "HEAD").write_text("c" * 40)
+    assert list(commit_of(tmp_path)) == ["c" * 40]
 
 
 def test_a_grid_is_printed_in_both_containers(run):

@@ -52,7 +52,10 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def _options(  # pyright: ignore[reportUnusedFunction]
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False,
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version, the commit and the hash of the code, and leave."),
+    ] = False,
     debug: Annotated[  # noqa: ARG001
         bool, typer.Option("--debug", help="Show the traceback of an error. Stands before the command.")
     ] = False,
@@ -62,9 +65,9 @@ def _options(  # pyright: ignore[reportUnusedFunction]
     CONFIG may be a file or the name of a shipped configuration, such as [b]demo[/b]; `-` reads standard input.
     """
     if version:
-        from importlib.metadata import version as installed
+        from dubins_traffic.cli.version import version_text
 
-        print(f"{faults.PROGRAM} {installed(faults.PROGRAM)}")
+        print(version_text(faults.PROGRAM))
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())

@@ -57,11 +57,11 @@ def cases_page(suite: Suite, found: Mapping[str, Columns]) -> str:
 
 def _body(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
-    rows = [[case.name, *(_told(own, k) for own in found.values())] for k, case in enumerate(cases)]
+    rows = [[case.name, *(_said(own, k) for own in found.values())] for k, case in enumerate(cases)]
     return [*rows, ["clean", *(_clean(own) for own in found.values())]]
 
 
-def _told(columns: Columns, case: int) -> str:
+def _said(columns: Columns, case: int) -> str:
     """Return the verdict on a case, and how many rules the ego broke."""
     verdict, broken = columns["verdict"][case], columns["breaches"][case]
     if verdict is None:
