@@ -16,6 +16,7 @@ from referencing import Registry, Resource
 from dubins_traffic.campaign.report.statistics import estimate, share
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.schema import ID, schema_text, shipped_schema
+from dubins_traffic.suites import gather
 from dubins_traffic.suites.cases import run_cases
 from dubins_traffic.suites.comparing import compare_trials, open_sources
 from dubins_traffic.suites.games import Solver, agrees, check_command, run_games
@@ -301,3 +302,29 @@ def test_cases_that_leave_something_to_be_drawn_are_refused(tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
     with pytest.raises(InputError, match="a suite without cases"):
         run_cases(Suite.from_document(games()), tmp_path, ["simple"])
+
+
+def test_a_folder_of_cases_becomes_a_suite(tmp_path: Path) -> None:
+    folder = tmp_path / "cases"
+    for entry, place in zip(
+        cases()["cases"], ("lanes/3.order", "lanes/wide_group", "rules/1.road"), strict=True
+    ):
+        path = folder / f"{place}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(entry["document"]))
+    file = tmp_path / "suite.json"
+    words = ["own-2026", "Own", str(folder), str(file)]
+    gather.main(words)
+    suite = load_suite(file)
+    assert [entry.name for entry in suite.model.cases or ()] == [
+        "lanes-3-order",
+        "lanes-wide-group",
+        "rules-1-road",
+    ]
+    assert [entry.document for entry in suite.model.cases or ()] == [
+        entry["document"] for entry in cases()["cases"]
+    ]
+    with pytest.raises(InputError, match="exists already"):
+        gather.main(words)
+    with pytest.raises(InputError, match="no case in it"):
+        gather.gather("own", "Own", tmp_path / "nowhere")
