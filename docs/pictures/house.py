@@ -23,7 +23,7 @@ TRIALS = {
 WHAT = {
     "cli": "one short file a command",
     "service": "accounts, the queue, pages, workers",
-    "competition": "phases, submissions of strangers, places",
+    "competition": "phases, submissions, places; frozen sets of problems, results",
     "campaign": "many trials and their reports; a check of controllers; bags and logs",
     "sessions": "drivers or worlds in other processes",
     "envs": "environments for learning",

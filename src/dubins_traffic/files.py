@@ -141,6 +141,29 @@ def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool =
             neighbour.unlink(missing_ok=True)
 
 
+def make_folder(folder: Path, what: str) -> None:
+    """Make a folder unless it is there.
+
+    Parameters
+    ----------
+    folder : Path
+        Where.
+    what : str
+        What it is to hold, for the message.
+
+    Raises
+    ------
+    InputError
+        If that can't be done.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"can't hold {what} ({error.strerror})", file=str(folder), expected="a folder, or a place for one"
+        ) from None
+
+
 @contextlib.contextmanager
 def locked(folder: Path) -> Generator[None]:
     """Hold the lock of a folder; the system lets go of it when this process ends, however it ends.

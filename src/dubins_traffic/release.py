@@ -52,8 +52,13 @@ def _commit() -> str | None:
     if BUILT.exists():
         return BUILT.read_text(encoding="ascii").strip() or None
     root = PACKAGE.parents[1]
-    git = root / ".git"
-    if not (root / "pyproject.toml").exists() or not git.exists():
+    return commit_of(root) if (root / "pyproject.toml").exists() else None
+
+
+def commit_of(checkout: Path) -> str | None:
+    """Return the commit that a checkout is at, None if it is none."""
+    git = checkout / ".git"
+    if not git.exists():
         return None
     folder = git if git.is_dir() else Path(git.read_text(encoding="utf-8").removeprefix("gitdir: ").strip())
     return _resolved(folder, (folder / "HEAD").read_text(encoding="utf-8").strip())

@@ -23,7 +23,7 @@ from dubins_traffic.cli.tables import NOTE
 from dubins_traffic.controllers import registry
 from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.problem.trial_data import TrialData
-from dubins_traffic.release import sources_hash
+from dubins_traffic.release import commit_of, sources_hash
 from dubins_traffic.roads.network import RoadNetwork
 
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
@@ -109,6 +109,20 @@ def test_version(run):
     assert version == f"dubins-traffic {dubins_traffic.__version__}"
     assert re.fullmatch(r"commit (unknown|[0-9a-f]{40})", commit)
     assert sources == f"sources sha256 {sources_hash()}"
+
+
+def test_the_commit_of_a_checkout_is_told(tmp_path):
+    assert commit_of(tmp_path) is None
+    git = tmp_path / ".git"
+    git.mkdir()
+    (git / "HEAD").write_text("ref: refs/heads/main\n")
+    (git / "packed-refs").write_text(f"# pack-refs\n{'a' * 40} refs/heads/main\n")
+    assert commit_of(tmp_path) == "a" * 40
+    (git / "refs" / "heads").mkdir(parents=True)
+    (git / "refs" / "heads" / "main").write_text(f"{'b' * 40}\n")
+    assert commit_of(tmp_path) == "b" * 40
+    (git / "HEAD").write_text("c" * 40)
+    assert commit_of(tmp_path) == "c" * 40
 
 
 def test_a_grid_is_printed_in_both_containers(run):

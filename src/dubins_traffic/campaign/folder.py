@@ -14,7 +14,7 @@ from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.records import FOLDER as RECORDS
 from dubins_traffic.campaign.records import Keep, Records, read_keep
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import LOCK, locked, replace_file
+from dubins_traffic.files import LOCK, locked, make_folder, replace_file
 
 PARTS = "parts"
 _PART = re.compile(r"(\d{9})-(\d{9})\.parquet")
@@ -133,7 +133,7 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
         If the folder holds something else, another campaign or a changed one, is in use or can't be written.
     """
     read_keep(records or Keep.NONE)
-    _make(path)
+    make_folder(path, "a campaign")
     with locked(path):
         known = manifest.read(path)
         if known is None:
@@ -149,21 +149,11 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
         keep, sample = read_keep(known["records"])
         own = None if keep is Keep.NONE else Records(path.resolve(), keep, sample, campaign.total)
         for name in (PARTS, *(() if own is None else (RECORDS,))):
-            _make(path / name)
+            make_folder(path / name, "a campaign")
         for name in (".", PARTS):
             for left in (path / name).glob(".*.tmp"):
                 left.unlink()
         yield Folder(path, campaign, own)
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        expected = "a folder, or a place for one"
-        raise InputError(
-            f"can't hold a campaign ({error.strerror})", file=str(folder), expected=expected
-        ) from None
 
 
 def _check_empty(folder: Path) -> None:

@@ -36,7 +36,7 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
     """
     places = zip(campaign.controllers, campaign.places, strict=True)
     metrics = [
-        {"name": spec, "place": place, "file": _hash_of_file(place)}
+        {"name": spec, "place": place, "file": hash_of_file(place)}
         for spec, place in zip(campaign.model.metrics, campaign.metrics, strict=True)
     ]
     columns = [asdict(column) for column in campaign.columns]
@@ -50,11 +50,11 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
             entry["name"]: _hash(entry["document"]) for entry in campaign.document["configurations"]
         },
         "controllers": [
-            {"name": name, "place": place, "file": _hash_of_file(place)} for name, place in places
+            {"name": name, "place": place, "file": hash_of_file(place)} for name, place in places
         ],
         **({"metrics": metrics, "columns": columns} if metrics else {}),
         "versions": {
-            "dubins-traffic": version("dubins-traffic"),
+            "dubins-traffic": package_version(),
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },
@@ -182,10 +182,15 @@ def _hash(document: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
-def _hash_of_file(place: str) -> str | None:
+def hash_of_file(place: str) -> str | None:
     """Return the hash of a controller's file, None if it is given by name."""
     path = Path(place.rpartition(":")[0])
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.suffix == ".py" and path.is_file() else None
+
+
+def package_version() -> str:
+    """Return the version of this package."""
+    return version("dubins-traffic")
 
 
 def _writer(data: bytes) -> Callable[[Path], object]:

@@ -87,7 +87,7 @@ def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = K
                 raise InputError("has other columns", file=str(whole), expected=expected)
             return found
         empty = _schema(campaign, kind).empty_table()
-        return made.concat_tables([empty, *(_shaped(campaign, _load(part), kind) for part in parts)])
+        return made.concat_tables([empty, *(shaped(campaign, _load(part), kind) for part in parts)])
     except (OSError, made.ArrowInvalid) as error:
         raise InputError(f"can't be read ({error})", file=str(whole)) from None
 
@@ -117,7 +117,7 @@ def _groups(campaign: Campaign, parts: Sequence[Path], kind: Kind) -> Iterator[A
     waiting: list[Any] = []
     count = 0
     for part in parts:
-        waiting.append(_shaped(campaign, _load(part), kind))
+        waiting.append(shaped(campaign, _load(part), kind))
         count += len(waiting[-1])
         while count >= GROUP:
             joined = made.concat_tables(waiting).combine_chunks()
@@ -153,8 +153,8 @@ def _type(campaign: Campaign, factor: str) -> Any:
     return made.float64() if kinds <= {int, float} else made.string()
 
 
-def _shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
-    """Return rows of a part as rows of a table: with the columns that say which trials they are."""
+def shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
+    """Return rows of a part as rows of a table of a campaign: with the columns that say which trials they are."""
     made = rows.arrow()
     schema = _schema(campaign, kind)
     if kind is Kind.WALL:

@@ -31,6 +31,7 @@ from dubins_traffic.cli import (
     session,
     spec,
     submit,
+    suite,
     synth,
     template,
     verify,
@@ -90,6 +91,7 @@ app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
 app.add_typer(competition.competition, name="competition")
+app.add_typer(suite.suite, name="suite")
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.command("template", epilog=template.EXAMPLES)(template.template)
 transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items()}

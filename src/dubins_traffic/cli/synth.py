@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_text
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,6 +21,7 @@ EXAMPLES = options.examples(
     "synth demo --cars 2",
     "synth first.json --assume E1,E2,E4,E5,E6 --explain",
     "synth first.json --order-degree 1 -o first.npz --json",
+    "synth first.json --spec game.structuredslugs",
 )
 
 SourceArgument = Annotated[
@@ -63,6 +65,14 @@ GraphOption = Annotated[
     str | None,
     typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
 ]
+SpecOption = Annotated[
+    str | None,
+    typer.Option(
+        "--spec",
+        metavar="FILE",
+        help="Write the game as a specification: `*.structuredslugs`, `*.tlsf`, or `*.py` for TuLiP.",
+    ),
+]
 OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace files that exist; else they are refused.")
 ]
@@ -87,6 +97,7 @@ def synth(
     order_degree: OrderDegreeOption = None,
     strategy: StrategyOption = None,
     graph: GraphOption = None,
+    spec: SpecOption = None,
     overwrite: OverwriteOption = False,
     explain: ExplainOption = False,
     memory: MemoryOption = None,
@@ -98,14 +109,20 @@ def synth(
 
     Ctrl-C ends it soon; nothing is written then.
     """
+    from dubins_traffic.files import write_text
     from dubins_traffic.synthesis.answer import answer
+    from dubins_traffic.synthesis.archive import check_target
     from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
+    from dubins_traffic.synthesis.instance import start_cells
+    from dubins_traffic.synthesis.specification import specification_text
     from dubins_traffic.synthesis.strategy import Strategy
 
     for option, name in (("--output", strategy), ("--graph", graph)):
         if name is not None:
             _check_archive(option, name, overwrite=overwrite)
+    if spec is not None:
+        check_target(spec, overwrite=overwrite)
     instance = _instance(source, seed, trial)
     with _progress() as progress:
         found = answer(
@@ -119,6 +136,9 @@ def synth(
         reasons = found.explain(progress) if explain else []
     if graph is not None:
         save_game(found.solution.game, graph)
+    if spec is not None:
+        board = found.solution.game.board
+        write_text(spec, specification_text(board, start_cells(board, instance), Path(spec).suffix))
     if strategy is not None:
         won = Strategy.of(found.solution)
         won.first()

@@ -8,6 +8,7 @@ from typing import Any, Final, cast
 
 from dubins_traffic import outside
 from dubins_traffic.controllers import blame
+from dubins_traffic.files import begins_with, is_file
 from dubins_traffic.outside import Seam
 from dubins_traffic.protocols import Controller
 
@@ -35,6 +36,8 @@ SANDBOXED: Final = "+sandbox"
 """What ends the name of a controller that drives in a box (`dubins_traffic.sandbox`), before that of a shield; behind
 it there may be limits, as in ``my.py:Mine+sandbox,memory=512M``."""
 SANDBOX: Final = re.compile(re.escape(SANDBOXED) + r"(?P<limits>(?:,[\w=.+-]*)*)$")
+CLASS_FIRST: Final = b"class TulipStrategy"
+"""What a strategy that TuLiP has written in Python begins with; it is read, not run."""
 _SEAM = Seam(
     "--controller",
     "controller",
@@ -58,6 +61,8 @@ def load(spec: str) -> Controller:
     if spec.endswith(".npz"):
         learned = _module("learned")
         return cast(Controller, (learned if learned.is_policy(spec) else _module("synthesized")).player(spec))
+    if is_file(spec) and (not spec.endswith(".py") or begins_with(spec, CLASS_FIRST)):
+        return cast(Controller, _module("synthesized").foreign_player(spec))
     if not outside.is_place(spec):
         raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(BUILT_IN)))
     return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))

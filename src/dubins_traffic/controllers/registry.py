@@ -72,7 +72,8 @@ def load(spec: str) -> Controller:
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
         directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
         strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`; a policy of
-        `controllers.learned`, ``NAME.npz`` too, drives. Followed by
+        `controllers.learned`, ``NAME.npz`` too, drives. A strategy of another tool (`synthesis.foreign`), told by the
+        content of its file, is played by `synthesized`. Followed by
         ``+shield``: the same under the shield; by ``+shield:law`` or ``+shield:never`` under one that overtakes
         otherwise (`controllers.shield.Shield`). Followed by ``+sandbox``: the same in a box (`dubins_traffic.sandbox`).
 

@@ -21,13 +21,18 @@ from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.shield.filter import ShieldFilter
-from dubins_traffic.synthesis.advice import Advice, advise
+from dubins_traffic.synthesis.advice import Advice, Adviser, Ranked
 from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.foreign.adviser import MachineAdviser
+from dubins_traffic.synthesis.foreign.labelled import missing
+from dubins_traffic.synthesis.foreign.machine import Machine
+from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight
 from dubins_traffic.synthesis.sightings import Sighting
 from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.specification import inputs_of, outputs_of
 from dubins_traffic.synthesis.strategy import Strategy
 
 if TYPE_CHECKING:
@@ -55,7 +60,7 @@ class _Pursuit:
     the goals of the stages, by their places in the arena, and `vertices` their intersections.
     """
 
-    strategy: Strategy
+    adviser: Adviser
     play: RoadPlay
     ways: Floats
     goals: list[int]
@@ -71,8 +76,8 @@ class Synthesized(Rules):
 
     Parameters
     ----------
-    strategy : Strategy, optional
-        What to play; found when the trial starts, if not given.
+    strategy : Strategy or Machine, optional
+        What to play, ours or another tool's; found when the trial starts, if not given.
 
     Notes
     -----
@@ -82,7 +87,7 @@ class Synthesized(Rules):
     shield overtakes as `rules` does: a car that is parked for good is often what has broken the assumption.
     """
 
-    def __init__(self, strategy: Strategy | None = None) -> None:
+    def __init__(self, strategy: Strategy | Machine | None = None) -> None:
         super().__init__()
         self._strategy = strategy
         self._pursuit: _Pursuit | None = None
@@ -95,17 +100,17 @@ class Synthesized(Rules):
         drivers = self._drivers
         if drivers is None or not problem.e_agents:
             return
-        strategy = _solved(problem) if self._strategy is None else _fitting(self._strategy, problem)
+        adviser = _adviser(self._strategy, problem)
         self._shield_filter.start(problem)
         rules = RuleParameters.from_mapping(problem.rules)
         self._period = problem.period
         self._edge = problem.intersection_radius + problem.car.body.reach + MARGIN
         self._patience = (rules.forfeit_time - HURRY) * problem.rate
-        arena = strategy.board.arena
+        arena = adviser.board.arena
         vertices: list[int] = drivers.stage.tolist()
         self._pursuit = _Pursuit(
-            strategy,
-            RoadPlay(strategy.board, _sight(problem), ("ego", *problem.e_agents)),
+            adviser,
+            RoadPlay(adviser.board, _sight(problem), ("ego", *problem.e_agents)),
             _ways(drivers, [arena.network.arms(v) for v in vertices]),
             [arena.goals.index(v) for v in vertices],
             vertices,
@@ -162,18 +167,17 @@ class Synthesized(Rules):
         assert drivers is not None
         stages = len(pursuit.goals)
         goal, following = pursuit.goals[pursuit.stage], pursuit.goals[(pursuit.stage + 1) % stages]
-        position = pursuit.play.position
-        if position is not None:
-            self._note_wins(pursuit, pursuit.strategy.wins(position))
+        if pursuit.play.position is not None:
+            self._note_wins(pursuit, pursuit.adviser.wins(pursuit.play))
         drivers.distance[0] = pursuit.ways[pursuit.stage]
         pursuit.advice = None
         if seen.propositions.crosses >= 0:
             return
-        pursuit.advice = advise(pursuit.strategy, pursuit.play, goal, following)
+        pursuit.advice = pursuit.adviser.advise(pursuit.play, goal, following)
         if pursuit.advice is None or not pursuit.advice.exits:
             return
         lane = seen.propositions.lane
-        node = pursuit.strategy.board.arena.nodes[pursuit.advice.node]
+        node = pursuit.adviser.board.arena.nodes[pursuit.advice.node]
         for place, out in enumerate(_liked(pursuit.advice.exits, node.exits, drivers.distance[0])):
             back = BACK if out == lane ^ 1 and len(node.exits) > 1 else 0.0
             drivers.distance[0, out] = SECOND_BEST * place - back
@@ -201,7 +205,7 @@ class Synthesized(Rules):
             return command
         if drivers.car[0, EGO].turn > self._patience:
             return command
-        x, y = self._points[pursuit.strategy.board.arena.nodes[advice.node].vertex]
+        x, y = self._points[pursuit.adviser.board.arena.nodes[advice.node].vertex]
         room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)
         if command.speed * self._period <= room:
             return command
@@ -211,6 +215,11 @@ class Synthesized(Rules):
 def player(file: str) -> Synthesized:
     """Return the controller that plays the strategy in a file; InputError if it can't be read."""
     return Synthesized(Strategy.load(file))
+
+
+def foreign_player(file: str) -> Synthesized:
+    """Return the controller that plays the strategy of another tool in a file; InputError if it can't be read."""
+    return Synthesized(read_machine(file))
 
 
 def _liked(free: Sequence[int], exits: Sequence[int], distance: Floats) -> list[int]:
@@ -232,6 +241,20 @@ def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
     for stage, lanes in enumerate(arms):
         found[stage, list(lanes)] = drivers.distance[(stage + 1) % len(arms), list(lanes)]
     return found
+
+
+def _adviser(strategy: Strategy | Machine | None, problem: Problem) -> Adviser:
+    """Return who says what to do in a trial; InputError if the game is too large, or the strategy another one's."""
+    if strategy is None:
+        return Ranked(_solved(problem))
+    if isinstance(strategy, Strategy):
+        return Ranked(_fitting(strategy, problem))
+    board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
+    unknown = missing(board, strategy.names)
+    if unknown is not None:
+        expected = f"the propositions {', '.join((*inputs_of(board), *outputs_of(board)))}"
+        raise InputError("a strategy for another problem", field=unknown, expected=expected)
+    return MachineAdviser(board, strategy)
 
 
 def _solved(problem: Problem) -> Strategy:

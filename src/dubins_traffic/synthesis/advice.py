@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
+from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.road_play import EGO_CAR, RoadPlay
 from dubins_traffic.synthesis.strategy import Strategy
 
@@ -25,6 +27,43 @@ class Advice:
     node: int
     enter: bool
     exits: tuple[int, ...]
+
+
+class Adviser(Protocol):
+    """Who says what to do before intersections, in one trial."""
+
+    @property
+    def board(self) -> Board:
+        """The game."""
+        ...
+
+    def wins(self, play: RoadPlay) -> bool:
+        """Say whether the strategy wins from where a play is, which has a position."""
+        ...
+
+    def advise(self, play: RoadPlay, goal: int, following: int) -> Advice | None:
+        """Return what to do; None where the ego is at no lane's end or where the strategy does not win."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """What our own strategy says, by its ranks."""
+
+    strategy: Strategy
+
+    @property
+    def board(self) -> Board:
+        """The game."""
+        return self.strategy.board
+
+    def wins(self, play: RoadPlay) -> bool:
+        """Say whether the strategy wins from where a play is."""
+        return play.position is not None and self.strategy.wins(play.position)
+
+    def advise(self, play: RoadPlay, goal: int, following: int) -> Advice | None:
+        """Return what the strategy says (`advise`)."""
+        return advise(self.strategy, play, goal, following)
 
 
 def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Advice | None:

@@ -8,6 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from dubins_traffic.cars.state import Pose
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.rules.parameters import RuleParameters
@@ -57,6 +58,31 @@ def start_positions(board: Board, instance: Instance) -> list[int]:
         return []
     choices = [list(_scenes(board, node, cells)) for node in range(len(board.arena.nodes))]
     return sorted({board.number(scenes) for scenes in product(*choices)})
+
+
+def start_cells(board: Board, instance: Instance) -> list[int]:
+    """Return the cells in which the cars of an instance start, the ego first.
+
+    Raises
+    ------
+    InputError
+        If others play, or two cars start in one cell.
+    """
+    if len(instance.starts) != board.others + 1:
+        raise InputError(
+            "other cars than those of the game",
+            field="starts",
+            value=len(instance.starts),
+            expected=f"{board.others + 1}",
+        )
+    cells = [cell_of(board.arena, instance.problem, pose) for pose in instance.starts]
+    for k, cell in enumerate(cells):
+        if cell in cells[:k]:
+            name = board.arena.name(cell)
+            raise InputError(
+                "two cars start in one cell", field="starts", value=name, expected="one car a cell"
+            )
+    return cells
 
 
 def cell_of(arena: Arena, problem: Problem, pose: Pose) -> int:

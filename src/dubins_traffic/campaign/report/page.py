@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import hashlib
-import html
-from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dubins_traffic.campaign.report import plots
 from dubins_traffic.campaign.report.comparison import Comparison, Difference, Standing
+from dubins_traffic.campaign.report.markup import base_style, document, section, table, text
 from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
@@ -44,24 +42,16 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
     name = comparison.campaign.model.name
     standings = comparison.standings
     sections = [
-        _section("Verdicts and collisions", _overview(comparison)),
-        _section("Formulas", _formulas(comparison)) if any(own.formulas for own in standings) else "",
-        _section("Metrics", _metrics(comparison)),
-        _section("Differences, pair by pair", _differences(comparison)) if comparison.differences else "",
-        *(_section(f"Against {words(factor)}", _plots(comparison, factor)) for factor in comparison.factors),
-        _section("Worst trials", _worst(worst)) if any(worst.values()) else "",
-        _section("Rules and ends", _shares(comparison)),
-        _section("How it was made", _made(manifest)),
+        section("Verdicts and collisions", _overview(comparison)),
+        section("Formulas", _formulas(comparison)) if any(own.formulas for own in standings) else "",
+        section("Metrics", _metrics(comparison)),
+        section("Differences, pair by pair", _differences(comparison)) if comparison.differences else "",
+        *(section(f"Against {words(factor)}", _plots(comparison, factor)) for factor in comparison.factors),
+        section("Worst trials", _worst(worst)) if any(worst.values()) else "",
+        section("Rules and ends", _shares(comparison)),
+        section("How it was made", _made(manifest)),
     ]
-    policy = f"default-src 'none'; img-src data:; style-src '{_hash(style)}'"
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<meta name="color-scheme" content="light dark">\n'
-        f"<title>{_text(name)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
-        f"{_head(comparison)}\n<main>\n{''.join(sections)}</main>\n</body>\n</html>\n"
-    )
+    return document(name, style, _head(comparison), sections)
 
 
 def _head(comparison: Comparison) -> str:
@@ -80,13 +70,13 @@ def _head(comparison: Comparison) -> str:
         else ""
     )
     notice = assumption_notice(comparison.broken, comparison.judged)
-    warning += f'<p class="warning">{_text(notice)}</p>' if notice else ""
+    warning += f'<p class="warning">{text(notice)}</p>' if notice else ""
     key = "".join(
-        f'<li><span class="dot c{k}"></span>{_text(name)}</li>'
+        f'<li><span class="dot c{k}"></span>{text(name)}</li>'
         for k, name in enumerate(comparison.controllers)
     )
     return (
-        f"<header><h1>{_text(campaign.model.name)}</h1><p>{' · '.join(facts)}</p>{warning}"
+        f"<header><h1>{text(campaign.model.name)}</h1><p>{' · '.join(facts)}</p>{warning}"
         f'<ul class="key">{key}</ul></header>'
     )
 
@@ -120,9 +110,7 @@ def _overview(comparison: Comparison) -> str:
     ]
     at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
     ruled = ["controller", "judged", "clean", "counted rounds", *plots.VERDICTS]
-    return (
-        f'<div class="figures wide">{figures}</div>{note}{_table(ruled, judged)}{_table(at_fault, collided)}'
-    )
+    return f'<div class="figures wide">{figures}</div>{note}{table(ruled, judged)}{table(at_fault, collided)}'
 
 
 def _formulas(comparison: Comparison) -> str:
@@ -134,13 +122,13 @@ def _formulas(comparison: Comparison) -> str:
     for name in names:
         own = [(k, standing) for k, standing in enumerate(standings) if name in standing.formulas]
         for place, (k, standing) in enumerate(own):
-            first = "" if place else f'<th rowspan="{len(own)}" scope="rowgroup">{_text(name)}</th>'
+            first = "" if place else f'<th rowspan="{len(own)}" scope="rowgroup">{text(name)}</th>'
             found = standing.formulas[name]
             judged = next(iter(found.values())).total
-            shares = (_share(found[held]) for held in plots.FORMULA)
-            body.append([first, _name(standing, k), _count(judged), *shares])
-    table = _table(["formula", "", "trials", *plots.FORMULA], body, "grouped")
-    return f'<div class="figures wide">{figures}</div>{table}'
+            held = (_share(found[what]) for what in plots.FORMULA)
+            body.append([first, _name(standing, k), _count(judged), *held])
+    shares = table(["formula", "", "trials", *plots.FORMULA], body, "grouped")
+    return f'<div class="figures wide">{figures}</div>{shares}'
 
 
 def _metrics(comparison: Comparison) -> str:
@@ -153,8 +141,8 @@ def _metrics(comparison: Comparison) -> str:
             first = f'<th rowspan="{many}" scope="rowgroup">{_heading(metric)}</th>' if k == 0 else ""
             body.append([first, _name(standing, k), *_estimate(estimate), _count(estimate.count)])
     undefined = ", ".join(metric.label for metric in comparison.undefined)
-    note = f"<p>Not defined for these trials: {_text(undefined)}.</p>" if undefined else ""
-    return _table(head, body, "grouped") + note + f"<p>{HOW}</p>"
+    note = f"<p>Not defined for these trials: {text(undefined)}.</p>" if undefined else ""
+    return table(head, body, "grouped") + note + f"<p>{HOW}</p>"
 
 
 def _differences(comparison: Comparison) -> str:
@@ -164,7 +152,7 @@ def _differences(comparison: Comparison) -> str:
         own = [one for one in comparison.differences if (one.first, one.second) == (first, second)]
         head = ["metric", "mean", "95 %", "median", "95 %", "more", "less", "equal", "better"]
         body = [[f"<th>{_heading(one.metric)}</th>", *_difference(one)] for one in own]
-        found.append(f"<h3>{_text(first)} minus {_text(second)}</h3>{_table(head, body)}")
+        found.append(f"<h3>{text(first)} minus {text(second)}</h3>{table(head, body)}")
     return "".join(found)
 
 
@@ -177,7 +165,7 @@ def _difference(one: Difference) -> list[str]:
     if decided and estimate.mean is not None:
         cells[:2] = [f"<b>{cell}</b>" for cell in cells[:2]]
         if one.metric.better:
-            better = _text(one.first if (estimate.mean > 0) == (one.metric.better > 0) else one.second)
+            better = text(one.first if (estimate.mean > 0) == (one.metric.better > 0) else one.second)
     equal = estimate.count - one.larger - one.smaller
     return [*cells, _count(one.larger), _count(one.smaller), _count(equal), better]
 
@@ -191,7 +179,7 @@ def _plots(comparison: Comparison, factor: str) -> str:
         if metric not in silent
     )
     names = "; ".join(metric.label for metric in silent)
-    note = f"<p>No chart of what is 0 or absent everywhere: {_text(names)}.</p>" if silent else ""
+    note = f"<p>No chart of what is 0 or absent everywhere: {text(names)}.</p>" if silent else ""
     return f'<div class="figures">{"".join(images)}</div>{note}'
 
 
@@ -207,12 +195,12 @@ def _worst(worst: Mapping[str, Sequence[Bad]]) -> str:
                 if key.startswith("factor.")
             )
             link = f'<a href="{bad.replay}">replay</a>' if bad.replay else ""
-            note = f' <span class="note">{_text(bad.note)}</span>' if bad.note else ""
+            note = f' <span class="note">{text(bad.note)}</span>' if bad.note else ""
             cells = [f"{row['number']}", row["configuration"], factors, bad.why]
             body.append(
-                [f'<th><span class="dot c{k}"></span>{_text(name)}</th>', *map(_text, cells), link + note]
+                [f'<th><span class="dot c{k}"></span>{text(name)}</th>', *map(text, cells), link + note]
             )
-    return _table(head, body, "texts")
+    return table(head, body, "texts")
 
 
 def _shares(comparison: Comparison) -> str:
@@ -233,7 +221,7 @@ def _shares(comparison: Comparison) -> str:
         ]
         cited = ", ".join(clause(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS))
         note = f"<p>Clauses: {cited}</p>" if cited else ""
-        parts.append(f"<h3>{title}</h3>{_table(['controller', *map(words, names)], body)}{note}")
+        parts.append(f"<h3>{title}</h3>{table(['controller', *map(words, names)], body)}{note}")
     return "".join(parts)
 
 
@@ -245,51 +233,25 @@ def _made(manifest: Mapping[str, Any]) -> str:
         **{f"controller {one['name']}": one["file"] for one in manifest["controllers"] if one["file"]},
         "code": manifest["code"],
     }
-    body = [[f"<th>{_text(name)}</th>", f"<code>{_text(value)}</code>"] for name, value in facts.items()]
-    return _table(["what", "version or SHA-256"], body, "texts")
-
-
-def _section(title: str, body: str) -> str:
-    return f"<section><h2>{_text(title)}</h2>\n{body}</section>\n"
-
-
-def _table(head: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -> str:
-    """Return a table; cells that begin with <th are whole elements, an empty first cell is spanned from above.
-
-    Each cell repeats its heading, for narrow pages, on which the cells of a row stand below one another.
-    """
-    heading = "".join(f"<th>{_text(cell)}</th>" for cell in head)
-    labels = [_text(cell) for cell in head]
-    rows: list[str] = []
-    for cells in body:
-        spanned = kind == "grouped" and not cells[0]
-        labelled = [
-            cell if cell.startswith("<th") else f'<td data-head="{label}">{cell}</td>'
-            for label, cell in zip(labels, cells, strict=True)
-        ]
-        rows.append("".join(labelled[spanned:]))
-    lines = "\n".join(f"<tr>{row}</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table class="{kind}"><thead><tr>{heading}</tr></thead>\n'
-        f"<tbody>\n{lines}\n</tbody></table></div>"
-    )
+    body = [[f"<th>{text(name)}</th>", f"<code>{text(value)}</code>"] for name, value in facts.items()]
+    return table(["what", "version or SHA-256"], body, "texts")
 
 
 def _image(svg: str, alt: str) -> str:
     data = base64.b64encode(svg.encode()).decode()
-    return f'<img alt="{_text(alt)}" src="data:image/svg+xml;base64,{data}">'
+    return f'<img alt="{text(alt)}" src="data:image/svg+xml;base64,{data}">'
 
 
 def _name(standing: Standing, index: int) -> str:
-    return f'<th class="name"><span class="dot c{index}"></span>{_text(standing.controller)}</th>'
+    return f'<th class="name"><span class="dot c{index}"></span>{text(standing.controller)}</th>'
 
 
 def _heading(metric: Column) -> str:
-    unit = f' <span class="unit">{_text(metric.unit)}</span>' if metric.unit else ""
+    unit = f' <span class="unit">{text(metric.unit)}</span>' if metric.unit else ""
     arrow = {1: "↑", -1: "↓", 0: ""}[metric.better]
     title = {1: "more is better", -1: "less is better", 0: ""}[metric.better]
     mark = f' <span class="better" title="{title}">{arrow}</span>' if arrow else ""
-    return f"{_text(metric.label)}{unit}{mark}"
+    return f"{text(metric.label)}{unit}{mark}"
 
 
 def _estimate(estimate: Estimate, *, signed: bool = False) -> list[str]:
@@ -327,12 +289,7 @@ def _count(value: int) -> str:
     return f"{value:,}"
 
 
-def _text(text: str) -> str:
-    return html.escape(str(text))
-
-
 def _style(comparison: Comparison) -> str:
-    own = resources.files("dubins_traffic.campaign.report") / "report.css"
     colours = [plots.colour(k) for k in range(len(comparison.campaign.controllers))]
     dots = [f".c{k} {{ background: {colour} }}" for k, colour in enumerate(colours)]
     dark = [
@@ -341,9 +298,4 @@ def _style(comparison: Comparison) -> str:
         if colour in plots.DARK
     ]
     scheme = f"@media (prefers-color-scheme: dark) {{ {' '.join(dark)} }}"
-    return "\n".join([own.read_text(encoding="utf-8").strip(), *dots, scheme])
-
-
-def _hash(text: str) -> str:
-    """Return the source expression of `text` for a Content-Security-Policy."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+    return "\n".join([base_style(), *dots, scheme])

@@ -17,7 +17,7 @@ from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import write_text
+from dubins_traffic.files import make_folder, write_text
 
 REPORT = "report"
 PAGE = "index.html"
@@ -72,7 +72,7 @@ def write_report(
     clock = table.read(place, campaign, parts, table.Kind.WALL) if wall else None
     comparison = compare(campaign, results, clock)
     target = place / REPORT if output is None else Path(output)
-    _make(target)
+    make_folder(target, "a report")
     ranked = comparison.controllers
     bad = find_worst(campaign, results, ranked, worst, target, progress or _silent) if worst else {}
     for name, text in csv_files(comparison).items():
@@ -116,7 +116,7 @@ def replay_trial(
         expected = f"the number of a trial that has been run; {len(results)} of {campaign.total} have"
         raise InputError("no such trial", file=str(place), field="number", value=number, expected=expected)
     target = place / REPORT / replay_name(number) if output is None else Path(output)
-    _make(target.parent)
+    make_folder(target.parent, "a report")
     again = replay(campaign, found[0], target)
     return target, "" if same(found[0], again) else OTHER_WAY
 
@@ -133,11 +133,3 @@ def _open(place: Path) -> tuple[Mapping[str, Any], Campaign, Sequence[Path]]:
 
 def _silent(_done: int, _total: int) -> None:
     """Tell nobody."""
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        problem = f"can't hold a report ({error.strerror})"
-        raise InputError(problem, file=str(folder), expected="a folder, or a place for one") from None

@@ -1,0 +1,263 @@
+"""`dubins-traffic suite`."""
+
+from __future__ import annotations
+
+import json as json_text
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+from dubins_traffic.errors import InputError
+
+if TYPE_CHECKING:
+    from dubins_traffic.suites.suite import Suite
+
+LIST_EXAMPLES = options.examples("suite list")
+SHOW_EXAMPLES = options.examples("suite show rules-2026", "suite show synthesis-2026 --json")
+RUN_EXAMPLES = options.examples(
+    "suite run icra2016 --controller simple -o simple",
+    "suite run rules-2026 -o all --workers 2 --resume",
+    "suite run rules-2026 --controller my.py:Mine --trials 1 -o mine",
+    "suite run synthesis-2026 --solver 'python solve_game.py {game}' -o theirs",
+)
+COMPARE_EXAMPLES = options.examples(
+    "suite compare simple mine -o page", "suite compare ada=a/rules-2026-0123456789ab.json bob=b"
+)
+
+suite = typer.Typer(
+    help="Frozen sets of problems under a name, and results that can be compared.", no_args_is_help=True
+)
+
+Name = Annotated[
+    str, typer.Argument(metavar="NAME", help="A shipped suite, or a suite's file.", show_default=False)
+]
+
+
+@suite.command("list", epilog=LIST_EXAMPLES)
+def list_suites(json: options.Json = False) -> None:
+    """List the suites that are shipped, with their hashes."""
+    from dubins_traffic.suites.suite import load_suite, shipped_suites
+
+    found = [load_suite(name) for name in shipped_suites()]
+    if json:
+        entries = [{"name": own.name, "hash": own.hash, "title": own.model.title} for own in found]
+        print(json_text.dumps({"suites": entries}, indent=2))
+        return
+    width = max(len(own.label) for own in found)
+    for own in found:
+        print(f"{own.label:{width}}  {own.model.title}")
+
+
+@suite.command("show", epilog=SHOW_EXAMPLES)
+def show(name: Name, json: options.Json = False) -> None:
+    """Say what a suite consists of; with --json its file."""
+    from dubins_traffic.suites.suite import load_suite
+
+    found = load_suite(name)
+    if json:
+        print(json_text.dumps(found.document, indent=2))
+        return
+    print(f"{found.name}: {found.model.title}")
+    ranked = "" if found.model.games else f", ranked by {found.model.metric}"
+    print(f"hash {found.hash}{ranked}")
+    print("\n".join(_contents(found)))
+
+
+def _contents(found: Suite) -> list[str]:
+    """Return what is in a suite, a line each."""
+    if found.model.cases is not None:
+        return [f"  {case.name}" for case in found.model.cases]
+    if found.model.campaign is None:
+        return [
+            f"  {game.name}: {game.positions:,} positions, the ego wins from {game.winning:,}"
+            for game in found.model.games or ()
+        ]
+    campaign = found.campaign(["simple"])
+    names = ", ".join(dict.fromkeys(cell.configuration for cell in campaign.cells))
+    varied = [f"  {factor}: {', '.join(_values(found, factor))}" for factor in campaign.factors]
+    return [
+        f"{campaign.total} trials of each controller: {found.trials} of {len(campaign.cells)} combinations",
+        f"  configurations: {names}",
+        *varied,
+        f"page of {', '.join(found.controllers)}",
+    ]
+
+
+def _values(found: Suite, factor: str) -> list[str]:
+    cells = found.campaign(["simple"]).cells
+    return list(dict.fromkeys(str(cell.values[factor]) for cell in cells))
+
+
+@suite.command("run", epilog=RUN_EXAMPLES)
+def run(
+    name: Name,
+    folder: Annotated[
+        str,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder, made if missing.", show_default=False),
+    ],
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--controller",
+            metavar="C",
+            help="A controller, as `run` takes it; may be given several times.",
+            show_default="those of the suite's page: built-in ones, with and without the shield",
+            autocompletion=options.controllers,
+        ),
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            "--trials",
+            metavar="N",
+            min=1,
+            help="Only the first N trials of each combination: no results of the whole suite.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what has been begun in DIR.")] = False,
+    solver: Annotated[
+        str | None,
+        typer.Option(
+            "--solver",
+            metavar="COMMAND",
+            help="Who solves the games of a suite: a command with a word {game} for the exported game.",
+            show_default="dubins-traffic itself",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float,
+        typer.Option("--seconds", metavar="S", min=0.001, help="Longest time of that command for one game."),
+    ] = 600.0,
+) -> None:
+    """Run a suite, or what is left of it; write a file of results to send, and a page. What is finished is kept."""
+    from dubins_traffic.suites.comparing import open_sources
+    from dubins_traffic.suites.suite import load_suite
+    from dubins_traffic.suites.writing import PAGE, write_results
+
+    found = load_suite(name)
+    _check_options(found, controllers, trials, workers, solver)
+    if found.model.games is not None:
+        path = _games(found, Path(folder), solver, seconds, resume=resume)
+    elif found.model.cases is not None:
+        path = _cases(found, Path(folder), controllers or [], workers, resume=resume)
+    else:
+        path = _trials(found, Path(folder), controllers or [], trials, workers, resume=resume)
+    report = Path(folder) / "report"
+    print(write_results(found, open_sources([str(path)]), report), end="")
+    options.tell(str(path), str(report / PAGE))
+
+
+def _check_options(
+    found: Suite, controllers: list[str] | None, trials: int | None, workers: int | None, solver: str | None
+) -> None:
+    """Refuse options that say nothing for a suite of this kind."""
+    given = {"--controller": controllers, "--trials": trials, "--workers": workers, "--solver": solver}
+    kind = "games" if found.model.games else "cases" if found.model.cases else "trials"
+    known = {
+        "trials": ("--controller", "--trials", "--workers"),
+        "cases": ("--controller", "--workers"),
+        "games": ("--solver",),
+    }
+    for option, value in given.items():
+        if value is not None and option not in known[kind]:
+            raise InputError(
+                f"nothing for a suite of {kind}", file=option, value=value, expected="no such option"
+            )
+
+
+def _trials(
+    found: Suite,
+    folder: Path,
+    controllers: list[str],
+    trials: int | None,
+    workers: int | None,
+    *,
+    resume: bool,
+) -> Path:
+    from dubins_traffic.campaign.folder import kept
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.suites.run_suite import run_suite
+
+    try:
+        with progress() as tell:
+            return run_suite(
+                found, folder, controllers, trials=trials, workers=workers, resume=resume, progress=tell
+            )
+    except KeyboardInterrupt:
+        faults.tell(f"interrupted; {kept(folder)} trials are kept, --resume goes on")
+        raise typer.Exit(faults.FAILED) from None
+
+
+def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | None, *, resume: bool) -> Path:
+    import os
+
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.suites.cases import run_cases
+
+    if not controllers:
+        raise InputError("missing", file="--controller", expected="who drives in the cases")
+    count = workers or os.cpu_count() or 1
+    try:
+        with progress() as tell:
+            return run_cases(found, folder, controllers, workers=count, resume=resume, progress=tell)
+    except KeyboardInterrupt:
+        faults.tell("interrupted; the cases that are finished are kept, --resume goes on")
+        raise typer.Exit(faults.FAILED) from None
+
+
+def _games(found: Suite, folder: Path, solver: str | None, seconds: float, *, resume: bool) -> Path:
+    from dubins_traffic.cli.progress import progress
+    from dubins_traffic.suites.games import Solver, check_command, run_games
+
+    if solver is not None:
+        check_command(solver)
+    own = Solver() if solver is None else Solver(solver.split()[0], solver, seconds)
+    try:
+        with progress() as tell:
+            return run_games(found, folder, own, resume=resume, progress=tell)
+    except KeyboardInterrupt:
+        faults.tell("interrupted; the answers that are there are kept, --resume goes on")
+        raise typer.Exit(faults.FAILED) from None
+
+
+@suite.command("compare", epilog=COMPARE_EXAMPLES)
+def compare(
+    places: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="[NAME=]DIR...",
+            help="Folders of `suite run`, or files of results; NAME is what their entries are called.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Write the page, the table and CSV there."),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option("--suite", metavar="FILE", help="The suite's file, if the suite is not shipped."),
+    ] = None,
+) -> None:
+    """Compare results of one suite: a table here, and a page. Results of different hashes are refused."""
+    from dubins_traffic.suites.comparing import open_sources
+    from dubins_traffic.suites.suite import load_suite
+    from dubins_traffic.suites.writing import PAGE, TABLE, results, write_results
+
+    sources = open_sources(places)
+    found = load_suite(name or sources[0].found.suite)
+    if output is None:
+        print(results(found, sources)[TABLE], end="")
+    else:
+        print(write_results(found, sources, Path(output)), end="")
+        options.tell(str(Path(output) / PAGE))
+    if len({source.found.code for source in sources}) > 1:
+        faults.tell("these results were made by different versions of the code")

@@ -1,0 +1,141 @@
+"""Cases of a suite, an instance each, are run with controllers; what comes of each is kept as it comes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.manifest import hash_of_file
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.errors import InputError
+from dubins_traffic.files import locked, make_folder, read_text, write_text
+from dubins_traffic.problem.document import instance_from_document, instance_to_document
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.header import bare_name
+from dubins_traffic.runs.jobs import Job, run_trials
+from dubins_traffic.suites.results import KEPT, save
+from dubins_traffic.suites.settings import CaseEntry
+from dubins_traffic.suites.suite import Suite
+
+FILE: Final = "cases.jsonl"
+Found = dict[str, dict[str, dict[str, Any]]]
+"""What came of each case, by controller and case: columns of a campaign's table."""
+
+
+def case_instance(entry: CaseEntry) -> Instance:
+    """Return the instance of a case.
+
+    Raises
+    ------
+    InputError
+        If it is none, or leaves something to be drawn.
+    """
+    left = [name for name in ("starts", "duration", "seed", "trial") if name not in entry.document]
+    if left:
+        raise InputError("a case that leaves something to be drawn", field=f"{entry.name}.{left[0]}")
+    return instance_from_document(entry.document, entry.name)
+
+
+def run_cases(
+    suite: Suite,
+    folder: Path,
+    specs: Sequence[str],
+    *,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Callable[[int, int], object] | None = None,
+) -> Path:
+    """Run the cases of a suite, or those that are left, with some controllers; return the file of results.
+
+    Raises
+    ------
+    InputError
+        If the suite has no cases, a controller can't be loaded, the folder holds results and they are not to be gone on
+        with or are of another suite, or a file can't be written.
+    KeyboardInterrupt
+        On Ctrl-C; what is finished is kept.
+    """
+    entries = suite.model.cases
+    if entries is None:
+        raise InputError("a suite without cases", file=suite.file or suite.name)
+    instances = {entry.name: case_instance(entry) for entry in entries}
+    for spec in specs:
+        controllers.load(spec)
+    make_folder(folder, "results")
+    with locked(folder):
+        file = folder / FILE
+        found = _kept(file, suite) if file.exists() else {}
+        if file.exists() and not resume:
+            raise InputError(
+                "holds results", file=str(folder), expected="a new folder; --resume goes on with it"
+            )
+        _run(suite, file, instances, specs, found, workers, progress or (lambda _done, _total: None))
+        named = {bare_name(spec): found[bare_name(spec)] for spec in specs}
+        columns = {
+            name: {column: [own[case][column] for case in instances] for column in (*KEPT, *rows.WALL)}
+            for name, own in named.items()
+        }
+        listed = [
+            {
+                "controller": name,
+                "file": hash_of_file(spec),
+                "columns": {column: own[column] for column in KEPT},
+            }
+            for (name, own), spec in zip(columns.items(), specs, strict=True)
+        ]
+        seconds = {name: {column: own[column] for column in rows.WALL} for name, own in columns.items()}
+        return save(suite, folder, {"entries": listed}, {"entries": seconds})
+
+
+def _run(
+    suite: Suite,
+    file: Path,
+    instances: Mapping[str, Instance],
+    specs: Sequence[str],
+    found: Found,
+    workers: int,
+    progress: Callable[[int, int], object],
+) -> None:
+    """Run what is left and keep each case when it is done."""
+    cases = {_key(instance): name for name, instance in instances.items()}
+    total = len(specs) * len(instances)
+    for spec in specs:
+        own = found.setdefault(bare_name(spec), {})
+        left = [instance for name, instance in instances.items() if name not in own]
+        jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one) for one in left]
+        for result in run_trials(jobs, workers):
+            row = rows.row(0, result.ending, result.score, result.wall.act_s)
+            own[cases[_key(result.instance)]] = {column: row[column] for column in (*KEPT, *rows.WALL)}
+            _keep(file, suite, found)
+            progress(sum(map(len, found.values())), total)
+
+
+def _key(instance: Instance) -> str:
+    return json.dumps(instance_to_document(instance), sort_keys=True)
+
+
+def _keep(file: Path, suite: Suite, found: Found) -> None:
+    lines: list[Mapping[str, Any]] = [{"hash": suite.hash}]
+    lines += [
+        {"controller": name, "case": case, "row": row}
+        for name, own in found.items()
+        for case, row in own.items()
+    ]
+    write_text(file, "".join(json.dumps(line) + "\n" for line in lines))
+
+
+def _kept(file: Path, suite: Suite) -> Found:
+    """Return what is kept in a folder; InputError if it is of another suite."""
+    try:
+        first, *rest = [json.loads(line) for line in read_text(file).splitlines()]
+        if first != {"hash": suite.hash}:
+            raise InputError("results of another suite", file=str(file), expected="a new folder")
+        found: Found = {}
+        for line in rest:
+            found.setdefault(line["controller"], {})[line["case"]] = line["row"]
+        return found
+    except (ValueError, KeyError, TypeError):
+        raise InputError("can't be read as results", file=str(file), expected="a new folder") from None

@@ -1,0 +1,55 @@
+"""Writing results of a suite: a page, a table in Markdown, and numbers as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from dubins_traffic.campaign.report.csv_tables import csv_files
+from dubins_traffic.campaign.report.page import page
+from dubins_traffic.files import make_folder, write_text
+from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
+from dubins_traffic.suites.comparing import Source, compare_trials
+from dubins_traffic.suites.games_page import answers_of, games_page, games_table
+from dubins_traffic.suites.markdown import trials_table
+from dubins_traffic.suites.suite import Suite
+
+PAGE = "index.html"
+TABLE = "results.md"
+
+
+def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
+    """Return the files of results by name: `PAGE`, `TABLE`, and of a suite of trials CSV; same sources, same texts.
+
+    Raises
+    ------
+    InputError
+        As `compare_trials`, `columns_of` and `answers_of`.
+    """
+    if suite.model.cases is not None:
+        found = columns_of(suite, sources)
+        return {TABLE: cases_table(suite, found), PAGE: cases_page(suite, found)}
+    if suite.model.games is not None:
+        answers = answers_of(suite, sources)
+        return {TABLE: games_table(suite, answers), PAGE: games_page(suite, answers)}
+    comparison, made = compare_trials(suite, sources)
+    return {
+        **csv_files(comparison),
+        TABLE: trials_table(suite, comparison),
+        PAGE: page(comparison, made, {}),
+    }
+
+
+def write_results(suite: Suite, sources: Sequence[Source], folder: Path) -> str:
+    """Write the files of results into a folder and return the table in Markdown.
+
+    Raises
+    ------
+    InputError
+        As `results`, or if a file can't be written.
+    """
+    found = results(suite, sources)
+    make_folder(folder, "results")
+    for name, text in found.items():
+        write_text(folder / name, text)
+    return found[TABLE]

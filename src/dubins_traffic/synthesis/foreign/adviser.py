@@ -1,0 +1,168 @@
+"""A machine of another tool, followed on the road: where it is in its play, and what it says to do.
+
+In the game both sides move in turn; on the road a turn takes as long as it takes. So the machine is asked anew with
+each change, and goes on by a turn only when the ego has done what it said, or when it said to stay. Where the
+play is none that it can be in, as when an assumed place has been revised, a state is taken in which some play of the
+game could have come there; if there is none, the machine does not win.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from dubins_traffic.synthesis.advice import Advice
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.foreign.labelled import Labelled, Place
+from dubins_traffic.synthesis.foreign.machine import Machine, State
+from dubins_traffic.synthesis.road_play import RoadPlay
+from dubins_traffic.synthesis.specification import EGO
+
+MOST_PLACES: Final = 100_000
+"""Places with states of the machine that are looked at in advance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """The ego's turn: the machine in `state` reads `place`, which the environment has made of `before`."""
+
+    before: Place
+    place: Place
+    state: State
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """What a machine says: its next state, and the place after the ego's move."""
+
+    state: State
+    place: Place
+
+
+class MachineAdviser:
+    """What a machine says to the ego, in one trial.
+
+    Parameters
+    ----------
+    board : Board
+        The game.
+    machine : Machine
+        The strategy.
+    """
+
+    def __init__(self, board: Board, machine: Machine) -> None:
+        self.board = board
+        self._machine = machine
+        self._game: Labelled | None = None
+        self._turn: Turn | None = None
+        self._begun = False
+        self._known: dict[Place, list[State]] = {}
+
+    def wins(self, play: RoadPlay) -> bool:
+        """Say whether the machine has an answer where a play is."""
+        self._follow(play)
+        return self._turn is not None
+
+    def advise(self, play: RoadPlay, goal: int, following: int) -> Advice | None:  # noqa: ARG002
+        """Return what the machine says, None where the ego is at no lane's end or where it has no answer.
+
+        It seeks goals in an order of its own, so `goal` and `following` don't matter.
+        """
+        self._follow(play)
+        turn, nodes = self._turn, len(self.board.arena.nodes)
+        if turn is None or play.cells[EGO] < nodes or turn.place.cells != tuple(play.cells):
+            return None
+        node = self.board.arena.lane_end[play.cells[EGO] - nodes][0]
+        answer = self._answer(turn.place, turn.state)
+        if answer is None or answer.place.cells[EGO] != node:
+            return Advice(node, False, ())
+        after = self._answer_in_time(answer.place, answer.state)
+        out = answer.place if after is None else after.place
+        exits = () if out.cells[EGO] == node else (out.cells[EGO] - nodes,)
+        return Advice(node, True, exits)
+
+    def _follow(self, play: RoadPlay) -> None:
+        """Bring the machine to where the play is."""
+        if play.position is None:
+            return
+        if self._game is None:
+            self._game = Labelled(self.board, play.moves)
+        place = Place(play.position, tuple(play.cells))
+        if not self._begun:
+            self._begun = True
+            self._begin(place)
+        elif self._turn is None or self._turn.place != place:
+            self._turn = next(self._turns_at(place), None)
+        if self._turn is not None:
+            turn = self._waited(self._turn)
+            self._turn = None if self._answer(turn.place, turn.state) is None else turn
+
+    def _begin(self, place: Place) -> None:
+        """Let the machine read the first letter, to which it answers with the cell in which the ego starts."""
+        first = self._machine.step(self._machine.begin(), self._labelled.letter(place))
+        if first is None or self._labelled.ego_cell(first[1]) != place.cells[EGO]:
+            return
+        self._turn = Turn(place, place, first[0])
+        self._explore(place, first[0])
+
+    @property
+    def _labelled(self) -> Labelled:
+        assert self._game is not None
+        return self._game
+
+    def _turns_at(self, place: Place) -> Iterator[Turn]:
+        """Yield the turns that it may be at a place, the likeliest first."""
+        old = self._turn
+        if old is not None:
+            answer = self._answer(old.place, old.state)
+            if answer is not None and answer.place.cells[EGO] == place.cells[EGO]:
+                if answer.place == place or self._labelled.follows(answer.place, place):
+                    yield Turn(answer.place, place, answer.state)
+            elif self._labelled.follows(old.before, place):
+                yield Turn(old.before, place, old.state)
+        for state in self._known.get(place, ()):
+            yield Turn(place, place, state)
+
+    def _waited(self, turn: Turn) -> Turn:
+        """Return the turn after those in which the ego stays and nobody else moves; the same if it stays for ever."""
+        seen: set[State] = set()
+        now = turn
+        while now.state not in seen:
+            seen.add(now.state)
+            answer = self._answer(now.place, now.state)
+            if answer is None or answer.place != now.place:
+                return now
+            now = Turn(now.place, now.place, answer.state)
+        return turn
+
+    def _answer_in_time(self, place: Place, state: State) -> _Answer | None:
+        """Return the first answer that moves the ego, if nobody else moves; None if it stays for ever."""
+        turn = self._waited(Turn(place, place, state))
+        answer = self._answer(turn.place, turn.state)
+        return None if answer is None or answer.place == place else answer
+
+    def _answer(self, place: Place, state: State) -> _Answer | None:
+        """Return what the machine answers to a place; None if nothing, or a move that is none of the game."""
+        found = self._machine.step(state, self._labelled.letter(place))
+        if found is None:
+            return None
+        after = self._labelled.moved(place, self._labelled.ego_cell(found[1]))
+        return None if after is None else _Answer(found[0], after)
+
+    def _explore(self, place: Place, state: State) -> None:
+        """Note in which states the machine may be where, in the plays from a place."""
+        waiting: deque[tuple[Place, State]] = deque([(place, state)])
+        seen = {(place, state)}
+        while waiting and len(seen) < MOST_PLACES:
+            here, now = waiting.popleft()
+            for turn in self._labelled.turns(here):
+                states = self._known.setdefault(turn, [])
+                if now in states:
+                    continue
+                states.append(now)
+                answer = self._answer(turn, now)
+                if answer is not None and (answer.place, answer.state) not in seen:
+                    seen.add((answer.place, answer.state))
+                    waiting.append((answer.place, answer.state))

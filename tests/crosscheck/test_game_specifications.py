@@ -1,0 +1,79 @@
+"""Games of cells as specifications: TuLiP, with omega and dd, finds the winners that we find, start by start."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from itertools import permutations
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.queues import WHO, Scene
+from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.specification import specification_text
+from tests.games import ALL, board, pan
+from tests.tools import interpreter_with
+
+SCRIPT = Path(__file__).with_name("tulip_realizable.py")
+
+
+def positions(some: Board, count: int) -> Iterator[tuple[list[int], int]]:
+    """Yield cells of the cars and the position that they make, no two cars before one crossing."""
+    arena = some.arena
+    cells = list(permutations(range(arena.cells), some.others + 1))
+    Random(2016).shuffle(cells)
+    nodes = len(arena.nodes)
+    for own in cells:
+        ends = [arena.lane_end[cell - nodes][0] for cell in own if cell >= nodes]
+        if len(set(ends)) == len(ends) and count:
+            count -= 1
+            yield list(own), some.number([_scene(some, node, own) for node in range(nodes)])
+
+
+def _scene(some: Board, node: int, cells: tuple[int, ...]) -> Scene:
+    nodes = len(some.arena.nodes)
+    who = [WHO.EGO if car == 0 else WHO.OTHER for car in range(len(cells))]
+    inside = who[cells.index(node)] if node in cells else None
+    lanes = [nodes + lane for lane in some.arena.nodes[node].inbound]
+    return Scene(inside, tuple((lanes.index(cell), who[k]) for k, cell in enumerate(cells) if cell in lanes))
+
+
+@pytest.mark.parametrize(
+    ("some", "count"),
+    [
+        (board(2, 2, 1), 4),
+        (board(2, 2, 1, "E1,E2,E3,E5,E6"), 6),
+        (board(2, 2, 1, ALL, 3), 4),
+        (board(2, 2, 1, "E1,E2,E4,E5,E6", 3), 4),
+        (pan(1, (0, 4), "E1,E2,E3,E5,E6"), 4),
+        (pan(1, (0, 3), ALL, 3), 4),
+        (pan(1, (4,), ALL), 3),
+        (board(2, 2, 2), 2),
+        (board(2, 2, 2, "E1,E2,E3,E4:unmet,E5,E6", 3), 2),
+        (pan(2, (0, 4), ALL, 3), 1),
+        (pan(2, (0, 4), "E1,E2,E3,E4,E5:moves-up,E6", 3), 1),
+    ],
+    ids=lambda some: (
+        f"{some.arena.cells} cells, {some.others} cars, {some.assumption}" if isinstance(some, Board) else ""
+    ),
+)
+def test_winners_are_those_of_tulip(some: Board, count: int) -> None:
+    winning = solve(build(some)).winning
+    starts = list(positions(some, count))
+    texts = [specification_text(some, cells, ".py") for cells, _ in starts]
+    ran = subprocess.run(
+        [interpreter_with("tulip"), str(SCRIPT)],
+        input=json.dumps(texts),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert ran.returncode == 0, ran.stderr[-2000:]
+    found = json.loads(ran.stdout.strip().splitlines()[-1])
+    assert found == [bool(winning[position]) for _, position in starts]

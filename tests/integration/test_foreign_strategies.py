@@ -1,0 +1,201 @@
+"""Strategies of other tools: read from their files, refused when damaged, and driven on the road."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dubins_traffic.cars.state import Frames
+from dubins_traffic.cli.main import main
+from dubins_traffic.controllers import registry
+from dubins_traffic.controllers.synthesized import STRATEGY_LEFT
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.record.reader import Record, read
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.synthesis.foreign.read import read_machine
+from dubins_traffic.synthesis.specification import specification, specification_text
+from tests import foreign
+from tests.games import ALL, board
+from tests.grammars import slugs_sections, tlsf_sections
+
+FORMS = ("hoa", "aag", "aig", "slugs json", "slugs text", "tulip")
+
+
+@pytest.fixture(scope="module")
+def strategies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return foreign.files(tmp_path_factory.mktemp("strategies"))
+
+
+def test_all_formats_answer_alike(strategies: dict[str, Path]) -> None:
+    start_of_other = foreign.starts_of(foreign.instance())[1]
+    words = [(start_of_other, *rest) for rest in product(range(4), repeat=3)]
+    answers: dict[str, list[list[int | None]]] = {form: [] for form in FORMS}
+    for form, word in product(FORMS, words):
+        machine = read_machine(strategies[form])
+        state = machine.begin()
+        own: list[int | None] = []
+        for cell in word:
+            step = machine.step(state, {"car1_0": bool(cell & 1), "car1_1": bool(cell >> 1)})
+            if step is None:
+                own.append(None)
+                break
+            state, answer = step
+            own.append(answer["ego_0"] + 2 * answer["ego_1"])
+        answers[form].append(own)
+    assert answers["aag"] == answers["aig"] == answers["hoa"] == answers["tulip"]
+    assert answers["slugs json"] == answers["slugs text"]
+    for whole, part in zip(answers["hoa"], answers["slugs json"], strict=True):
+        known = part[: part.index(None)] if None in part else part
+        assert whole[: len(known)] == known
+        assert known
+
+
+def drive(controller: str, folder: Path) -> Record:
+    path = folder / f"{len(list(folder.iterdir()))}.mcap"
+    run_trial(foreign.instance(), controller, record=path)
+    return read(path)
+
+
+def same_frames(one: Frames, other: Frames) -> bool:
+    names = ("x", "y", "c", "s", "speed", "yaw_rate", "command_speed", "command_yaw_rate", "lane", "bits")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def test_one_machine_drives_the_same_frames_whatever_its_format(
+    strategies: dict[str, Path], tmp_path: Path
+) -> None:
+    (first, *others) = (drive(str(strategies[form]), tmp_path) for form in FORMS)
+    assert len(first.frames) == 1801
+    for other in others:
+        assert same_frames(first.frames, other.frames)
+    kinds = {event.kind for block in first.blocks for event in block.events}
+    assert STRATEGY_LEFT not in kinds
+    assert not same_frames(first.frames, drive("rules", tmp_path).frames)
+
+
+def test_the_machine_goes_round_and_keeps_the_rules(strategies: dict[str, Path]) -> None:
+    score = run_trial(foreign.instance(), str(strategies["hoa"])).score
+    assert score.to_json()["rounds"] == 3
+    assert score.verdict is not None
+    assert [one for one in score.verdict.violations if one.car == "ego"] == []
+
+
+def test_where_a_machine_has_no_answer_the_ego_goes_on_by_the_rules(tmp_path: Path) -> None:
+    """A machine whose first answer is another cell than the one in which the ego starts."""
+    text = foreign.as_hoa()
+    first, _ = foreign.machine()
+    path = tmp_path / "other"
+    path.write_text(text.replace(f"Start: {first}", f"Start: {(first + 1) % 4}"))
+    record = drive(str(path), tmp_path)
+    kinds = [event.kind for block in record.blocks for event in block.events]
+    assert STRATEGY_LEFT in kinds
+
+
+def test_a_machine_for_another_problem_is_refused(strategies: dict[str, Path], tmp_path: Path) -> None:
+    some = foreign.instance()
+    controller = registry.load(str(strategies["hoa"]))
+    two = replace(some.problem, e_agents=("a", "b"))
+    controller.start(two)  # its propositions are some of those of the larger game
+    path = tmp_path / "strange"
+    path.write_text(foreign.as_hoa().replace('"car1_1"', '"weather"'))
+    with pytest.raises(InputError, match="weather: a strategy for another problem"):
+        registry.load(str(path)).start(some.problem)
+    path.write_text(foreign.as_hoa().replace('"ego_1"', '"first_0_1"'))
+    with pytest.raises(InputError, match="ego_1: a strategy for another problem"):
+        registry.load(str(path)).start(some.problem)
+
+
+def damaged() -> list[tuple[str, str | bytes, str]]:
+    hoa, aag, text = foreign.as_hoa(), foreign.as_aag(), foreign.as_slugs_text()
+    return [
+        ("nothing known", "hello", "no strategy that is known"),
+        ("binary", b"\xff\xfe\x00", "not UTF-8"),
+        ("hoa without body", hoa.partition("--BODY--")[0], "--BODY-- or --END-- is missing"),
+        ("hoa without end", hoa.partition("--END--")[0], "--BODY-- or --END-- is missing"),
+        ("hoa of other names", hoa.replace("AP: 4", "AP: 5"), "another number of names"),
+        ("hoa with a label of state", hoa.replace("State: 0", "State: [0] 0"), "no state's number"),
+        ("hoa with an unknown number", hoa.replace("[!0&", "[!9&", 1), "not a label"),
+        ("hoa with an open label", hoa.replace("] 0", " 0", 1), "label"),
+        ("hoa without its start", hoa.replace("Start: 0", "Start: 7"), "in which it starts is missing"),
+        ("aiger cut off", aag[:60], "cut off"),
+        ("aiger with a bad header", aag.replace("aag ", "aag x", 1), "not a header"),
+        ("aiger too large", "aag 999999999 0 0 0 0\n", "too large a circuit"),
+        (
+            "aiger with unknown literals",
+            aag.replace("\n2\n4\n", "\n2\n444\n"),
+            "a literal of no variable|nothing",
+        ),
+        ("slugs of other names", text.replace("ego_0:1", "ego_9:1"), "a state of other propositions"),
+        ("slugs with an unknown successor", text.replace("successors : 0", "successors : 99"), "no state"),
+        ("json that is none", "{", "not JSON"),
+        ("json of something else", "{}", "variables and nodes"),
+        ("tulip's, changed", foreign.as_tulip().replace("self.state == 0", "self.state > 0"), "dumpsmach"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"), [case[1:] for case in damaged()], ids=[case[0] for case in damaged()]
+)
+def test_damaged_files_are_refused(data: str | bytes, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "strategy"
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    with pytest.raises(InputError, match=message):
+        registry.load(str(path))
+
+
+def test_labels_of_hoa_are_read_as_they_are_meant(tmp_path: Path) -> None:
+    path = tmp_path / "strategy"
+    path.write_text(
+        'HOA: v1\nStart: 0\nAP: 3 "a" "b" "ego_0"\nAcceptance: 0 t\n--BODY--\nState: 0\n'
+        "[(0&!1 | !0&1) & 2] 1\n[!(0&!1 | !0&1) & !2] 0 {1}\nState: 1\n/* for ever */ [t] 1\n--END--\n"
+    )
+    machine = read_machine(path)
+    for a, b in product((False, True), repeat=2):
+        found = machine.step(0, {"a": a, "b": b})
+        assert found == (int(a != b), {"ego_0": a != b})
+
+
+@pytest.mark.parametrize(("some", "cells"), [(board(2, 2, 1), [0, 5]), (board(2, 2, 2, ALL, 3), [0, 9, 11])])
+def test_specifications_keep_to_their_grammars(some: Any, cells: list[int]) -> None:
+    tlsf = tlsf_sections(specification_text(some, cells, ".tlsf"))
+    slugs = slugs_sections(specification_text(some, cells, ".structuredslugs"))
+    spec = specification(some, cells)
+    assert tlsf["inputs"] == slugs["INPUT"] == list(spec.inputs)
+    assert tlsf["outputs"] == slugs["OUTPUT"] == list(spec.outputs)
+    assert len(slugs["SYS_LIVENESS"]) == len(some.arena.targets)
+
+
+@pytest.mark.parametrize(
+    ("some", "cells", "message"),
+    [
+        (board(2, 2, 1, "E1,E3,E4,E5,E6"), [0, 5], "without E2"),
+        (board(2, 2, 1, "E1,E2,E3:forfeits,E4,E5,E6"), [0, 5], "without E3"),
+        (board(2, 2, 1, "E1,E2,E3,E4,E6"), [0, 5], "without E5"),
+        (board(3, 3, 1, ALL, 4), [0, 5], "order_degree"),
+        (board(2, 2, 5), [0, 1, 2, 3, 4, 5], "too many e-agents"),
+        (board(2, 2, 1), [5, 5], "not starts of the game"),
+    ],
+)
+def test_games_that_can_not_be_said_are_refused(some: Any, cells: list[int], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        specification(some, cells)
+
+
+def test_the_command_writes_specifications(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "road.json"
+    file.write_text(json.dumps(instance_to_document(foreign.instance())))
+    for ending in ("structuredslugs", "tlsf", "py"):
+        target = tmp_path / f"game.{ending}"
+        assert main(["synth", str(file), "--spec", str(target)]) == 0
+        assert "car1_0" in target.read_text()
+    assert main(["synth", str(file), "--spec", str(tmp_path / "game.tlsf")]) == 2
+    assert main(["synth", str(file), "--spec", str(tmp_path / "game.txt")]) == 2
+    assert "not a file of a specification" in capsys.readouterr().err
+    assert not (tmp_path / "game.txt").exists()
