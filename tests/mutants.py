@@ -24,7 +24,7 @@ from tests.mutated import Mask, Mutant, Seen
 
 LINE = 0.03 + MARGIN
 """Metres by which the line is nearer, for a stop 3 cm inside the disc."""
-CLOSE = 0.62
+CLOSE = 0.9
 """Metres between centres at which a mutant swerves."""
 
 
@@ -182,14 +182,15 @@ class Swerves(Mutant):
         answer = super().act_batch(view)
         x, y, c, s = view.state.x, view.state.y, view.state.c, view.state.s
         dx, dy = x - x[:, :1], y - y[:, :1]
-        along, left = dx * c[:, :1] + dy * s[:, :1], np.abs(dy * c[:, :1] - dx * s[:, :1])
+        along = dx * c[:, :1] + dy * s[:, :1]
         lane = view.labels.lane
-        ahead = (
-            view.seen & (lane == lane[:, :1]) & (lane >= 0) & (along > 0.1) & (along < CLOSE) & (left < 0.2)
-        )
+        ahead = view.seen & (lane == lane[:, :1]) & (lane >= 0) & (along > 0.1) & (np.hypot(dx, dy) < CLOSE)
         ahead &= view.labels.bits & np.uint32(FLAG.STANDS | FLAG.EXCUSED | FLAG.APPROACH) == 0
-        near = ahead.any(axis=1) & (view.labels.crosses[:, EGO] < 0)
-        answer[near] = 0.2, 0.9
+        near = np.flatnonzero(ahead.any(axis=1) & (view.labels.crosses[:, EGO] < 0))
+        who = ahead[near].argmax(axis=1)
+        turn = np.arcsin(np.clip(c[near, 0] * s[near, who] - s[near, 0] * c[near, who], -1.0, 1.0)) + 0.6
+        answer[near, 0] = 0.35
+        answer[near, 1] = np.clip(3.0 * turn, -0.9, 0.9)
         return answer
 
 
