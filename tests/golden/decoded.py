@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import dubins_traffic as dt
+from dubins_traffic.scoring.margins import ENTERED
 from dubins_traffic.viewer.replay import replay_page
 from tests.recordings import REALS, WHOLE
 
@@ -26,8 +27,18 @@ def _simple(value: Any) -> Any:
 
 
 def decoded_score(score: dt.Score) -> bytes:
-    """Return a score without the record's place and what a wall clock measured."""
+    """Return a score without the record's place and what a wall clock measured.
+
+    The margins of rule 3 are left out: they are younger than the hashes, and `tests/property/test_margin_signs.py` has
+    them.
+    """
     document = score.to_json()
+    if document["verdict"] is not None:
+        robustness = document["verdict"]["robustness"]
+        document["verdict"] = {
+            **document["verdict"],
+            "robustness": {rule: robustness[rule] for rule in robustness if rule not in ENTERED},
+        }
     return plain({name: document[name] for name in document if name not in _LEFT_OUT})
 
 
