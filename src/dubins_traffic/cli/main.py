@@ -16,6 +16,7 @@ from dubins_traffic.cli import (
     competition,
     convert,
     evaluate,
+    falsify,
     faults,
     gazebo,
     instance,
@@ -84,6 +85,9 @@ app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
+app.command("falsify", epilog=falsify.EXAMPLES)(falsify.falsify)
+app.command("shrink", epilog=falsify.SHRINK_EXAMPLES)(falsify.shrink)
+app.command("regress", epilog=falsify.REGRESS_EXAMPLES)(falsify.regress)
 app.add_typer(competition.competition, name="competition")
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.command("template", epilog=template.EXAMPLES)(template.template)

@@ -272,7 +272,7 @@ def ask(
         taken = list(islice(waiting, free)) if 8 * free >= batch else []
         for own in grouped(taken):
             if shared is not None:
-                _check_clear(own)
+                check_clear(own)
             seats.append(Controlled(own, make, shared, metrics))
         if not seats:
             return
@@ -280,7 +280,7 @@ def ask(
             for own in seats:
                 own.ask_each()
         else:
-            _ask_all(seats, shared)
+            ask_all(seats, shared)
         for own in seats:
             yield from own.step(controller)
         seats = [own for own in seats if len(own.group.active)]
@@ -295,7 +295,7 @@ def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
     return list(groups.values())
 
 
-def _ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
+def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
     """Let one controller choose the commands of all egos."""
     seats = [own for own in seats if len(own.group.active)]
     if not seats:
@@ -332,7 +332,8 @@ def _joined(tables: Sequence[Tables]) -> list[Any]:
     return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
 
 
-def _check_clear(instances: Sequence[Instance]) -> None:
+def check_clear(instances: Sequence[Instance]) -> None:
+    """Refuse instances with noise in observations, which a controller of whole batches is not shown."""
     for instance in instances:
         noise = instance.disturbances
         if noise.position_noise > 0.0 or noise.heading_noise > 0.0:
