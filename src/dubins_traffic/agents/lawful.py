@@ -1,4 +1,4 @@
-"""The e-agents `lawful` and `nemesis`: the law of the road (`policies.rules.policy`) with their own ways to go."""
+"""The e-agents `lawful`, `nemesis` and `chosen`: the law of the road (`policies.rules.policy`), and their own ways."""
 
 from __future__ import annotations
 
@@ -8,15 +8,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dubins_traffic.agents.choices import cut, empty, from_rows
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.kernels.records import Rows, stack, table
+from dubins_traffic.kernels.records import Rows, numbers, stack, table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import GOES, KIND, Driver, Drivers, Traffic, scratch, vehicles_of
+from dubins_traffic.policies.rules.tables import (
+    GOES,
+    KIND,
+    Driver,
+    Drivers,
+    Leg,
+    Traffic,
+    scratch,
+    vehicles_of,
+)
 from dubins_traffic.problem.cycles import cycle_lanes
 from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
@@ -90,7 +100,25 @@ def pack_drivers(
         stage += own.tolist()
     distance = _one_below_another([far for _, far in rounds])
     _add_stages([instance.problem for instance in instances], rows, whose, drivers, stage)
-    return drivers_of(instances, net, drivers, np.array(stage, dtype=np.int64), distance)
+    numbers: list[int] = whose.tolist()
+    choice = _add_choices([rows[number].choice for number in numbers], drivers)
+    return drivers_of(instances, net, drivers, np.array(stage, dtype=np.int64), distance, choice)
+
+
+def _add_choices(tables: Sequence[Mapping[int, Floats]], drivers: Rows[Driver]) -> Rows[Leg]:
+    """Put what is chosen for the cars of each trial one below another; note whose rows they are."""
+    found: list[Floats] = [empty(0)]
+    first = 0
+    for b, own in enumerate(tables):
+        for n, rows in own.items():
+            drivers[b, n].choice = first
+            first += len(rows)
+            found.append(rows)
+    legs = np.concatenate(found)
+    rows = table(Leg, len(legs))
+    if len(legs):
+        numbers(rows, np.float64)[:] = legs
+    return rows
 
 
 def _one_below_another(tables: Sequence[Floats]) -> Floats:
@@ -104,7 +132,12 @@ def _one_below_another(tables: Sequence[Floats]) -> Floats:
 
 
 def drivers_of(
-    instances: Sequence[Instance], net: Ints, cars: Rows[Driver], stage: Ints, distance: Floats
+    instances: Sequence[Instance],
+    net: Ints,
+    cars: Rows[Driver],
+    stage: Ints,
+    distance: Floats,
+    choice: Rows[Leg] | None = None,
 ) -> Drivers:
     """Return the drivers of a batch, `cars` (B, N), on no way yet."""
     return Drivers(
@@ -118,23 +151,31 @@ def drivers_of(
         command=kept_commands(*cars.shape),
         stage=stage,
         distance=distance,
+        choice=table(Leg, 0) if choice is None else choice,
     )
 
 
 class _Fleet(NamedTuple):
-    """The cars of a trial that keep the rules: their rows, which of them go to goals, and the cycles of the others."""
+    """The cars of a trial that keep the rules: their rows, which of them go to goals, the cycles of the others, and
+    what is chosen for them.
+    """
 
     cars: Rows[Driver]
     goers: list[int]
     loops: list[tuple[int, Sequence[Sequence[int]]]]
+    choice: dict[int, Floats]
 
 
 def _fleet(instance: Instance, cars: int) -> _Fleet:
-    own = _Fleet(table(Driver, cars), [], [])
+    own = _Fleet(table(Driver, cars), [], [], {})
     for n, agent in enumerate(instance.e_agents, start=1):
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
             _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])
+            rows = given.get("choices", ())
+            if rows:
+                own.choice[n] = cut(from_rows(rows), own.cars[n].speed, instance.problem)
+                own.cars[n].choices = len(own.choice[n])
             if own.cars[n].kind == KIND.LOOP:
                 own.loops.append((n, given["cycle"]))
             else:
@@ -149,12 +190,14 @@ def _defaults(kind: str) -> Mapping[str, Any]:
 
 def _describe(kind: str, given: Mapping[str, Any], fastest: float, car: Driver) -> None:
     """Fill the row of a car but for its stages."""
-    car.speed = min(given["speed"], fastest)
+    car.speed = car.usual_speed = min(given["speed"], fastest)
     car.kind = KIND.NEMESIS if kind == "nemesis" else GOES[given["goes"]]
     if kind == "lawful":
         car.departs = given["departs_after"]
         car.rolls, car.lefts, car.blocks = given["rolls"], given["left"], given["blocks"]
         car.tailgates, car.parks, car.park_time = given["tailgates"], given["parks"], given["parks_for"]
+    elif kind == "chosen":
+        car.departs = given["departs_after"]
 
 
 def _add_stages(

@@ -11,7 +11,16 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
-from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Scratch, Traffic, scratch, vehicles_of
+from dubins_traffic.policies.rules.tables import (
+    KIND,
+    Driver,
+    Drivers,
+    Leg,
+    Scratch,
+    Traffic,
+    scratch,
+    vehicles_of,
+)
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.routing.lane_graph import nearest_stage
@@ -62,6 +71,7 @@ class Rules:
             command=kept_commands(1, cars),
             stage=stage,
             distance=distance,
+            choice=table(Leg, 0),
         )
 
     def act(self, observation: Observation) -> Command:

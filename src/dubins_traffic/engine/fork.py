@@ -76,7 +76,12 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
         memory=memory,
         breach_log=breach_log,
         drivers=rows_of(
-            world.drivers, trials, stage=world.drivers.stage, distance=world.drivers.distance, **seed
+            world.drivers,
+            trials,
+            stage=world.drivers.stage,
+            distance=world.drivers.distance,
+            choice=world.drivers.choice,
+            **seed,
         ),
         scratch=_copied(world.scratch),
         agents=_agents(world.agents, trials, seeds),

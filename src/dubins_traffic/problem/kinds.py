@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
 from dubins_traffic.problem import limits
-from dubins_traffic.problem.faults import Strict, parse
+from dubins_traffic.problem.faults import Strict, fault, parse
 
 Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
@@ -143,6 +144,65 @@ class Nemesis(Strict):
     speed: Speed = Field(default=0.7, description="speed while the ego is not behind it, m/s")
 
 
+class Choice(Strict):
+    """What is chosen for one leg of a car: a lane and the disc at its end. What is null is left to the law."""
+
+    at: Annotated[int, Field(ge=0, lt=limits.LEGS)] = Field(
+        description="number of the leg; 0 is the lane in which it starts"
+    )
+    exit: Annotated[int, Field(ge=0, lt=limits.EXITS)] | None = Field(
+        default=None,
+        description="which exit of the crossing at its end, counted counter-clockwise from the way back, which is 0",
+    )
+    speed: Share | None = Field(default=None, description="speed in the lane, as a share of the largest")
+    pause: Seconds | None = Field(default=None, description="seconds for which it pauses in the lane")
+    pause_at: Share | None = Field(
+        default=None, description="share of the lane after which it does; null: 0.5"
+    )
+    hold: Seconds | None = Field(
+        default=None, description="seconds of its own turn for which it holds at the line of the crossing"
+    )
+    dwell: Seconds | None = Field(
+        default=None, description="seconds for which it stands in the disc at the end of the lane"
+    )
+    gap: Distance | None = Field(default=None, description="gap kept behind what is ahead in its lane, m")
+
+    @model_serializer(mode="wrap")
+    def _sparse(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if value is not None}
+
+
+class Chosen(Strict):
+    """Keeps the rules of the road, and does what a table says where they leave it a choice."""
+
+    goes: Literal["wander", "loop", "places"] = Field(
+        default="wander", description="where nothing is chosen: at random, round a cycle, or between places"
+    )
+    cycle: list[LatticePoint] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=limits.GOALS,
+        description="for loop: lattice points of the intersections, in order; null: drawn",
+    )
+    speed: Speed = Field(default=0.5, description="speed where nothing is chosen, m/s")
+    departs_after: Annotated[float, Field(ge=0, le=50)] = Field(
+        default=0.0,
+        description="seconds for which it parks where it starts; before a crossing it does not park",
+    )
+    choices: list[Choice] = Field(
+        default=[],
+        max_length=limits.LEGS,
+        description="what is chosen, a row for each leg for which anything is; cut to what E3 to E5 allow",
+    )
+
+    @field_validator("choices")
+    @classmethod
+    def _in_order(cls, rows: list[Choice]) -> list[Choice]:
+        if any(earlier.at >= later.at for earlier, later in pairwise(rows)):
+            raise fault("rows out of order", "the legs `at` in rising order, each once")
+        return rows
+
+
 class Counter(Strict):
     """Keeps the ego from a goal for ever where the assumption is too weak to forbid it: plays the counterstrategy."""
 
@@ -169,11 +229,12 @@ KINDS: dict[str, type[Strict]] = {
     "scripted": Scripted,
     "lawful": Lawful,
     "nemesis": Nemesis,
+    "chosen": Chosen,
     COUNTER: Counter,
     REMOTE: Remote,
 }
 """Kinds by name, each with the model of its parameters; `agents.kinds` says what is made of them."""
-KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis"})
+KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis", "chosen"})
 """Kinds of e-agents that keep the rules of the road."""
 ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})
 """Kinds of e-agents whose trials run by themselves: drivers of their own decide, in Python or elsewhere."""
@@ -223,4 +284,4 @@ def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 def loops(kind: str, parameters: Mapping[str, Any]) -> bool:
     """Tell whether an e-agent of `kind` drives round a cycle."""
-    return kind == "loop" or (kind == "lawful" and parameters["goes"] == "loop")
+    return kind == "loop" or (kind in ("lawful", "chosen") and parameters["goes"] == "loop")

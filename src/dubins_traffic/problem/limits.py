@@ -38,6 +38,10 @@ CORNERS = 1_000
 """Most corners of one polygon."""
 COMMANDS = 1_000_000
 """Most commands of a script."""
+LEGS = 10_000
+"""Most legs for which something is chosen for a car."""
+EXITS = 4
+"""Most exits of a crossing."""
 DELAY = 100_000
 """Longest command delay, ticks."""
 YAW_PER_TICK = 0.5

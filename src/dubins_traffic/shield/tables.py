@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
-from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Traffic, vehicles_of
+from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Leg, Traffic, vehicles_of
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
@@ -202,4 +202,5 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
         command=kept_commands(trials, cars),
         stage=np.array(stage, dtype=np.int64),
         distance=distance,
+        choice=table(Leg, 0),
     )

@@ -187,7 +187,13 @@ def drive_on(
     x, y = state.x[b, n], state.y[b, n]
     bits = np.int64(labels.bits[b, n])
     special = bits & (FLAG.BLOCKED | FLAG.LEFT) != 0 or car.violations & VIOLATION.LEFT_SIDE != 0
-    if special or drivers.car[b, n].hold > 0.0 or vehicle.tightest > 0.0 or part == PART.AFTER:
+    if (
+        special
+        or drivers.car[b, n].hold > 0.0
+        or car.pause > 0.0
+        or vehicle.tightest > 0.0
+        or part == PART.AFTER
+    ):
         return False
     if car.kind == KIND.ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
         return False

@@ -8,6 +8,7 @@ from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import DRAW, below, uniform
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
+from dubins_traffic.policies.rules.chosen import choose
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Scratch, Traffic, Vehicle
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.roads.table import RoadTable
@@ -64,6 +65,8 @@ def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
     car.violations = violations
     price_exits(b, n, tick, traffic)
     car.next_lane = cheapest(v, roads.vert_off[drivers.net[b]], 15, roads, scratch)
+    if car.choices != 0:
+        choose(b, n, BARRED, traffic)
 
 
 @jit_inline

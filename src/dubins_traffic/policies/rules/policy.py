@@ -17,6 +17,7 @@ from dubins_traffic.cars.state import Command, Labels, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
+from dubins_traffic.policies.rules.chosen import keeps_own_gap, pauses
 from dubins_traffic.policies.rules.command_cache import (
     coast,
     cruise,
@@ -155,7 +156,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     kept = 0.0
     if who != -1:
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
-    speed = dawdle(b, n, speed, near, traffic)
+    speed = dawdle(b, n, speed, -way_to_go(way, x, y), near, traffic)
     speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
@@ -203,10 +204,12 @@ def follow(
     traffic: Traffic,
 ) -> tuple[float, float]:
     """Return (speed, gap to keep) of a car that has `who` ahead."""
-    state, drivers = traffic.state, traffic.drivers
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     kept = BUMPER if rides else wanted_gap(b, n, who, way, traffic, car, part, vehicle.reach)
+    if car.keeps > 0.0 and who >= 0 and keeps_own_gap(b, n, who, labels, car):
+        kept = car.keeps
     if kept > QUEUE_GAP and not rides and who != -1:
         turn = part == PART.BEFORE and car.turn > 0
         if turn or is_pressed(b, n, traffic):
@@ -216,13 +219,18 @@ def follow(
 
 
 @jit_inline
-def dawdle(b: int, n: int, speed: float, near: int, traffic: Traffic) -> float:
-    """Return the speed of a car that may hold up the ego, or stand in a disc, on purpose."""
+def dawdle(b: int, n: int, speed: float, to_go: float, near: int, traffic: Traffic) -> float:
+    """Return the speed of a car that may hold up the ego, or stand in its lane or in a disc, on purpose.
+
+    It is `to_go` metres before the end of its lane.
+    """
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     car = drivers.car[b, n]
     passes = car.aside != 0.0
     if car.kind == KIND.NEMESIS and not passes and before_ego(b, n, near, traffic):
         speed = min(speed, DAWDLE)
+    if car.pause > 0.0 and pauses(b, n, to_go, labels, traffic):
+        speed = 0.0
     if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):
         car.hold -= drivers.vehicle[b].period
         speed = 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
+from dubins_traffic.policies.rules.chosen import holds
 from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
@@ -227,6 +228,8 @@ def may_go(b: int, n: int, tick: int, traffic: Traffic) -> bool:
         dy = state.y[b, 0] - state.y[b, n]
         if dx * dx + dy * dy < TRAIL * TRAIL:
             return False
+    if not due and car.line_hold > 0.0 and holds(car, vehicle):
+        return False
     if has_room(b, n, car.next_lane, 0, traffic):
         return True
     waited = car.owed - ticks_of(CHOOSY, vehicle)

@@ -137,6 +137,22 @@ class Driver:
     """Where that stands which it may pass, metres."""
     watch_y: float
     """Where that stands which it may pass, metres."""
+    choice: int
+    """Its first row of `Drivers.choice`."""
+    choices: int
+    """For how many of its first legs something is chosen (`policies.rules.chosen`)."""
+    leg: int = -1
+    """The leg it is on, where something is chosen."""
+    usual_speed: float
+    """How fast it drives where nothing else is chosen, m/s."""
+    pause: float
+    """For how long it will still pause in its lane, seconds."""
+    pause_at: float
+    """After which share of the lane."""
+    line_hold: float
+    """For how long it holds at the line when it is its turn, seconds."""
+    keeps: float
+    """The gap it keeps behind what is ahead in its lane, metres, 0: the law's."""
 
 
 @record
@@ -195,13 +211,34 @@ class Vehicle:
     """Within how many seconds every goal has to be free once (E6)."""
 
 
+@record
+class Leg:
+    """What is chosen for a leg of a car: a lane and the disc at its end (`policies.rules.chosen`); NaN is nothing."""
+
+    exit: float
+    """The exit at its end, counted counter-clockwise from the way back, which is 0; only crossings have a choice."""
+    speed: float
+    """How fast the car drives outside discs, m/s."""
+    pause: float
+    """For how long it pauses in its lane, before it comes near to the crossing, seconds."""
+    pause_at: float
+    """After which share of the lane it does; 0.5 if not a number."""
+    hold: float
+    """For how long of its own turn it holds at the line of the crossing, seconds."""
+    dwell: float
+    """For how long it stands in the disc, seconds."""
+    gap: float
+    """What it keeps behind what is ahead in its lane, metres."""
+
+
 class Drivers(Tables):
     """The cars of a batch that the law drives.
 
     `active` (B,): whether there is one in the trial; `net` (B,): number of the road network; `seed` (B,) uint64 and
     `trial` (B,): of the random numbers; `vehicle` (B,), `car` (B, N), `way` (B, N) and `command` (B, ceil(N / BLOCK));
     `stage` (M,): lanes of loops, and goals; `distance` (M, L): for a goal, metres from the beginning of each lane to
-    the end of the lane by which the goal is reached; (0, 0) where nobody drives a round.
+    the end of the lane by which the goal is reached; (0, 0) where nobody drives a round; `choice` (C,): what is chosen
+    for the legs of cars, one car's after another's (`policies.rules.chosen`).
     """
 
     active: Ints
@@ -214,6 +251,7 @@ class Drivers(Tables):
     command: Rows[KeptCommands]
     stage: Ints
     distance: Floats
+    choice: Rows[Leg]
 
 
 class Scratch(Tables):

@@ -1,0 +1,199 @@
+"""What is chosen for a car of the kind `chosen`: tables to draw, to change a little, and to shrink.
+
+A table is an array (K, CHOICES) of numbers with a row for each of the first K legs of a car and the columns `CHOICE`;
+what is not a number is left to the law, so a table of none is the kind `lawful`. In
+documents only the numbers stand, as rows of `problem.kinds.Choice`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.policies.rules.tables import LONGEST_WAY, through_speed
+from dubins_traffic.problem.instance import EAgent
+from dubins_traffic.problem.kinds import parameters_of
+from dubins_traffic.rules.parameters import RuleParameters
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.roads.network import RoadNetwork
+
+
+class _Choice(NamedTuple):
+    """What may be chosen for a leg, columns of a table: the fields of `policies.rules.tables.Leg`."""
+
+    EXIT: int = 0
+    """The exit at its end, counted counter-clockwise from the way back, which is 0; only crossings have a choice."""
+    SPEED: int = 1
+    """Share of the largest speed at which the car drives outside discs."""
+    PAUSE: int = 2
+    """Seconds for which it pauses in its lane, before it comes near to the crossing."""
+    PAUSE_AT: int = 3
+    """Share of the lane after which it does."""
+    HOLD: int = 4
+    """Seconds of its own turn for which it holds at the line of the crossing."""
+    DWELL: int = 5
+    """Seconds for which it stands in the disc at the end of the lane."""
+    GAP: int = 6
+    """Metres kept behind what is ahead in its lane."""
+
+
+CHOICE: Final = _Choice()
+CHOICES: Final = len(CHOICE)
+NAMES: Final = tuple(name.lower() for name in CHOICE._fields)
+"""The keys of a row in a document, in the order of the columns."""
+EXITS: Final = 4
+BOUNDS: Final = np.array(
+    [(0.0, EXITS - 1.0), (0.15, 1.0), (0.0, 30.0), (0.0, 1.0), (0.0, 8.0), (0.0, 1.0), (0.06, 0.8)]
+)
+"""Between which values tables are drawn, a row for each column; `cut` knows the limits of a problem."""
+LEAST_GAP, MOST_GAP = float(BOUNDS[CHOICE.GAP, 0]), float(BOUNDS[CHOICE.GAP, 1])
+"""Gaps that the law can keep, metres."""
+SLOWEST = 2.4
+"""A car drives at least so many times as fast as one that lingers."""
+SHARE = 0.8
+"""Up to which share of the time that E3 to E5 allow something is chosen."""
+STEP = 0.15
+"""How far `mutated` moves a number, standard deviation as a share of its range."""
+
+
+def empty(legs: int) -> Floats:
+    """Return a table of `legs` rows in which nothing is chosen."""
+    return np.full((legs, CHOICES), np.nan)
+
+
+def from_rows(rows: Sequence[Mapping[str, Any]]) -> Floats:
+    """Return the table of the rows of a document."""
+    table = empty(1 + max((row["at"] for row in rows), default=-1))
+    for row in rows:
+        for column, name in enumerate(NAMES):
+            value = row.get(name)
+            if value is not None:
+                table[row["at"], column] = value
+    return table
+
+
+def to_rows(table: Floats) -> list[dict[str, Any]]:
+    """Return the rows of a document with what a table chooses; legs for which nothing is chosen are left out."""
+    rows: list[dict[str, Any]] = []
+    for leg in np.flatnonzero(np.isfinite(table).any(axis=1)).tolist():
+        row: dict[str, Any] = {"at": leg}
+        for column in np.flatnonzero(np.isfinite(table[leg])).tolist():
+            value = float(table[leg, column])
+            row[NAMES[column]] = int(value) if column == CHOICE.EXIT else value
+        rows.append(row)
+    return rows
+
+
+def drawn(dice: np.random.Generator, legs: int, share: float = 0.3) -> Floats:
+    """Return a table of `legs` rows of which each number is chosen with probability `share`, uniform in `BOUNDS`."""
+    low, high = BOUNDS[:, 0], BOUNDS[:, 1]
+    table = low + (high - low) * dice.random((legs, CHOICES))
+    table[:, CHOICE.EXIT] = dice.integers(0, EXITS, legs)
+    table[dice.random((legs, CHOICES)) >= share] = np.nan
+    return table
+
+
+def mutated(dice: np.random.Generator, table: Floats) -> Floats:
+    """Return a table that differs in one number: moved a little, chosen anew, or left to the law."""
+    own = table.copy()
+    leg, column = int(dice.integers(len(own))), int(dice.integers(CHOICES))
+    chosen = np.argwhere(np.isfinite(own))
+    move = dice.random()
+    if len(chosen) and move < 0.7:
+        leg, column = chosen[dice.integers(len(chosen))].tolist()
+    low, high = BOUNDS[column].tolist()
+    if np.isfinite(own[leg, column]) and move < 0.2:
+        own[leg, column] = np.nan
+    elif column == CHOICE.EXIT:
+        own[leg, column] = dice.integers(0, EXITS)
+    elif np.isfinite(own[leg, column]) and move < 0.5:
+        moved = own[leg, column] + STEP * (high - low) * dice.standard_normal()
+        own[leg, column] = min(max(moved, low), high)
+    else:
+        own[leg, column] = low + (high - low) * dice.random()
+    return own
+
+
+def reductions(table: Floats) -> Iterator[Floats]:
+    """Yield the tables with one thing less: without one leg's choices, first, then without one number."""
+    chosen = np.isfinite(table)
+    for leg in np.flatnonzero(chosen.sum(axis=1) > 1).tolist():
+        own = table.copy()
+        own[leg] = np.nan
+        yield own
+    for leg, column in np.argwhere(chosen).tolist():
+        own = table.copy()
+        own[leg, column] = np.nan
+        yield own
+
+
+def cut(table: Floats, speed: float, problem: Problem) -> Floats:
+    """Return a table whose numbers keep to what E3 to E5 allow in a problem.
+
+    Parameters
+    ----------
+    table : (K, CHOICES)
+        What is chosen; its speeds are shares of the largest.
+    speed
+        At which the car drives where nothing is chosen, m/s.
+    problem
+        Whose rules and car decide.
+
+    Returns
+    -------
+    (K, CHOICES)
+        The same with speeds in m/s.
+    """
+    rules = RuleParameters.from_mapping(problem.rules)
+    fastest = problem.car.bounds.speed
+    own = table.copy()
+    slowest = min(SLOWEST * rules.linger_distance / max(rules.linger_time, problem.period), fastest)
+    own[:, CHOICE.SPEED] = np.clip(own[:, CHOICE.SPEED] * fastest, slowest, fastest)
+    hold = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
+    own[:, CHOICE.HOLD] = np.clip(own[:, CHOICE.HOLD], 0.0, SHARE * hold)
+    rest = SHARE * rules.rest_time - rules.linger_time - hold
+    own[:, CHOICE.PAUSE] = np.clip(own[:, CHOICE.PAUSE], 0.0, max(rest, 0.0))
+    through = np.where(np.isfinite(own[:, CHOICE.SPEED]), own[:, CHOICE.SPEED], speed)
+    through = np.minimum(np.maximum(through, through_speed(problem)), fastest)
+    longest = LONGEST_WAY * (problem.intersection_radius + problem.car.body.reach)
+    spare = np.maximum(SHARE * (rules.exit_time - longest / through), 0.0)
+    own[:, CHOICE.DWELL] = np.clip(own[:, CHOICE.DWELL], 0.0, spare)
+    own[:, CHOICE.GAP] = np.clip(own[:, CHOICE.GAP], LEAST_GAP, MOST_GAP)
+    return own
+
+
+def with_choices(
+    instance: Instance, tables: Mapping[int, Floats], starts: Mapping[int, Pose] | None = None
+) -> Instance:
+    """Return an instance in which tables drive some e-agents, by their numbers (1 is the first), and where they start.
+
+    Whoever is of the kind `chosen` already keeps its other parameters; of others the kind is changed.
+    """
+    agents, poses = list(instance.e_agents), list(instance.starts)
+    for n, table in tables.items():
+        agent = agents[n - 1]
+        known = agent.parameters if agent.kind == "chosen" else parameters_of("chosen", {})
+        agents[n - 1] = EAgent("chosen", agent.name, "chosen", {**known, "choices": to_rows(table)})
+    for n, pose in (starts or {}).items():
+        poses[n] = pose
+    return replace(instance, e_agents=tuple(agents), starts=tuple(poses))
+
+
+def table_of(agent: EAgent) -> Floats:
+    """Return the table that drives an e-agent of the kind `chosen`."""
+    return from_rows(agent.parameters["choices"])
+
+
+def place_in_lane(network: RoadNetwork, lane: int, share: float, w: float) -> Pose:
+    """Return the pose in the middle of a lane after a share of its way, w metres right of the centre line."""
+    (x, y), (end_x, end_y) = np.asarray(network.lane_line(lane, -w))[[0, -1]].tolist()
+    far = float(np.hypot(end_x - x, end_y - y))
+    c, s = (end_x - x) / far, (end_y - y) / far
+    return Pose(x + share * (end_x - x), y + share * (end_y - y), c, s)
