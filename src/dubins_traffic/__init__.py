@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dubins_traffic.controllers.shield import Shield
     from dubins_traffic.engine.batch import Batch, run_batch
     from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
+    from dubins_traffic.falsify.estimate import estimate
     from dubins_traffic.falsify.regress import regress
     from dubins_traffic.falsify.search import falsify
     from dubins_traffic.falsify.shrink import shrink
@@ -52,6 +53,7 @@ _PLACES = {
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
     "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
     "controllers.shield": ("Shield",),
+    "falsify.estimate": ("estimate",),
     "falsify.regress": ("regress",),
     "falsify.search": ("falsify",),
     "falsify.shrink": ("shrink",),
@@ -130,6 +132,7 @@ __all__ = [
     "Verification",
     "__version__",
     "draw",
+    "estimate",
     "falsify",
     "generate_network",
     "instance_from_document",

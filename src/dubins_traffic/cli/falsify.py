@@ -107,14 +107,14 @@ def falsify(
     try:
         with faults.no_silent_end(), progress(trials) as tell:
 
-            def told(own: Search) -> None:
+            def heard(own: Search) -> None:
                 seen[:] = [own]
                 tell(own.counts.trials, trials or own.counts.trials)
 
             found = search(
                 configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
                 trials=trials, seconds=seconds, seed=seed, strategy=strategy, duration=duration or None,
-                workers=workers, ray=ray, resume=resume, progress=told,
+                workers=workers, ray=ray, resume=resume, progress=heard,
             )  # fmt: skip
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {seen[0].counts.trials if seen else 0} trials; --resume goes on")

@@ -15,6 +15,7 @@ from dubins_traffic.cli import (
     check_controller,
     competition,
     convert,
+    estimate,
     evaluate,
     falsify,
     faults,
@@ -87,6 +88,7 @@ app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
 app.command("falsify", epilog=falsify.EXAMPLES)(falsify.falsify)
 app.command("shrink", epilog=falsify.SHRINK_EXAMPLES)(falsify.shrink)
+app.command("estimate", epilog=estimate.EXAMPLES)(estimate.estimate)
 app.command("regress", epilog=falsify.REGRESS_EXAMPLES)(falsify.regress)
 app.add_typer(competition.competition, name="competition")
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsify.cells import Cell, Manoeuvre
@@ -84,10 +84,11 @@ def case_of(instance: Instance, name: str | None = None) -> Case:
     expected = "an object with rule, manoeuvre, degree, controller, time, tick and sentence"
     if not isinstance(found, Mapping):
         raise InputError("not a case", file=name, field=KEY, value=found, expected=expected)
+    told = cast("Mapping[str, Any]", found)
     try:
-        story = Story(**found)
+        story = Story(**told)
         if story.manoeuvre.upper() not in Manoeuvre.__members__:
             raise InputError("no manoeuvre", file=name, field=f"{KEY}.manoeuvre", value=story.manoeuvre)
     except (TypeError, AttributeError):
-        raise InputError("not a case", file=name, field=KEY, value=sorted(found), expected=expected) from None
+        raise InputError("not a case", file=name, field=KEY, value=sorted(told), expected=expected) from None
     return Case(instance, story)

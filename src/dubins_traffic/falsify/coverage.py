@@ -18,7 +18,7 @@ THROUGH: Final = (Manoeuvre.STRAIGHT, Manoeuvre.LEFT, Manoeuvre.RIGHT)
 ALONG: Final = {
     "1.collision": (Manoeuvre.DRIVING, Manoeuvre.OVERTAKING),
     "1.road": (Manoeuvre.DRIVING, Manoeuvre.OVERTAKING),
-    "2.left": (Manoeuvre.DRIVING, Manoeuvre.OVERTAKING),
+    "2.left": (Manoeuvre.OVERTAKING,),
     "2.return": (Manoeuvre.OVERTAKING,),
 }
 """What an ego does on a road when it may break a rule."""
@@ -40,7 +40,7 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
                 else:
                     at_discs = through if rule.startswith("1.") else ()
                     found |= {Cell(rule, own, degree) for own in (*ALONG[rule], *at_discs)}
-    return sorted(found)
+    return sorted(found, key=lambda cell: cell.number)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +22,9 @@ BARRED: Final = 1 << 40
 STRAIGHT_WITHIN: Final = 0.5
 """Sine of the largest turn that still counts as going straight on, 30 degrees."""
 _AT_CROSSINGS: Final = ("3.stop", "3.order", "3.clear")
+
+
+Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class Passages:
     end: Ints
     manoeuvre: Ints
     degree: Ints
-    in_disc: npt.NDArray[np.bool_]
+    in_disc: Bools
     flags: Ints
     before: Ints
 
@@ -78,17 +80,17 @@ class Passages:
         way; a collision needs somebody near.
         """
         seen, came = self.flags, self.before
-        met = came & (FLAG.AHEAD | BARRED) != 0
-        blocked = seen & (FLAG.BLOCKED | FLAG.OVERTAKING) != 0
+        met = _held(came, FLAG.AHEAD | BARRED)
+        blocked = _held(seen, FLAG.BLOCKED | FLAG.OVERTAKING)
         entered = self.in_disc & (self.manoeuvre != Manoeuvre.LEAVING) & (self.degree >= crossing_degree)
-        tested = {
-            "1.collision": np.where(self.in_disc, met, blocked | (seen & (FLAG.AHEAD | BARRED) != 0)),
+        tested: dict[str, Bools] = {
+            "1.collision": np.where(self.in_disc, met, blocked | _held(seen, FLAG.AHEAD | BARRED)),
             "1.road": np.ones(len(seen), dtype=bool),
-            "2.left": ~self.in_disc & (blocked | (seen & FLAG.LEFT != 0)),
-            "2.return": ~self.in_disc & (seen & FLAG.LEFT != 0),
+            "2.left": ~self.in_disc & (blocked | _held(seen, FLAG.LEFT)),
+            "2.return": ~self.in_disc & _held(seen, FLAG.LEFT),
             "3.stop": entered,
-            "3.order": entered & (came & FLAG.AHEAD != 0),
-            "3.clear": entered & (came & BARRED != 0),
+            "3.order": entered & _held(came, FLAG.AHEAD),
+            "3.clear": entered & _held(came, BARRED),
         }
         within = self.manoeuvre * DEGREES + self.degree
         count = np.zeros(CELLS, dtype=np.int64)
@@ -99,7 +101,7 @@ class Passages:
 
 
 def find_passages(
-    lane: Ints, bits: npt.NDArray[Any], frames: Ints, networks: Sequence[RoadNetwork]
+    lane: Ints, bits: npt.NDArray[np.integer[Any]], frames: Ints, networks: Sequence[RoadNetwork]
 ) -> Passages:
     """Return the stretches of some trials.
 
@@ -119,9 +121,9 @@ def find_passages(
     begins = np.ones(whole.shape, dtype=bool)
     begins[:, 1:] = whole[:, 1:] != whole[:, :-1]
     place = np.flatnonzero(begins)
-    flags = bits.astype(np.int64)
-    waits = flags & (FLAG.APPROACH | FLAG.STOPPED) != 0
-    flags |= np.where(waits & (flags & FLAG.CLEAR == 0), BARRED, 0)
+    flags: Ints = bits.astype(np.int64)
+    waits = _held(flags, FLAG.APPROACH | FLAG.STOPPED)
+    flags |= np.where(waits & ~_held(flags, FLAG.CLEAR), BARRED, 0)
     held = np.bitwise_or.reduceat(flags.ravel(), place)
     ends = np.append(place[1:], whole.size)
     kept = whole.ravel()[place] != OVER
@@ -160,9 +162,14 @@ def _ground(networks: Sequence[RoadNetwork]) -> _Ground:
     tables = [_lanes(network) for network in distinct.values()]
     sizes = np.cumsum([0, *(len(head) for head, _, _ in tables)])
     base = dict(zip(distinct, sizes.tolist(), strict=False))
-    join = partial(np.concatenate, axis=0)
-    head, tail, tangent = (join([table[k] for table in tables]) for k in range(3))
-    return _Ground(head, tail, tangent, np.array([base[id(network)] for network in networks]))
+    heads, tails, tangents = zip(*tables, strict=True)
+    place = np.array([base[id(network)] for network in networks])
+    return _Ground(np.concatenate(heads), np.concatenate(tails), np.concatenate(tangents), place)
+
+
+def _held(flags: Ints, wanted: int) -> Bools:
+    """Tell of which stretches one of the flags `wanted` held."""
+    return (flags & wanted) != 0
 
 
 def _lanes(network: RoadNetwork) -> tuple[Ints, Ints, npt.NDArray[np.float64]]:
@@ -196,7 +203,7 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
         Manoeuvre.RIGHT,
     )
     along = np.select(
-        [flags & FLAG.OVERTAKING != 0, flags & FLAG.TURNED != 0],
+        [_held(flags, FLAG.OVERTAKING), _held(flags, FLAG.TURNED)],
         [Manoeuvre.OVERTAKING, Manoeuvre.TURNED],
         Manoeuvre.DRIVING,
     )
