@@ -7,8 +7,8 @@ from typing import Any
 
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.engine.group import Group
-from dubins_traffic.falsify.companies import Driven
-from dubins_traffic.falsify.splitting import Begin
+from dubins_traffic.falsification.companies import Driven
+from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.instance import Instance, Problem
 

@@ -8,13 +8,13 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
-from dubins_traffic.falsify.archive import files
-from dubins_traffic.falsify.case import read_case
-from dubins_traffic.falsify.estimate import by_counting, by_splitting, drawn
-from dubins_traffic.falsify.intervals import clopper_pearson
-from dubins_traffic.falsify.judging import confirm, judge
-from dubins_traffic.falsify.shrink import single_removals
-from dubins_traffic.falsify.splitting import follow, split
+from dubins_traffic.falsification.archive import files
+from dubins_traffic.falsification.case import read_case
+from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
+from dubins_traffic.falsification.intervals import clopper_pearson
+from dubins_traffic.falsification.judging import confirm, judge
+from dubins_traffic.falsification.shrink import single_removals
+from dubins_traffic.falsification.splitting import follow, split
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import NEAR, Rolling, corridor, standing
 
@@ -37,7 +37,7 @@ def test_every_case_is_violated_within_the_assumption_when_it_is_judged_afresh(f
     cases = [read_case(path) for path in files(found)]
     assert {case.story.rule for case in cases} >= {"1.road", "2.left", "3.stop", "3.clear"}
     for case in cases:
-        judged = judge(case.instance, lambda: _simple(), "simple")
+        judged = judge(case.instance, _simple, "simple")
         breach = judged.breach(case.story.rule)
         verdict = judged.score.verdict
         assert verdict is not None
@@ -86,9 +86,7 @@ def test_a_shrunk_case_loses_its_breach_with_any_one_thing_less(found: Path, tmp
     assert dt.run_trial(dt.load_instance(tmp_path / "small.json"), "simple").score.verdict is not None
 
 
-def test_commands_find_shrink_and_run_cases_again(
-    found: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "found"
     arguments = ["--controller", "simple", "--rule", "3.stop", "--trials", "16", "--duration", "6", "-o"]
     assert main(["falsify", "junction", *arguments, str(folder), "--json"]) == 0
@@ -126,7 +124,7 @@ def test_a_particle_that_branches_off_is_a_fork_bit_for_bit() -> None:
     whole.advance(90)
     twin = whole.reseeded([7, 8, 9, 10])
     twin.advance(instances[0].ticks - 90)
-    from dubins_traffic.falsify.splitting import Particle
+    from dubins_traffic.falsification.splitting import Particle
 
     particles = [
         Particle(own, ((0, own.seed), (3, seed))) for own, seed in zip(instances, (7, 8, 9, 10), strict=True)
@@ -169,8 +167,8 @@ def test_an_event_of_one_in_a_million_is_estimated_with_fifty_thousand_trials() 
 
 
 def test_monte_carlo_counts_what_the_judge_says() -> None:
-    from dubins_traffic.falsify.crew import Here
-    from dubins_traffic.falsify.sampling import prepared
+    from dubins_traffic.falsification.crew import Here
+    from dubins_traffic.falsification.sampling import prepared
 
     configuration = prepared(dt.load_config("junction"), 6.0, {})
     found = by_counting(

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify.archive import opened
-from dubins_traffic.falsify.case import Case, Story, read_case
-from dubins_traffic.falsify.cells import CELLS, Cell, Manoeuvre
-from dubins_traffic.falsify.coverage import coverage, possible
-from dubins_traffic.falsify.passages import find_passages
-from dubins_traffic.falsify.sampling import Genome, Source, prepared
+from dubins_traffic.falsification.archive import opened
+from dubins_traffic.falsification.case import Case, Story, read_case
+from dubins_traffic.falsification.cells import CELLS, Cell, Manoeuvre
+from dubins_traffic.falsification.coverage import coverage, possible
+from dubins_traffic.falsification.passages import find_passages
+from dubins_traffic.falsification.sampling import Genome, Source, prepared
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.network import RoadNetwork

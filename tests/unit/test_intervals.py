@@ -3,7 +3,7 @@
 import pytest
 from scipy import stats
 
-from dubins_traffic.falsify.intervals import clopper_pearson, of_mean, student, wilson
+from dubins_traffic.falsification.intervals import clopper_pearson, of_mean, student, wilson
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def estimate(
 ) -> None:
     """Estimate the probability that an ego breaks a rule, or comes near it, with a 95 % interval."""
     from dubins_traffic.controllers.registry import dressed
-    from dubins_traffic.falsify.estimate import estimate as run
+    from dubins_traffic.falsification.estimate import estimate as run
 
     with faults.no_silent_end(), progress(what="trials") as tell:
         found = run(

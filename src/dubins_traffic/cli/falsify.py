@@ -14,8 +14,8 @@ from dubins_traffic.cli.progress import progress
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dubins_traffic.falsify.coverage import Row
-    from dubins_traffic.falsify.search import Found, Search
+    from dubins_traffic.falsification.coverage import Row
+    from dubins_traffic.falsification.search import Found, Search
 
 EXAMPLES = options.examples(
     "falsify junction --controller lanes --trials 2000 -o found",
@@ -100,7 +100,7 @@ def falsify(
     been found, and --resume goes on.
     """
     from dubins_traffic.controllers.registry import dressed
-    from dubins_traffic.falsify.search import falsify as search
+    from dubins_traffic.falsification.search import falsify as search
 
     driver = dressed(controller, shield=shield, sandbox=options.boxes(sandbox, limits, trust))
     seen: list[Search] = []
@@ -139,8 +139,8 @@ def shrink(
     ] = None,
 ) -> None:
     """Take away from a case what its failure does not need; write what is left, with its replay page."""
-    from dubins_traffic.falsify.pages import write_page
-    from dubins_traffic.falsify.shrink import shrink as smaller
+    from dubins_traffic.falsification.pages import write_page
+    from dubins_traffic.falsification.shrink import shrink as smaller
 
     target = output or options.beside(case, ".small.json")
     page = str(Path(target).with_suffix(".html"))
@@ -161,7 +161,7 @@ def regress(
 ) -> None:
     """Run a folder of cases with a controller; exit with status 1 if it breaks a rule in any of them."""
     from dubins_traffic.controllers.registry import dressed
-    from dubins_traffic.falsify.regress import regress as run
+    from dubins_traffic.falsification.regress import regress as run
 
     found = run(folder, dressed(controller, shield=shield))
     if json:

@@ -12,11 +12,11 @@ import numpy as np
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify.companies import beginner
-from dubins_traffic.falsify.crew import Crew, crew_of, maker
-from dubins_traffic.falsify.intervals import Interval, clopper_pearson, of_mean, wilson
-from dubins_traffic.falsify.sampling import STREAM, prepared
-from dubins_traffic.falsify.splitting import Begin, split
+from dubins_traffic.falsification.companies import beginner
+from dubins_traffic.falsification.crew import Crew, crew_of, maker
+from dubins_traffic.falsification.intervals import Interval, clopper_pearson, of_mean, wilson
+from dubins_traffic.falsification.sampling import STREAM, prepared
+from dubins_traffic.falsification.splitting import Begin, split
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.scoring.verdict import EGO_RULES

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.falsify.trying import EgoTrace, Tried, broken_formulas, tried_of
+from dubins_traffic.falsification.trying import EgoTrace, Tried, broken_formulas, tried_of
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.record.reader import Record, read, replay
 from dubins_traffic.runs.single import run_trial

@@ -14,8 +14,8 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, ask_all, check_clear, grouped
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
-from dubins_traffic.falsify.cells import CELLS, Cell
-from dubins_traffic.falsify.passages import Passages, find_passages
+from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters

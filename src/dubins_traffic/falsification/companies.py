@@ -12,7 +12,7 @@ from dubins_traffic.engine.controlled import Controlled, Maker, grouped
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.falsify.splitting import Begin
+from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.records import table
 from dubins_traffic.rules.judged import kinds_of

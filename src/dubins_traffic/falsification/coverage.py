@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from dubins_traffic.falsify.cells import Cell, Manoeuvre
+from dubins_traffic.falsification.cells import Cell, Manoeuvre
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.verdict import EGO_RULES
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify.archive import files
-from dubins_traffic.falsify.case import Case, read_case
-from dubins_traffic.falsify.judging import judge
-from dubins_traffic.falsify.sentences import sentence_of
+from dubins_traffic.falsification.archive import files
+from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.falsification.judging import judge
+from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.verdict import EGO_NAME, Ruling
 

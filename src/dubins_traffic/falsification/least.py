@@ -6,14 +6,14 @@ from bisect import insort
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
-from dubins_traffic.falsify.case import Case, Story
-from dubins_traffic.falsify.judging import judge
-from dubins_traffic.falsify.sampling import Genome
-from dubins_traffic.falsify.trying import DONE, Tried
+from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.judging import judge
+from dubins_traffic.falsification.sampling import Genome
+from dubins_traffic.falsification.trying import DONE, Tried
 
 if TYPE_CHECKING:
-    from dubins_traffic.falsify.crew import Crew
-    from dubins_traffic.falsify.sampling import Source
+    from dubins_traffic.falsification.crew import Crew
+    from dubins_traffic.falsification.sampling import Source
     from dubins_traffic.scoring.score import Score
 
 MOST: Final = 5

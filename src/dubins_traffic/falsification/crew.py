@@ -15,7 +15,7 @@ from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError, WorkerLostError
-from dubins_traffic.falsify.trying import Findings, Laboratory
+from dubins_traffic.falsification.trying import Findings, Laboratory
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

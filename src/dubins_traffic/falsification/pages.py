@@ -6,12 +6,12 @@ import os
 from typing import TYPE_CHECKING
 
 from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.falsify.judging import judge
+from dubins_traffic.falsification.judging import judge
 from dubins_traffic.scoring.verdict import EGO_NAME
 from dubins_traffic.viewer.replay import write_replay
 
 if TYPE_CHECKING:
-    from dubins_traffic.falsify.case import Case
+    from dubins_traffic.falsification.case import Case
 
 
 def write_page(case: Case, path: str | os.PathLike[str], controller: str | None = None) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.falsify.cells import CELLS, DEGREES, MANOEUVRES, Cell, Manoeuvre
+from dubins_traffic.falsification.cells import CELLS, DEGREES, MANOEUVRES, Cell, Manoeuvre
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.propositions import FLAG

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from dubins_traffic.agents import choices
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.falsify.sampling import CHOSEN
+from dubins_traffic.falsification.sampling import CHOSEN
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.problem.instance import Disturbances, EAgent, Instance
 from dubins_traffic.problem.kinds import KINDS, parameters_of

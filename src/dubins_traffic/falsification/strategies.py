@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify.sampling import Genome, Source
+from dubins_traffic.falsification.sampling import Genome, Source
 
 if TYPE_CHECKING:
-    from dubins_traffic.falsify.trying import Tried
+    from dubins_traffic.falsification.trying import Tried
 
 FRESH: Final = 0.15
 """Share of proposals of an evolution that are drawn at random."""

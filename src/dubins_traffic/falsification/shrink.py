@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.falsify.case import Case, Story, read_case
-from dubins_traffic.falsify.judging import Judged, confirm
-from dubins_traffic.falsify.removals import WAYS, Removal, Way, lead, removals
-from dubins_traffic.falsify.sentences import sentence_of
-from dubins_traffic.falsify.trying import Laboratory
+from dubins_traffic.falsification.case import Case, Story, read_case
+from dubins_traffic.falsification.judging import Judged, confirm
+from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
+from dubins_traffic.falsification.sentences import sentence_of
+from dubins_traffic.falsification.trying import Laboratory
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify.case import Case, read_case
+from dubins_traffic.falsification.case import Case, read_case
 from dubins_traffic.files import locked, read_text, write_text
 
 CASES: Final = "cases"

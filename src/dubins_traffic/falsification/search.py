@@ -16,18 +16,18 @@ import numpy as np
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsify import archive as archives
-from dubins_traffic.falsify.archive import Archive
-from dubins_traffic.falsify.case import Case, Story
-from dubins_traffic.falsify.cells import CELLS, Cell
-from dubins_traffic.falsify.coverage import Row, coverage, possible
-from dubins_traffic.falsify.crew import Crew, crew_of
-from dubins_traffic.falsify.judging import confirm
-from dubins_traffic.falsify.least import Least
-from dubins_traffic.falsify.sampling import DURATION, Source, prepared
-from dubins_traffic.falsify.sentences import sentence_of
-from dubins_traffic.falsify.strategies import Strategy, make
-from dubins_traffic.falsify.trying import DONE, FORMULA, Tried
+from dubins_traffic.falsification import archive as archives
+from dubins_traffic.falsification.archive import Archive
+from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.coverage import Row, coverage, possible
+from dubins_traffic.falsification.crew import Crew, crew_of
+from dubins_traffic.falsification.judging import confirm
+from dubins_traffic.falsification.least import Least
+from dubins_traffic.falsification.sampling import DURATION, Source, prepared
+from dubins_traffic.falsification.sentences import sentence_of
+from dubins_traffic.falsification.strategies import Strategy, make
+from dubins_traffic.falsification.trying import DONE, FORMULA, Tried
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
