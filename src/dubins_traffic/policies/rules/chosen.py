@@ -22,6 +22,9 @@ HALF_WAY: Final = 0.5
 BEFORE_APPROACH: Final = 0.1
 """A car pauses at least this far before it takes its place in the order of a crossing, metres."""
 
+PASSES: Final = 8.0
+"""How near a car is that passes, in units of a body's farthest point."""
+
 
 @jit
 def choose(b: int, n: int, barred: float, traffic: Traffic) -> None:
@@ -65,7 +68,7 @@ def _chosen(value: float, otherwise: float) -> float:
 def pauses(b: int, n: int, to_go: float, labels: Labels, traffic: Traffic) -> bool:
     """Tell whether a car stands in its lane now because so it was chosen, and count the time.
 
-    It does once it has driven its share of the lane, `to_go` (m) before the lane's end, and is outside discs, has no
+    The time does not end while another e-agent passes. It pauses once it has driven its share of the lane, `to_go` (m) before the lane's end, and is outside discs, has no
     place in an order of arrival, and passes nothing.
     """
     roads, drivers = traffic.roads, traffic.drivers
@@ -80,8 +83,23 @@ def pauses(b: int, n: int, to_go: float, labels: Labels, traffic: Traffic) -> bo
     nearest = vehicle.disc + vehicle.reach + vehicle.approaches + BEFORE_APPROACH
     if to_go > max((1.0 - car.pause_at) * length, nearest):
         return False
-    car.pause -= vehicle.period
+    if car.pause > vehicle.period or not is_passed(b, n, labels, traffic):
+        car.pause -= vehicle.period
     return True
+
+
+@jit_inline
+def is_passed(b: int, n: int, labels: Labels, traffic: Traffic) -> bool:
+    """Tell whether another e-agent passes a car: that would be long on the left if the car drove off beside it."""
+    state = traffic.state
+    far = PASSES * traffic.drivers.vehicle[b].reach
+    found = False
+    for j in range(1, state.count[b]):
+        dx = state.x[b, j] - state.x[b, n]
+        dy = state.y[b, j] - state.y[b, n]
+        near = j != n and labels.lane[b, j] == labels.lane[b, n] and dx * dx + dy * dy < far * far
+        found = found or (near and np.int64(labels.bits[b, j]) & FLAG.LEFT != 0)
+    return found
 
 
 @jit_inline
