@@ -22,7 +22,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.scoring.margins import Margins
+from dubins_traffic.scoring.margins import MARGINS, MEASURED, Margins
 from dubins_traffic.scoring.score import score
 from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
 from tests.recordings import blocks
@@ -121,10 +121,11 @@ def test_signs_agree_with_the_verdict_on_records(
         kept = read(str(file))
         verdict = score(kept).verdict
         assert verdict is not None
-        assert list(verdict.robustness) == ["1.collision", "1.road", "2.left", "2.return"]
+        assert list(verdict.robustness) == [*MARGINS[:-1]]
         for rule, value in verdict.robustness.items():
             assert value is None or (value > 0.0) == (verdict.formulas[rule] == "presumably true"), rule
-        assert of(kept.instance, kept.frames, 100) == verdict.robustness
+        own = {rule: verdict.robustness[rule] for rule in ("1.collision", *MEASURED)}
+        assert of(kept.instance, kept.frames, 100) == own
     assert main(["score", str(file), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["trials"][0]["verdict"]["robustness"] == verdict.robustness
     assert main(["check", str(file)]) == 0

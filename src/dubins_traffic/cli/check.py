@@ -96,7 +96,10 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
         part = f"{excuse.assumption} ({excuse.clause})"
         console.print(f"  excused by {part}: {first}, {sensed} the sensing radius", markup=False)
         console.print(f"  {near} breach of the ego follows one near it", markup=False)
-    margins = [f"{rule} {value:.3f} m" for rule, value in verdict.robustness.items() if value is not None]
+    from dubins_traffic.scoring.margins import UNITS
+
+    known = [(rule, value) for rule, value in verdict.robustness.items() if value is not None]
+    margins = [f"{rule} {value:.3f} {UNITS.get(rule, 'm')}" for rule, value in known]
     if margins:
         console.print(f"  robustness: {', '.join(margins)}", markup=False)
 

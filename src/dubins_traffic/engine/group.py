@@ -251,7 +251,8 @@ class Group:
         pending = running(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
             score = scores.score(
-                self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging, ending,
+                self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging,
+                world.breach_log.entry[b], ending,
                 self._rules[b], name, begin.get(b),
             )  # fmt: skip
             if self._feed is not None:

@@ -122,6 +122,22 @@ class JudgedCar:
     """Run of being in the disc that its body meets."""
     came_by: int = -1
     """The lane by which it came into the disc that its body meets, -1 if it started there."""
+    ticket: int = -1
+    """Tick of its ticket, as of the frame before."""
+    approach_since: int = -1
+    """Run of approaching a crossing, as of the frame before."""
+
+
+@record
+class EntryMargins:
+    """The least margins of rule 3 over the ego's entries, negative once broken; infinite without an entry."""
+
+    stop: float = np.inf
+    """Ticks since it had stopped, or that it still had to approach for a stop."""
+    order: float = np.inf
+    """Ticks from its ticket to the next one."""
+    clear: float = np.inf
+    """Metres between the disc and the nearest body of others."""
 
 
 @record
@@ -157,6 +173,8 @@ class BreachLog(Tables):
         What is remembered of each car.
     goal : (G,) JudgedGoal
         The goals of one trial after the other.
+    entry : (B,) EntryMargins
+        By how much the ego has kept rule 3.
     goal_due : (B,) int64
         Tick in which the goals have to be looked at though no car comes or goes.
     look : (N,) int64
@@ -169,6 +187,7 @@ class BreachLog(Tables):
 
     car: Grid[JudgedCar]
     goal: Rows[JudgedGoal]
+    entry: Rows[EntryMargins]
     goal_due: Ints
     look: Ints
     row: Rows[FoundBreach]
@@ -187,6 +206,7 @@ class BreachLog(Tables):
         return BreachLog(
             car=known,
             goal=taken,
+            entry=table(EntryMargins, trials),
             goal_due=np.zeros(trials, dtype=np.int64),
             look=np.zeros(cars, dtype=np.int64),
             row=table(FoundBreach, (MOST * trials * cars + len(goals)) * frames),

@@ -20,6 +20,7 @@ from dubins_traffic.rules.breach_log import (
     RULE,
     RULES,
     BreachLog,
+    EntryMargins,
     FoundBreach,
     RefereeParameters,
     RefereeTables,
@@ -179,6 +180,11 @@ class Referee:
     def running(self) -> Sequence[Pending]:
         """What hangs over the cars of each trial."""
         return running(np.arange(len(self._judged)), self._terms, self._log)
+
+    @property
+    def entries(self) -> Rows[EntryMargins]:
+        """By how much the ego of each trial has kept rule 3."""
+        return self._log.entry
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from dubins_traffic.roads.lookup import distance2, lane_end
 from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, RefereeTables
 from dubins_traffic.rules.breaches import judge_entry, judge_lane, judge_road
 from dubins_traffic.rules.duties import judge_agent, judge_goals
+from dubins_traffic.rules.entry_margins import measure_entry
 from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN, LabelTables, Memory, TrialRules
@@ -56,6 +57,8 @@ def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
         car.lane = labels.lane[b, n]
         car.crosses = labels.crosses[b, n]
         car.at = labels.at[b, n]
+        kept = tables.memory.car[b, n]
+        car.ticket, car.approach_since = kept.ticket, kept.approach_since
 
 
 @jit_inline
@@ -135,6 +138,8 @@ def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: Refer
     x, y = roads.vertex[row].x, roads.vertex[row].y
     count = list_near(tables.state, b, tick, x, y, far, spacing)
     judge_entry(b, n, tick, v, stopped, count, tables)
+    if n == EGO:
+        measure_entry(b, tick, v, stopped, count, tables)
 
 
 @jit

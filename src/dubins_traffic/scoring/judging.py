@@ -16,7 +16,7 @@ from dubins_traffic.rules.referee import NOTHING
 from dubins_traffic.scoring.collisions import Collisions
 from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.goals import Visiting
-from dubins_traffic.scoring.margins import Margins
+from dubins_traffic.scoring.margins import ENTERED, Margins, entries_by_rule
 from dubins_traffic.scoring.verdict import Verdict, reach_verdict
 
 if TYPE_CHECKING:
@@ -97,9 +97,15 @@ class Judging:
             self._was_sensed,
             lambda car, tick: self._was_sensed(car, tick, tick),
             self._referee.running[0] if self._last >= 0 else NOTHING,
-            self._margins.result(),
+            self._margins.result() | self._entries(),
             whole=ran_whole(self._instance, self._ending, self._last),
         )
+
+    def _entries(self) -> dict[str, float | None]:
+        """Return the margins of rule 3."""
+        if self._referee is None or self._last < 0:
+            return dict.fromkeys(ENTERED)
+        return entries_by_rule(self._referee.entries[0], self._instance.problem.period)
 
     def _was_sensed(self, car: int, first: int, last: int) -> bool:
         if len(self._sensed) > 1:

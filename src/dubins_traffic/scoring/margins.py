@@ -1,24 +1,39 @@
-"""How far the ego stays from breaking the rules that have a measure: collisions, the road, the lane, the way back."""
+"""How far the ego stays from breaking the rules: collisions, road, lane, way back, entries of crossings, and rounds."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.clearance import Clearance
+from dubins_traffic.scoring.verdict import EGO_NAME
+
+if TYPE_CHECKING:
+    from dubins_traffic.rules.breach_log import EntryMargins
+    from dubins_traffic.scoring.score import Score
 
 MEASURED: Final = ("1.road", "2.left", "2.return")
 """The rules whose margins `find_margins` finds, in the order of `EgoMargins`."""
+ENTERED: Final = ("3.stop", "3.order", "3.clear")
+"""The rules whose margins the referee finds, in the order of `rules.breach_log.EntryMargins`."""
+LIVENESS: Final = "1.goal"
+MARGINS: Final = ("1.collision", *MEASURED, *ENTERED, LIVENESS)
+"""The columns of `margins_of`."""
+UNITS: Final = {"3.stop": "s", "3.order": "s", LIVENESS: "s"}
+"""What a margin is measured in, if not in metres."""
+SURE: Final = 1e-9
+"""Margins are at least so far from 0 in `margins_of`, on the side on which the verdict is."""
 
 
 class Margins:
@@ -46,7 +61,7 @@ class Margins:
         """Nothing is left to do."""
 
     def result(self) -> dict[str, float | None]:
-        """Return the robustness of each rule by its name, metres; None where nothing could break it.
+        """Return the robustness of rules 1 and 2 by their names, metres; None where nothing could break them.
 
         It is positive if the rule was kept and negative if it was broken, or would be if the trial ended here.
         """
@@ -78,6 +93,55 @@ class Margins:
             ego[name] = np.concatenate([getattr(block, name)[:, EGO] for block in self._blocks])
         find_margins(only, np.array([count]), ego, only, tables, found)
         return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back])
+
+
+def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | None]:
+    """Return the margins of rule 3 by the rules' names, seconds, seconds and metres; None without an entry that counts.
+
+    Parameters
+    ----------
+    found
+        What the referee has found.
+    period
+        Seconds of a tick.
+    """
+    values = (found.stop * period, found.order * period, found.clear)
+    return {
+        rule: value if math.isfinite(value) else None for rule, value in zip(ENTERED, values, strict=True)
+    }
+
+
+def margins_of(scores: Iterable[Score]) -> Floats:
+    """Return by how much the ego of each trial kept each rule, or broke it: what a search looks at.
+
+    Parameters
+    ----------
+    scores
+        Of trials whose problems carry rules.
+
+    Returns
+    -------
+    (B, len(MARGINS)) float64
+        Metres, or `UNITS`; infinite where nothing could break the rule. Negative exactly if the ego broke the rule;
+        of liveness, exactly if a goal was not visited, or a gap was too long.
+    """
+    return np.array([_row(score) for score in scores]).reshape(-1, len(MARGINS))
+
+
+def _row(score: Score) -> list[float]:
+    verdict = score.verdict
+    if verdict is None:
+        return [math.inf] * len(MARGINS)
+    broken = {own.rule for own in verdict.violations if own.car == EGO_NAME}
+    row: list[float] = []
+    for rule in MARGINS[:-1]:
+        value = verdict.robustness.get(rule)
+        value = math.inf if value is None else value
+        row.append(min(value, -SURE) if rule in broken else max(value, SURE))
+    limit, gap = verdict.gap_limit_s, verdict.longest_gap_s
+    spare = math.inf if limit is None or gap is None else limit - gap
+    missed = score.goals_visited < 1.0 or spare < 0.0
+    return [*row, min(spare, -SURE) if missed else max(spare, SURE)]
 
 
 def margins_by_rule(gap: float | None, found: Sequence[float]) -> dict[str, float | None]:

@@ -14,6 +14,7 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.breach_log import EntryMargins
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, Pending, accused, order
 from dubins_traffic.scoring.collisions import Collision, Collisions
@@ -21,7 +22,7 @@ from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
 from dubins_traffic.scoring.goals import GoalVisits, Visits
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
-from dubins_traffic.scoring.margins import margins_by_rule
+from dubins_traffic.scoring.margins import entries_by_rule, margins_by_rule
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
 from dubins_traffic.scoring.paper import paper_score
 from dubins_traffic.scoring.score import Score, is_clean
@@ -68,6 +69,7 @@ class BatchScores:
         breaches: Sequence[Breach],
         seen: Set[tuple[int, int]],
         running: Pending,
+        entry: EntryMargins,
         ending: Ending,
         rules: RuleParameters,
         controller: str,
@@ -77,7 +79,7 @@ class BatchScores:
 
         `contacts`, with `at_fault`, and the `breaches` of the breach_log are in order of time; `seen` holds (car, tick)
         of each breach by an e-agent that was within the sensing radius then; `running` is what hung over the cars in
-        the last frame.
+        the last frame, `entry` by how much the ego kept rule 3.
         """
         own, margins = self._tally.trial[b], self._found[b]
         rate, ticks = instance.problem.rate, ending.ticks
@@ -98,7 +100,8 @@ class BatchScores:
                 lambda car, first, last: bool(first <= self._tally.sensed[b, car] <= last),
                 lambda car, tick: (car, tick) in seen,
                 running,
-                margins_by_rule(gap, (margins.road, margins.line, margins.back)),
+                margins_by_rule(gap, (margins.road, margins.line, margins.back))
+                | entries_by_rule(entry, instance.problem.period),
                 whole=whole,
             )
         clean = is_clean(verdict, collisions)

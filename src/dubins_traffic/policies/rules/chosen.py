@@ -68,8 +68,8 @@ def _chosen(value: float, otherwise: float) -> float:
 def pauses(b: int, n: int, to_go: float, labels: Labels, traffic: Traffic) -> bool:
     """Tell whether a car stands in its lane now because so it was chosen, and count the time.
 
-    The time does not end while another e-agent passes. It pauses once it has driven its share of the lane, `to_go` (m) before the lane's end, and is outside discs, has no
-    place in an order of arrival, and passes nothing.
+    It does once it has driven its share of the lane, `to_go` (m) before the lane's end, and is outside discs, has no
+    place in an order of arrival, and passes nothing. The time does not end while another e-agent passes.
     """
     roads, drivers = traffic.roads, traffic.drivers
     car = drivers.car[b, n]

@@ -1,0 +1,72 @@
+"""By how much the ego keeps rule 3 when it enters a crossing, or breaks it, compiled."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.kernels.arrays import INFINITE
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.rules.breach_log import EntryMargins, RefereeTables
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import distance2_to_body
+
+LEAST = 1e-6
+"""Metres that a margin of the disc's clearance is away from 0 at least: its places are those of the frame after the one
+that is judged, and may be on the other side."""
+
+
+@jit
+def measure_entry(b: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
+    """Keep the least margins of rule 3 of the ego of trial b, which enters crossing v in this frame.
+
+    `stopped` (whether) and `count` (number) are those of `rules.breaches.judge_entry`; the signs follow its judgement.
+    """
+    log = tables.log
+    found = log.entry[b]
+    own = log.car[b, EGO]
+    if stopped:
+        found.stop = min(found.stop, max(1.0, float(tick - own.ticket)))
+        lead = _lead(b, v, tables)
+        found.order = min(found.order, min(lead, -1.0) if own.bits & FLAG.AHEAD != 0 else max(lead, 1.0))
+    else:
+        run = tick - 1 - own.approach_since if own.approach_since >= 0 else 0
+        found.stop = min(found.stop, -max(1.0, float(tables.rules[b].stop_ticks - run)))
+    _measure_clearance(b, v, count, found, tables)
+
+
+@jit
+def _lead(b: int, v: int, tables: RefereeTables) -> float:
+    """Return how many ticks after the ego's ticket the next one was taken at v, before it if negative."""
+    log, net = tables.log, tables.rules[b].net
+    own = log.car[b, EGO].ticket
+    lead = INFINITE
+    for k in range(1, tables.state.count[b]):
+        other = log.car[b, k]
+        if (
+            other.bits & FLAG.STOPPED != 0
+            and other.lane >= 0
+            and lane_end(tables.roads, net, other.lane) == v
+        ):
+            lead = min(lead, float(other.ticket - own))
+    return lead
+
+
+@jit
+def _measure_clearance(b: int, v: int, count: int, found: EntryMargins, tables: RefereeTables) -> None:
+    log, state, roads, own = tables.log, tables.state, tables.roads, tables.rules[b]
+    vertex = roads.vertex[int(roads.vert_off[own.net]) + v]
+    broken = False
+    nearest = INFINITE
+    for i in range(count):
+        k = tables.spacing.near[i]
+        if k == EGO:
+            continue
+        broken = broken or log.car[b, k].crosses == v
+        square = distance2_to_body(
+            vertex.x, vertex.y, state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k],
+            own.half_length, own.half_width,
+        )  # fmt: skip
+        nearest = min(nearest, sqrt(square) - own.rounding - own.radius)
+    found.clear = min(found.clear, min(nearest, -LEAST) if broken else max(nearest, LEAST))
