@@ -88,6 +88,8 @@ class Controlled:
         Drives the egos of all trials instead.
     metrics : sequence of callable
         What makes further metrics of a trial.
+    numbers : sequence of int, optional
+        By which the shared controller is told of the trials; by default their own, which must differ then.
 
     Attributes
     ----------
@@ -101,6 +103,7 @@ class Controlled:
         make: Maker,
         shared: BatchController | None = None,
         metrics: Sequence[MetricMaker] = (),
+        numbers: Sequence[int] | None = None,
     ) -> None:
         self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
@@ -108,7 +111,8 @@ class Controlled:
         self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
         self._interventions = [0] * len(instances)
         self._told = np.zeros(len(instances), dtype=bool)
-        self._trials = np.array([instance.trial for instance in instances])
+        own = [instance.trial for instance in instances] if numbers is None else numbers
+        self._trials = np.array(own)
         self._look()
         if shared is not None:
             try:

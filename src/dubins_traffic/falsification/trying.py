@@ -91,6 +91,7 @@ class Laboratory:
         self.cancelled = cancelled
         self._fit = fitness()
         made = controllers.made(self._make)
+        self._asked = 0
         self._shared = made if isinstance(made, BatchController) else None
 
     def attempt(self, instances: Sequence[Instance]) -> Findings:
@@ -130,7 +131,9 @@ class Laboratory:
         shared = self._shared
         if shared is not None:
             check_clear(instances)
-        seats = Controlled(instances, self._make, shared)
+        numbers = range(self._asked, self._asked + len(instances))
+        self._asked = numbers.stop
+        seats = Controlled(instances, self._make, shared, numbers=numbers)
         while len(seats.group.active):
             self._check()
             if shared is None:
