@@ -333,7 +333,9 @@ class PassesQueue(Mutant):
 
     def see(self, view: Seen) -> None:
         away, bearing = view.bearings()
-        waits = view.has(FLAG.EXCUSED) & (view.labels.lane == view.labels.lane[:, :1]) & (np.abs(bearing) < 0.5)
+        waits = (
+            view.has(FLAG.EXCUSED) & (view.labels.lane == view.labels.lane[:, :1]) & (np.abs(bearing) < 0.5)
+        )
         waits &= (away < 1.4) & (view.labels.lane[:, :1] >= 0)
         waits[:, EGO] = False
         view.labels.bits[waits] |= np.uint32(FLAG.STANDS)

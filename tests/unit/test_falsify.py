@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dubins_traffic.agents.choices import CHOICE
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.archive import opened
 from dubins_traffic.falsification.case import Case, Story, read_case
@@ -13,6 +14,8 @@ from dubins_traffic.falsification.cells import CELLS, Cell, Manoeuvre
 from dubins_traffic.falsification.coverage import coverage, possible
 from dubins_traffic.falsification.passages import find_passages
 from dubins_traffic.falsification.sampling import Genome, Source, prepared
+from dubins_traffic.falsification.strategies import make
+from dubins_traffic.falsification.trying import Tried
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.network import RoadNetwork
@@ -107,3 +110,20 @@ def test_a_folder_holds_one_search(tmp_path: Path) -> None:
         opened(tmp_path / "a", {"seed": 2}, resume=True),
     ):
         pass
+
+
+def test_cma_moves_by_what_it_is_told_and_goes_the_same_way_again() -> None:
+    source = Source(prepared(JUNCTION, 6.0, {}), 3)
+    targets = ("3.order", "3.clear")
+    first, second = (make("cma", source, targets) for _ in range(2))
+    for generation in range(4):
+        numbers = range(32 * generation, 32 * generation + 32)
+        for number, genome in zip(numbers, first.propose(numbers), strict=True):
+            near = float(np.nansum(genome.tables[1][:, CHOICE.HOLD]))
+            first.tell(number, genome, Tried(False, False, dict.fromkeys(targets, near), ()), False)
+    second.restore(first.state())
+    ways = [own.propose(range(128, 160)) for own in (first, second)]
+    assert [own.to_json() for own in ways[0]] == [own.to_json() for own in ways[1]]
+    begun = make("cma", source, targets).propose(range(32))
+    held = [np.mean([own.tables[1][:, CHOICE.HOLD].sum() for own in way]) for way in (begun, ways[0])]
+    assert held[1] < 0.9 * held[0]

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back"}
-MEASURED: Final = ("1.collision", *COLUMNS)
+ENTRIES: Final = {"3.stop": "stop", "3.order": "order", "3.clear": "clear"}
+MEASURED: Final = ("1.collision", *COLUMNS, *ENTRIES)
 """The rules whose margins can be watched while a trial runs."""
 
 
@@ -46,6 +47,9 @@ class Watched:
         world = self.group.world
         if self.rule == "1.collision":
             return np.maximum(world.tally.trial["clearance"], 0.0)
+        if self.rule in ENTRIES:
+            entries: Any = world.breach_log.entry[ENTRIES[self.rule]]
+            return entries * (1.0 if self.rule == "3.clear" else self.group.instances[0].problem.period)
         problems = [instance.problem for instance in self.group.instances]
         kinds, index = kinds_of(problems)
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]

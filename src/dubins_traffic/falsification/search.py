@@ -257,7 +257,7 @@ def falsify(
     seed : int
         What all follows from: the same seed and number of trials give the same files, byte for byte.
     strategy : str
-        ``evolution`` or ``uniform``.
+        ``evolution``, ``uniform``, or ``cma``, which needs the extra `falsify`.
     duration : float or None
         Seconds of a trial; None: as the configuration says.
     workers : int

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.continuous import Cma
 from dubins_traffic.falsification.sampling import Genome, Source
 
 if TYPE_CHECKING:
@@ -133,7 +134,11 @@ class Evolution:
             ]
 
 
-STRATEGIES: Final[Mapping[str, type[Uniform | Evolution]]] = {"uniform": Uniform, "evolution": Evolution}
+STRATEGIES: Final[Mapping[str, type[Uniform | Evolution | Cma]]] = {
+    "uniform": Uniform,
+    "evolution": Evolution,
+    "cma": Cma,
+}
 
 
 def make(name: str, source: Source, targets: Sequence[str]) -> Strategy:
