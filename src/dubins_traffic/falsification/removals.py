@@ -22,6 +22,8 @@ LATER: Final = (1.0, 0.75, 0.5, 0.25, 0.125)
 """Shares of a trial's beginning, `LEAD` before its end, that are tried to be left out."""
 LEAD: Final = 2.0
 """Seconds that a trial lasts at least before its breach, so that it shows how that came about."""
+REDRAWN: Final = 8
+"""As so many trials, by their numbers, an instance with a car less is tried beside its own."""
 KEPT: Final = frozenset({"choices", "cycle", "commands", "kind", "parameters"})
 """Parameters of e-agents that have no default to go back to, or a way of their own to be taken away."""
 
@@ -45,15 +47,18 @@ def lead(instance: Instance) -> int:
 
 
 def without_cars(instance: Instance, frames: Frames) -> Iterator[Removal]:  # noqa: ARG001  # a `Way`
-    """Yield the instances without one of the e-agents, the last first."""
+    """Yield the instances without one of the e-agents, the last first.
+
+    What is drawn in a trial follows from the numbers of cars and trial, and others move up: so each is also tried as the
+    first few trials.
+    """
     for car in range(len(instance.e_agents), 0, -1):
         agents = (*instance.e_agents[: car - 1], *instance.e_agents[car:])
         problem = replace(instance.problem, e_agents=tuple(agent.name for agent in agents))
         starts = (*instance.starts[:car], *instance.starts[car + 1 :])
-        yield (
-            f"the car {instance.names[car]}",
-            replace(instance, problem=problem, e_agents=agents, starts=starts),
-        )
+        for trial in dict.fromkeys((instance.trial, *range(REDRAWN))):
+            less = replace(instance, problem=problem, e_agents=agents, starts=starts, trial=trial)
+            yield f"the car {instance.names[car]}", less
 
 
 def begun_later(instance: Instance, frames: Frames) -> Iterator[Removal]:
