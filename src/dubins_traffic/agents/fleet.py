@@ -10,6 +10,7 @@ import numpy as np
 
 from dubins_traffic.agents.kernel import decide
 from dubins_traffic.agents.kinds import Lists, fill
+from dubins_traffic.agents.nudge import nudge
 from dubins_traffic.agents.own import OwnAgents
 from dubins_traffic.agents.tables import (
     STEP,
@@ -28,7 +29,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
-from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, OWN
+from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, NUDGED, OWN
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class Fleet:
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin a batch, of one control rate, whose first frame is `state`."""
         cars = state.x.shape[1]
-        kinds = {agent.kind for instance in instances for agent in instance.e_agents}
+        kinds = {agent.driver.kind for instance in instances for agent in instance.e_agents}
         self._lawful = _lawful() if kinds & KEEP_RULES else None
         if self._lawful is not None:
             self._lawful.reset(instances, state)
@@ -79,6 +80,7 @@ class Fleet:
         self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
         self._call = bound(decide)
+        self._nudge = bound(nudge)
         self._scene = Scene(state, self._roads, self._obstacles, self._agents, self._work)
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
@@ -91,6 +93,8 @@ class Fleet:
             self._counter.decide(tick, state, labels, commands)
         if self._own is not None:
             self._own.decide(tick, state, labels, commands)
+        if len(self._agents.recalled):
+            self._nudge(tick, commands, self._agents)
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what the cars that play a counterstrategy and the user's own have to say."""
@@ -126,16 +130,17 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     lists = Lists()
     elsewhere = KEEP_RULES | ALONE
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
-    kinds = [{agent.kind for agent in instances[b].e_agents} for b in fleets]
+    kinds = [{agent.driver.kind for agent in instances[b].e_agents} for b in fleets]
     driven = np.array([not own <= elsewhere for own in kinds])[whose]
     for b in np.flatnonzero(driven).tolist():
         instance = instances[b]
         for n, agent in enumerate(instance.e_agents, start=1):
-            if agent.kind not in elsewhere:
-                fill(instance, agent, agents[b, n], lists)
+            if agent.driver.kind not in elsewhere:
+                fill(instance, agent.driver, agents[b, n], lists)
     steps = table(Stretch, len(lists.script))
     for step, (end, speed, yaw_rate) in enumerate(lists.script):
         steps[step].end, steps[step].speed, steps[step].yaw_rate = end, speed, yaw_rate
+    recalled = _recalled(instances, agents)
     trail, point = _trails(agents, min(instance.problem.car.w for instance in instances))
     return Agents(
         team=_teams(instances, agents, net),
@@ -144,6 +149,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
         script=steps,
         trail=trail,
         point=point,
+        recalled=recalled,
     )
 
 
@@ -179,6 +185,19 @@ def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Row
     for name in ("w", "half_length", "half_width", "rounding"):
         teams[name] = getattr(cars, name)
     return teams
+
+
+def _recalled(instances: Sequence[Instance], agents: Rows[Agent]) -> Floats:
+    """Fill in by how much cars are nudged; return `Agents.recalled`."""
+    count = longest = 0
+    for b, instance in enumerate(instances):
+        for n, own in enumerate(instance.e_agents, start=1):
+            if own.kind == NUDGED:
+                agent = agents[b, n]
+                agent.recall, agent.delay = count, own.parameters["delay"]
+                agent.noise, agent.fastest = own.parameters["speed_noise"], instance.problem.car.bounds.speed
+                count, longest = count + 1, max(longest, agent.delay)
+    return np.zeros((count, longest + 1, 2))
 
 
 def _trails(agents: Rows[Agent], w: float) -> tuple[Rows[Trail], Rows[Point]]:

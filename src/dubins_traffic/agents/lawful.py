@@ -42,7 +42,7 @@ class Lawful:
         """Begin a batch whose first frame is `state`; InputError if its cars can't keep the rules."""
         cars = state.x.shape[1]
         for instance in instances:
-            if any(agent.kind in KEEP_RULES for agent in instance.e_agents):
+            if any(agent.driver.kind in KEEP_RULES for agent in instance.e_agents):
                 check_fit(instance.problem, owes=True)
         roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
@@ -168,7 +168,8 @@ class _Fleet(NamedTuple):
 
 def _fleet(instance: Instance, cars: int) -> _Fleet:
     own = _Fleet(table(Driver, cars), [], [], {})
-    for n, agent in enumerate(instance.e_agents, start=1):
+    for n, given_agent in enumerate(instance.e_agents, start=1):
+        agent = given_agent.driver
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
             _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])

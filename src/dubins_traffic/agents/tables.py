@@ -9,7 +9,7 @@ import numpy as np
 from dubins_traffic.cars.near import Search, search_room, widened
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
@@ -83,6 +83,14 @@ class Agent:
     """The row of its cycle or script, -1 when not on it."""
     since: int = -1
     """The tick since which it must stand, -1 if it need not."""
+    recall: int = -1
+    """Its row of `Agents.recalled` if it is nudged, or -1."""
+    delay: int
+    """How many ticks late a nudged car does what it asks for."""
+    noise: float
+    """By which share its speed is more or less at most."""
+    fastest: float
+    """How fast it drives at most, m/s."""
     goal_x: float
     """The waypoint, metres."""
     goal_y: float
@@ -165,7 +173,8 @@ class Agents(Tables):
     """The e-agents of a batch.
 
     `team` (B,), `agent` (B, N); `cycle` (M,): lanes in order; `script` (M,). Of the ego's path, for every car that
-    follows: `trail` (F,), and `point` (F, M), a ring.
+    follows: `trail` (F,), and `point` (F, M), a ring. Of every car that is nudged: `recalled` (R, D, 2), a ring of what
+    it has asked for, m/s and rad/s.
     """
 
     team: Rows[Team]
@@ -174,6 +183,7 @@ class Agents(Tables):
     script: Rows[Stretch]
     trail: Rows[Trail]
     point: Rows[Point]
+    recalled: Floats
 
 
 class Workspace(Tables):

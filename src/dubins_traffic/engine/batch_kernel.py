@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.agents.kernel import decide_trial as decide_others
+from dubins_traffic.agents.nudge import nudge_trial
 from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import OUTCOME, Motion, step_trial
 from dubins_traffic.cars.near import keep_apart, lost
@@ -71,6 +72,8 @@ class TrialProgress:
     """1 if the law drives some of its cars."""
     others: int
     """1 if other built-in drivers drive some of its cars."""
+    nudged: int
+    """1 if some of its e-agents are nudged."""
     ends: int
     """1 if a collision of the ego ends it."""
     sight2: float
@@ -209,6 +212,8 @@ def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: Worl
         decide_lawful(
             b, tick, own.sight2, spacing.apart[b], lost(spacing, b, tick), world, commands
         )  # fmt: skip
+    if own.nudged != 0:
+        nudge_trial(b, tick, commands, world.agents)
     own.decided = 1
 
 

@@ -294,7 +294,7 @@ def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
     """Return instances in groups that can be stepped together: of one control rate, width, and reach of memory."""
     groups: dict[tuple[float, float, float], list[Instance]] = {}
     for instance in instances:
-        gap = max((agent.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
+        gap = max((agent.driver.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
         groups.setdefault((instance.problem.rate, instance.problem.car.w, gap), []).append(instance)
     return list(groups.values())
 

@@ -146,11 +146,22 @@ def _tally(tally: Tally, trials: Ints) -> Tally:
 
 
 def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:
-    """Return the e-agents of forks; each car that follows has the ego's path of its own."""
+    """Return the e-agents of forks; each car that follows or is nudged has a memory of its own."""
     team, cars = agents.team[trials], agents.agent[trials]
     if seeds is not None:
         team["seed"] = seeds
     follows = cars["trail"] >= 0
     trail = cars["trail"][follows]
     cars["trail"][follows] = np.arange(len(trail))
-    return Agents(team, cars, agents.cycle, agents.script, agents.trail[trail], agents.point[trail])
+    nudged = cars["recall"] >= 0
+    recall = cars["recall"][nudged]
+    cars["recall"][nudged] = np.arange(len(recall))
+    return Agents(
+        team,
+        cars,
+        agents.cycle,
+        agents.script,
+        agents.trail[trail],
+        agents.point[trail],
+        agents.recalled[recall],
+    )

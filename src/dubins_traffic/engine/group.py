@@ -33,7 +33,7 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.tables import KIND, scratch
-from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
+from dubins_traffic.problem.kinds import KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
@@ -265,7 +265,9 @@ class Group:
         trial["last"] = [max(1, instance.ticks) for instance in self.instances]
         trial["ends"] = [instance.end_on_collision for instance in self.instances]
         fleets, whose = distinct([id(instance.e_agents) for instance in self.instances])
-        kinds = [{agent.kind for agent in self.instances[b].e_agents} for b in fleets]
+        kinds = [{agent.driver.kind for agent in self.instances[b].e_agents} for b in fleets]
+        nudged = [any(agent.kind == NUDGED for agent in self.instances[b].e_agents) for b in fleets]
+        trial["nudged"] = np.array(nudged)[whose]
         trial["others"] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         trial["sight2"] = np.square([instance.problem.sensing_radius for instance in self.instances])
         return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))

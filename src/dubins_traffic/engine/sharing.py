@@ -38,7 +38,7 @@ def can_share(instance: Instance) -> bool:
 
 def _is_fit(instance: Instance) -> bool:
     """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
-    lawful = any(agent.kind in KEEP_RULES for agent in instance.e_agents)
+    lawful = any(agent.driver.kind in KEEP_RULES for agent in instance.e_agents)
     try:
         check_fit(instance.problem, owes=False)
         if lawful:

@@ -29,6 +29,8 @@ class _Draw(NamedTuple):
     """Whether an e-agent whose patience ended turns round."""
     RULES: int = 20
     """What cars by the rules do, eleven numbers: exits take four, violations six, places one."""
+    NUDGE: int = 40
+    """How much faster or slower a nudged e-agent drives."""
     POSITION: int = 200
     """Noise of a sensed position, six numbers."""
     HEADING: int = 206

@@ -53,7 +53,8 @@ def origin_start(network: RoadNetwork, w: float) -> Pose | None:
 
 def drawn_cycle(agent: EAgent) -> bool:
     """Tell whether the cycle of a planned e-agent is drawn."""
-    return loops(agent.kind, agent.parameters) and agent.parameters["cycle"] is None
+    own = agent.driver
+    return loops(own.kind, own.parameters) and own.parameters["cycle"] is None
 
 
 def complete_agents(
@@ -64,7 +65,9 @@ def complete_agents(
     for agent in (plan.agent for plan in planned):
         parameters = dict(agent.parameters)
         if drawn_cycle(agent):
-            parameters["cycle"] = draw_cycle(network, draws)
+            cycle = {"cycle": draw_cycle(network, draws)}
+            nudged = agent.driver is not agent
+            parameters |= {"parameters": {**parameters["parameters"], **cycle}} if nudged else cycle
         agents.append(EAgent(agent.kind, agent.name, agent.type, parameters))
     return tuple(agents)
 
@@ -83,7 +86,8 @@ def agent_wishes(
     """
     wishes: list[Wish] = []
     clear = _clear_lanes(network, car, obstacles)
-    for plan, agent in zip(planned, agents, strict=True):
+    for plan, given in zip(planned, agents, strict=True):
+        agent = given.driver
         lanes = None
         if loops(agent.kind, agent.parameters):
             try:

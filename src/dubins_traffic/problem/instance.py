@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
+from dubins_traffic.problem.kinds import NUDGED
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -52,6 +53,13 @@ class EAgent:
     name: str
     type: str
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def driver(self) -> EAgent:
+        """The e-agent that says what this one asks for: itself, unless it is nudged."""
+        if self.kind != NUDGED:
+            return self
+        return EAgent(self.parameters["kind"], self.name, self.type, self.parameters["parameters"])
 
 
 @dataclass(frozen=True, slots=True)

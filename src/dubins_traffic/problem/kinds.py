@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer, model_validator
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
@@ -203,6 +203,39 @@ class Chosen(Strict):
         return rows
 
 
+class Nudged(Strict):
+    """Does what another kind asks for, late and with noise on its speed."""
+
+    kind: Literal["wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"] = Field(
+        default="lawful", description="which kind"
+    )
+    parameters: dict[str, Any] = Field(
+        default={}, description="its parameters; those left out have its defaults"
+    )
+    delay: Annotated[int, Field(ge=0, le=limits.REACTION)] = Field(
+        default=3, description="how many ticks late it does what the kind asks for"
+    )
+    speed_noise: Share = Field(
+        default=0.1, description="by which share its speed is more or less at most, drawn anew in each tick"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whole(cls, document: Any) -> Any:
+        """Check the other kind's parameters, and fill in its defaults."""
+        if not isinstance(document, dict):
+            return document
+        given = cast("dict[str, Any]", document)
+        kind, own = given.get("kind", "lawful"), given.get("parameters", {})
+        if kind in NUDGEABLE and isinstance(own, dict):
+            try:
+                return {**given, "parameters": parameters_of(kind, cast("dict[str, Any]", own))}
+            except InputError as error:
+                field = "parameters" if error.field is None else error.field
+                raise fault(error.problem, str(error.expected), field, error.value) from None
+        return given
+
+
 class Counter(Strict):
     """Keeps the ego from a goal for ever where the assumption is too weak to forbid it: plays the counterstrategy."""
 
@@ -219,6 +252,11 @@ class Remote(Strict):
 
 COUNTER = "counter"
 REMOTE = "remote"
+NUDGED = "nudged"
+NUDGEABLE: frozenset[str] = frozenset(
+    {"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"}
+)
+"""Kinds that can be nudged: those that run compiled."""
 OWN = "own"
 """A class of the user's, which the type names: ``module:Class`` or ``path/to/file.py:Class``."""
 KINDS: dict[str, type[Strict]] = {
@@ -230,6 +268,7 @@ KINDS: dict[str, type[Strict]] = {
     "lawful": Lawful,
     "nemesis": Nemesis,
     "chosen": Chosen,
+    NUDGED: Nudged,
     COUNTER: Counter,
     REMOTE: Remote,
 }

@@ -38,6 +38,8 @@ CORNERS = 1_000
 """Most corners of one polygon."""
 COMMANDS = 1_000_000
 """Most commands of a script."""
+REACTION = 1_000
+"""Most ticks late that an e-agent does what it asks for."""
 LEGS = 10_000
 """Most legs for which something is chosen for a car."""
 EXITS = 4

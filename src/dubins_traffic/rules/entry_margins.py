@@ -21,7 +21,8 @@ that is judged, and may be on the other side."""
 def measure_entry(b: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
     """Keep the least margins of rule 3 of the ego of trial b, which enters crossing v in this frame.
 
-    `stopped` (whether) and `count` (number) are those of `rules.breaches.judge_entry`; the signs follow its judgement.
+    `stopped` (whether), `count` (number) and `tables` (all rows of the referee) are those of
+    `rules.breaches.judge_entry`; the signs follow its judgement.
     """
     log = tables.log
     found = log.entry[b]

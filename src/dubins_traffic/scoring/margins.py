@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
@@ -17,11 +17,10 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.clearance import Clearance
-from dubins_traffic.scoring.verdict import EGO_NAME
+from dubins_traffic.scoring.verdict import EGO_NAME, Verdict
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.breach_log import EntryMargins
-    from dubins_traffic.scoring.score import Score
 
 MEASURED: Final = ("1.road", "2.left", "2.return")
 """The rules whose margins `find_margins` finds, in the order of `EgoMargins`."""
@@ -34,6 +33,20 @@ UNITS: Final = {"3.stop": "s", "3.order": "s", LIVENESS: "s"}
 """What a margin is measured in, if not in metres."""
 SURE: Final = 1e-9
 """Margins are at least so far from 0 in `margins_of`, on the side on which the verdict is."""
+
+
+class Judged(Protocol):
+    """What margins are read from: a score (`scoring.score.Score`)."""
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict, None if the problem carries no rules."""
+        ...
+
+    @property
+    def goals_visited(self) -> float:
+        """Share of the goals that were visited."""
+        ...
 
 
 class Margins:
@@ -111,7 +124,7 @@ def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | Non
     }
 
 
-def margins_of(scores: Iterable[Score]) -> Floats:
+def margins_of(scores: Iterable[Judged]) -> Floats:
     """Return by how much the ego of each trial kept each rule, or broke it: what a search looks at.
 
     Parameters
@@ -128,7 +141,7 @@ def margins_of(scores: Iterable[Score]) -> Floats:
     return np.array([_row(score) for score in scores]).reshape(-1, len(MARGINS))
 
 
-def _row(score: Score) -> list[float]:
+def _row(score: Judged) -> list[float]:
     verdict = score.verdict
     if verdict is None:
         return [math.inf] * len(MARGINS)
