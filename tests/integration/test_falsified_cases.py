@@ -14,7 +14,9 @@ def test_rules_passes_the_cases_of_its_mutants() -> None:
 
 
 def test_the_shield_passes_the_cases_of_lanes() -> None:
-    assert [own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed] == []
+    assert [
+        own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed
+    ] == []
 
 
 @pytest.mark.parametrize("controller", ["lanes", "simple"])

@@ -96,9 +96,11 @@ class _Climb:
         self._shapes = {car: table.shape for car, table in drawn.tables.items()}
         size = max(2, sum(rows * columns for rows, columns in self._shapes.values()))
         dice = source.dice(base)
-        options = {
-            "bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": lambda *shape: dice.standard_normal(shape),
-        }  # fmt: skip
+
+        def normal(*shape: int) -> Floats:
+            return dice.standard_normal(shape)
+
+        options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": normal}
         self._strategy = cma.CMAEvolutionStrategy(size * [0.5], STEP, options)
         self._asked: list[Floats] = []
 

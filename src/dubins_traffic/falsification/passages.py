@@ -117,7 +117,8 @@ def find_passages(
         That of each trial.
     """
     width = lane.shape[1]
-    whole = np.where(np.arange(width) < frames[:, None], lane, OVER)
+    running: Bools = np.less(np.arange(width), frames[:, None])
+    whole = np.where(running, lane, OVER)
     begins = np.ones(whole.shape, dtype=bool)
     begins[:, 1:] = whole[:, 1:] != whole[:, :-1]
     place = np.flatnonzero(begins)
