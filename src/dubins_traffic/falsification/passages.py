@@ -116,7 +116,7 @@ def find_passages(
     networks : sequence of RoadNetwork
         That of each trial.
     """
-    width = lane.shape[1]
+    width: int = lane.shape[1]
     running: Bools = np.less(np.arange(width), frames[:, None])
     whole = np.where(running, lane, OVER)
     begins = np.ones(whole.shape, dtype=bool)

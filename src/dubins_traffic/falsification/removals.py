@@ -49,8 +49,8 @@ def lead(instance: Instance) -> int:
 def without_cars(instance: Instance, frames: Frames) -> Iterator[Removal]:  # noqa: ARG001  # a `Way`
     """Yield the instances without one of the e-agents, the last first.
 
-    What is drawn in a trial follows from the numbers of cars and trial, and others move up: so each is also tried as the
-    first few trials.
+    What is drawn in a trial follows from the numbers of cars and trial, and others move up: so each is also tried as
+    the first few trials.
     """
     for car in range(len(instance.e_agents), 0, -1):
         agents = (*instance.e_agents[: car - 1], *instance.e_agents[car:])
