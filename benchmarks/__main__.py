@@ -10,7 +10,8 @@ minute; `envs`, which compiles an earlier commit, two and more; `first_use`, wit
 verifies their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so does
 `odd_egos` for its 2,000; `synthesis` solves its games in about two minutes; `campaign` runs 300,000 short trials in as
 many; `competition` judges 1,000 trials of strangers twice and `shield` runs 22,000 of a minute each, a quarter of an
-hour both; `adversaries` 10,000 episodes of a minute, in half an hour, and so does `synthesized` for its 2,000 of 300 s.
+hour both; `adversaries` 10,000 episodes of a minute, in half an hour, and so does `synthesized` for its 2,000 of 300 s;
+`falsify` searches some million trials, in hours.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ NAMES = (
     "synthesis",
     "synthesized",
     "counter",
+    "falsify",
     "adversaries",
     "gazebo",
     "campaign",

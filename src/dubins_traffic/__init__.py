@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from dubins_traffic.controllers.shield import Shield
     from dubins_traffic.engine.batch import Batch, run_batch
     from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
+    from dubins_traffic.falsification.estimate import estimate
+    from dubins_traffic.falsification.regress import regress
+    from dubins_traffic.falsification.search import falsify
+    from dubins_traffic.falsification.shrink import shrink
     from dubins_traffic.problem.configuration import Configuration, load_config
     from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
     from dubins_traffic.problem.draw import draw
@@ -49,6 +53,10 @@ _PLACES = {
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
     "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
     "controllers.shield": ("Shield",),
+    "falsification.estimate": ("estimate",),
+    "falsification.regress": ("regress",),
+    "falsification.search": ("falsify",),
+    "falsification.shrink": ("shrink",),
     "errors": ("ControllerError", "DubinsTrafficError", "InputError", "RecordError"),
     "problem.configuration": ("Configuration", "load_config"),
     "problem.document": ("instance_from_document", "instance_to_document", "load_instance"),
@@ -124,6 +132,8 @@ __all__ = [
     "Verification",
     "__version__",
     "draw",
+    "estimate",
+    "falsify",
     "generate_network",
     "instance_from_document",
     "instance_to_document",
@@ -134,11 +144,13 @@ __all__ = [
     "load_results",
     "plan",
     "plot",
+    "regress",
     "run_batch",
     "run_campaign",
     "run_trial",
     "run_trials",
     "score",
+    "shrink",
     "verify",
     "write_plot",
     "write_replay",

@@ -7,10 +7,9 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic
 
-from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engines import Outcome
+from dubins_traffic.campaign.engines import Numbered, Outcome, Work
 from dubins_traffic.campaign.worker import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.runs.jobs import deaf_to_interrupts
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
 
 
-class Pool:
+class Pool(Generic[Work]):
     """An engine of `workers` processes, which end with this one, however it ends."""
 
     def __init__(self, workers: int, around: Surroundings) -> None:
@@ -28,7 +27,7 @@ class Pool:
         self._around = around
         self._context = multiprocessing.get_context("spawn")
         self._cancelled = self._context.Event()
-        self._under_way: dict[Future[bytes], Chunk] = {}
+        self._under_way: dict[Future[bytes], Work] = {}
         self._start()
 
     @property
@@ -36,7 +35,7 @@ class Pool:
         """One chunk in work and one in waiting for each process."""
         return 2 * self._workers
 
-    def submit(self, chunk: Chunk) -> None:
+    def submit(self, chunk: Work) -> None:
         """Take a chunk to run."""
         try:
             future = self._pool.submit(_run, chunk)
@@ -45,12 +44,12 @@ class Pool:
             future.set_exception(error)
         self._under_way[future] = chunk
 
-    def wait(self) -> Sequence[Outcome]:
+    def wait(self) -> Sequence[Outcome[Work]]:
         """Return what has become of chunks; if a process has died, all that were under way are lost."""
         done, _ = wait(self._under_way, return_when=FIRST_COMPLETED)
         if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
             done, _ = wait(self._under_way)
-        outcomes: list[Outcome] = []
+        outcomes: list[Outcome[Work]] = []
         broken = False
         for future in done:
             chunk = self._under_way.pop(future)
@@ -97,7 +96,7 @@ def _begin(around: Surroundings, cancelled: Event) -> None:
     end_with_parent()
 
 
-def _run(chunk: Chunk) -> bytes:
+def _run(chunk: Numbered) -> bytes:
     try:
         return run_part(chunk, _around, _cancelled)
     except KeyboardInterrupt:

@@ -12,10 +12,10 @@ import socket
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
+from typing import Generic
 
 from dubins_traffic.campaign import ray_driver
-from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engines import Outcome
+from dubins_traffic.campaign.engines import Outcome, Work
 from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.errors import ClusterLostError, DubinsTrafficError, InputError, MissingExtraError
 from dubins_traffic.runs.jobs import deaf_to_interrupts
@@ -29,7 +29,7 @@ EMPTY = 300.0
 """Seconds for which a cluster may be without a single processor."""
 
 
-class RayEngine:
+class RayEngine(Generic[Work]):
     """An engine of all processors of a Ray cluster.
 
     Parameters
@@ -49,7 +49,7 @@ class RayEngine:
 
     def __init__(self, address: str, workers: int, around: Surroundings) -> None:
         self._address = address
-        self._under_way: dict[int, Chunk] = {}
+        self._under_way: dict[int, Work] = {}
         self._processors = 0
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
@@ -72,7 +72,7 @@ class RayEngine:
         """One chunk in work and one in waiting for each processor of the cluster."""
         return 2 * max(1, self._processors)
 
-    def submit(self, chunk: Chunk) -> None:
+    def submit(self, chunk: Work) -> None:
         """Take a chunk to run."""
         self._under_way[chunk.number] = chunk
         try:
@@ -80,7 +80,7 @@ class RayEngine:
         except OSError:
             raise self._lost("its driver ended") from None
 
-    def wait(self) -> Sequence[Outcome]:
+    def wait(self) -> Sequence[Outcome[Work]]:
         """Return what has become of chunks.
 
         Raises
@@ -101,7 +101,7 @@ class RayEngine:
             self._process.kill()
             self._process.join()
 
-    def _take(self, patience: float) -> Outcome | None:
+    def _take(self, patience: float) -> Outcome[Work] | None:
         """Take one message of the driver: a chunk's outcome, or a sign of life."""
         try:
             if not self._pipe.poll(max(0.0, self._heard + patience - time.monotonic())):
@@ -117,7 +117,7 @@ class RayEngine:
             return None
         return self._outcome(*rest)
 
-    def _outcome(self, number: int, part: bytes | None) -> Outcome:
+    def _outcome(self, number: int, part: bytes | None) -> Outcome[Work]:
         return Outcome(self._under_way.pop(number), part)
 
     def _count(self, processors: int) -> None:

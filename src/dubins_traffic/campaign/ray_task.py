@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from dubins_traffic.errors import DubinsTrafficError
 
 if TYPE_CHECKING:
-    from dubins_traffic.campaign.chunks import Chunk
+    from dubins_traffic.campaign.engines import Numbered
     from dubins_traffic.campaign.worker import Surroundings
 
 PACKAGE = "dubins-traffic"
@@ -38,6 +38,6 @@ def run(chunk: bytes, around: bytes, wanted: str) -> bytes:
         raise DubinsTrafficError(f"a node has {PACKAGE} {own}, not {wanted}")
     from dubins_traffic.campaign.worker import run_part
 
-    known: Chunk = pickle.loads(chunk)
+    known: Numbered = pickle.loads(chunk)
     shared: Surroundings = pickle.loads(around)
     return run_part(known, shared)

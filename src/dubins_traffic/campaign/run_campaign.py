@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
+from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.engines import Engine
 from dubins_traffic.campaign.folder import Folder
 from dubins_traffic.campaign.pool import Pool
@@ -88,7 +89,7 @@ def run_campaign(
         return Ran(campaign, own.path, before)
 
 
-def run_left(own: Folder, engine: Engine, progress: Progress | None = None) -> None:
+def run_left(own: Folder, engine: Engine[Chunk], progress: Progress | None = None) -> None:
     """Run on `engine` what is left of the campaign in a folder, and keep each chunk there; the table is not made yet.
 
     The exceptions are those of `run_campaign`.
@@ -102,6 +103,6 @@ def run_left(own: Folder, engine: Engine, progress: Progress | None = None) -> N
             progress(count, own.campaign.total)
 
 
-def _engine(workers: int | None, ray: str | None, around: Surroundings) -> Engine:
+def _engine(workers: int | None, ray: str | None, around: Surroundings) -> Engine[Chunk]:
     count = workers or os.cpu_count() or 1
     return Pool(count, around) if ray is None else RayEngine(ray, count, around)

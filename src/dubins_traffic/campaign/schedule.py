@@ -17,7 +17,7 @@ LOSSES_ALONE = 2
 REASON = "the process that ran it ended, each time it was run"
 
 
-def carry_out(engine: Engine, chunks: Iterator[Chunk]) -> Iterator[tuple[Chunk, bytes]]:
+def carry_out(engine: Engine[Chunk], chunks: Iterator[Chunk]) -> Iterator[tuple[Chunk, bytes]]:
     """Run `chunks` and yield each once, with its part of the table, in the order in which they are ready.
 
     No more than the engine's capacity are under way. What is lost is run again. What is lost again and again is run
@@ -50,7 +50,7 @@ def carry_out(engine: Engine, chunks: Iterator[Chunk]) -> Iterator[tuple[Chunk, 
             yield trial, _alone(engine, trial)
 
 
-def _alone(engine: Engine, trial: Chunk) -> bytes:
+def _alone(engine: Engine[Chunk], trial: Chunk) -> bytes:
     for _ in range(LOSSES_ALONE):
         engine.submit(trial)
         part = engine.wait()[0].part

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
+from dubins_traffic.campaign.engines import Errand, Numbered
 from dubins_traffic.campaign.records import Keep, Records
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import run_together
@@ -71,11 +72,15 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
     return rows.columns([found[k] for k in range(chunk.count)], scores.columns(makers))
 
 
-def run_part(chunk: Chunk, around: Surroundings, cancelled: Event | None = None) -> bytes:
-    """Run a chunk and return its part of the table, a Parquet file."""
+def run_part(chunk: Numbered, around: Surroundings, cancelled: Event | None = None) -> bytes:
+    """Run a chunk and return its part of the table, a Parquet file; or an errand, and return what came of it."""
     for path in around.paths:
         if path not in sys.path:
             sys.path.append(path)
+    if isinstance(chunk, Errand):
+        return chunk.run((lambda: False) if cancelled is None else cancelled.is_set)
+    if not isinstance(chunk, Chunk):
+        raise DubinsTrafficError(f"no work for a worker: {type(chunk).__name__}")
     found = run_chunk(chunk, around.records, cancelled)
     return rows.encoded(found, scores.columns(chunk.metrics))
 

@@ -15,7 +15,9 @@ from dubins_traffic.cli import (
     check_controller,
     competition,
     convert,
+    estimate,
     evaluate,
+    falsify,
     faults,
     gazebo,
     instance,
@@ -90,6 +92,10 @@ app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.add_typer(campaign.campaign, name="campaign")
+app.command("falsify", epilog=falsify.EXAMPLES)(falsify.falsify)
+app.command("shrink", epilog=falsify.SHRINK_EXAMPLES)(falsify.shrink)
+app.command("estimate", epilog=estimate.EXAMPLES)(estimate.estimate)
+app.command("regress", epilog=falsify.REGRESS_EXAMPLES)(falsify.regress)
 app.add_typer(competition.competition, name="competition")
 app.add_typer(suite.suite, name="suite")
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)

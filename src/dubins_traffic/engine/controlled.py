@@ -88,6 +88,8 @@ class Controlled:
         Drives the egos of all trials instead.
     metrics : sequence of callable
         What makes further metrics of a trial.
+    numbers : sequence of int, optional
+        By which the shared controller is told of the trials; by default their own, which must differ then.
 
     Attributes
     ----------
@@ -101,6 +103,7 @@ class Controlled:
         make: Maker,
         shared: BatchController | None = None,
         metrics: Sequence[MetricMaker] = (),
+        numbers: Sequence[int] | None = None,
     ) -> None:
         self.group = Group(instances, keeps_rules=False, metrics=metrics)
         self._lines = [CommandLine(instance) for instance in instances]
@@ -108,7 +111,8 @@ class Controlled:
         self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
         self._interventions = [0] * len(instances)
         self._told = np.zeros(len(instances), dtype=bool)
-        self._trials = np.array([instance.trial for instance in instances])
+        own = [instance.trial for instance in instances] if numbers is None else numbers
+        self._trials = np.array(own)
         self._look()
         if shared is not None:
             try:
@@ -272,7 +276,7 @@ def ask(
         taken = list(islice(waiting, free)) if 8 * free >= batch else []
         for own in grouped(taken):
             if shared is not None:
-                _check_clear(own)
+                check_clear(own)
             seats.append(Controlled(own, make, shared, metrics))
         if not seats:
             return
@@ -280,7 +284,7 @@ def ask(
             for own in seats:
                 own.ask_each()
         else:
-            _ask_all(seats, shared)
+            ask_all(seats, shared)
         for own in seats:
             yield from own.step(controller)
         seats = [own for own in seats if len(own.group.active)]
@@ -295,7 +299,7 @@ def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
     return list(groups.values())
 
 
-def _ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
+def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
     """Let one controller choose the commands of all egos."""
     seats = [own for own in seats if len(own.group.active)]
     if not seats:
@@ -332,7 +336,8 @@ def _joined(tables: Sequence[Tables]) -> list[Any]:
     return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
 
 
-def _check_clear(instances: Sequence[Instance]) -> None:
+def check_clear(instances: Sequence[Instance]) -> None:
+    """Refuse instances with noise in observations, which a controller of whole batches is not shown."""
     for instance in instances:
         noise = instance.disturbances
         if noise.position_noise > 0.0 or noise.heading_noise > 0.0:

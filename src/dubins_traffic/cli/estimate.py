@@ -1,0 +1,80 @@
+"""`dubins-traffic estimate`."""
+
+from __future__ import annotations
+
+import json as json_text
+from typing import Annotated
+
+import typer
+
+from dubins_traffic.cli import faults, options
+from dubins_traffic.cli.falsify import ControllerOption, WorkersOption
+from dubins_traffic.cli.progress import progress
+
+EXAMPLES = options.examples(
+    "estimate junction --controller lanes --event 3.clear --trials 2000 --duration 15",
+    "estimate town --controller rules --event 1.collision --below 0.05 --method splitting",
+)
+
+EventOption = Annotated[
+    str, typer.Option("--event", metavar="RULE", help="The rule that is broken, or nearly.")
+]
+BelowOption = Annotated[
+    float, typer.Option("--below", metavar="X", help="How near to it, by its margin; 0: it is broken.")
+]
+MethodOption = Annotated[str, typer.Option("--method", metavar="NAME", help="monte-carlo or splitting.")]
+TrialsOption = Annotated[
+    int | None, typer.Option("--trials", metavar="N", min=1, help="Of Monte Carlo.", show_default="10000")
+]
+DurationOption = Annotated[
+    float | None,
+    typer.Option(
+        "--duration", metavar="S", help="Seconds of a trial.", show_default="as the configuration says"
+    ),
+]
+ParticlesOption = Annotated[
+    int, typer.Option("--particles", metavar="N", help="Of splitting: trials on their way at a time.")
+]
+RunsOption = Annotated[int, typer.Option("--runs", metavar="R", help="Of splitting: independent runs.")]
+
+
+def estimate(
+    configuration: options.Config,
+    controller: ControllerOption = "rules",
+    event: EventOption = "1.collision",
+    below: BelowOption = 0.0,
+    method: MethodOption = "monte-carlo",
+    trials: TrialsOption = None,
+    seed: options.Seed = 0,
+    duration: DurationOption = None,
+    particles: ParticlesOption = 200,
+    runs: RunsOption = 10,
+    workers: WorkersOption = 1,
+    shield: options.Shield = False,
+    json: options.Json = False,
+) -> None:
+    """Estimate the probability that an ego breaks a rule, or comes near it, with a 95 % interval."""
+    from dubins_traffic.controllers.registry import dressed
+    from dubins_traffic.falsification.estimate import estimate as run
+
+    with faults.no_silent_end(), progress(what="trials") as tell:
+        found = run(
+            configuration, dressed(controller, shield=shield), event=event, below=below, method=method, trials=trials,
+            seed=seed, duration=duration, particles=particles, runs=runs, workers=workers,
+            progress=lambda done: tell(done, trials or done),
+        )  # fmt: skip
+    if json:
+        print(json_text.dumps(found.to_json(), indent=2))
+        return
+    low, high = found.interval
+    print(f"{found.event}: {found.probability:.3g}, 95 % interval {low:.3g} to {high:.3g}")
+    if found.wilson is not None:
+        print(
+            f"{found.events} of {found.trials} trials; Wilson's interval {found.wilson[0]:.3g} to {found.wilson[1]:.3g}"
+        )
+        if found.discarded:
+            faults.tell(
+                f"{found.discarded} trials don't count: the assumption was broken before the ego broke anything"
+            )
+    else:
+        print(f"{found.trials} trials in {len(found.runs)} runs of multilevel splitting")

@@ -1,0 +1,102 @@
+"""The folder of a search: one case for each kind of failure, what the search has done, and where it goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.files import locked, read_text, write_text
+
+CASES: Final = "cases"
+"""The folder of the cases."""
+REPORT: Final = "search.json"
+"""What was searched and what came of it."""
+STATE: Final = "state.json"
+"""Where the search goes on."""
+
+
+class Archive:
+    """The folder of a search.
+
+    Attributes
+    ----------
+    cases : dict of str to Case
+        The cases by the names of their cells.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.cases = {path.stem: read_case(path) for path in files(folder)}
+
+    def keep(self, name: str, case: Case) -> Path:
+        """Write a case under a name, and return its file."""
+        path = self.folder / CASES / f"{name}.json"
+        case.write(path)
+        self.cases[name] = case
+        return path
+
+    def write(self, name: str, document: Any, indent: int | None = 1) -> None:
+        """Write a document as JSON; equal documents give equal bytes."""
+        write_text(self.folder / name, json.dumps(document, indent=indent, allow_nan=False) + "\n")
+
+    def state(self) -> Any:
+        """Return where the search goes on, None for one that has not begun."""
+        path = self.folder / STATE
+        if not path.is_file():
+            return None
+        try:
+            return json.loads(read_text(path))
+        except ValueError:
+            raise InputError("not the state of a search", file=str(path)) from None
+
+
+def files(folder: Path) -> Iterator[Path]:
+    """Yield the files of the cases in a folder, or in the folder `cases` in it, in order."""
+    place = folder / CASES if (folder / CASES).is_dir() else folder
+    yield from sorted(path for path in place.glob("*.json") if path.name not in (REPORT, STATE))
+
+
+@contextlib.contextmanager
+def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
+    """Open the folder of a search for this process alone, and make it if there is none.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    settings : JSON
+        What is searched; a search that is resumed must have the same.
+    resume : bool
+        Whether to go on with what has been begun there; otherwise the folder must be new or empty.
+
+    Raises
+    ------
+    InputError
+        If the folder holds something else, another search, is in use or can't be written.
+    """
+    try:
+        (folder / CASES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"can't hold a search ({error.strerror})", file=str(folder)) from None
+    with locked(folder):
+        archive = Archive(folder)
+        state = archive.state()
+        if state is None and (archive.cases or (folder / REPORT).exists()):
+            raise InputError("holds files that are no search's", file=str(folder), expected="a new folder")
+        if state is not None and not resume:
+            raise InputError(
+                "holds a search", file=str(folder), expected="a new folder; --resume goes on with it"
+            )
+        if state is not None and state.get("settings") != settings:
+            changed = [name for name in settings if settings[name] != state.get("settings", {}).get(name)]
+            raise InputError(
+                f"holds another search: {', '.join(changed)} differ",
+                file=str(folder),
+                expected="the same settings",
+            )
+        yield archive

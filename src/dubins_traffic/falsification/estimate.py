@@ -1,0 +1,220 @@
+"""How often: the probability that an ego comes near to breaking a rule, or breaks it, with its confidence interval."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.companies import beginner
+from dubins_traffic.falsification.crew import Crew, crew_of, maker
+from dubins_traffic.falsification.intervals import Interval, clopper_pearson, of_mean, wilson
+from dubins_traffic.falsification.sampling import STREAM, prepared
+from dubins_traffic.falsification.splitting import Begin, split
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.draw import draw_many
+from dubins_traffic.scoring.verdict import EGO_RULES
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
+
+METHODS: Final = ("monte-carlo", "splitting")
+RUNS: Final = 10
+"""Independent runs of the splitting, from whose spread the interval follows."""
+PARTICLES: Final = 200
+BATCH: Final = 256
+
+Progress = Callable[[int], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Probability:
+    """The probability of an event.
+
+    Attributes
+    ----------
+    method : str
+        ``monte-carlo`` or ``splitting``.
+    event : str
+        What happens, in words.
+    probability : float
+        The estimate.
+    interval : (float, float)
+        Its 95 % interval: Clopper and Pearson's, or that of the mean of independent runs; where no run got there, that
+        of the first trials of all runs.
+    wilson : (float, float) or None
+        Wilson's interval, of Monte Carlo.
+    trials, events, discarded : int
+        How many trials ran; of Monte Carlo, in how many the event happened, and how many were left out since the
+        e-agents broke the assumption before the ego broke anything.
+    runs : tuple of float
+        The estimates of the independent runs of splitting.
+    """
+
+    method: str
+    event: str
+    probability: float
+    interval: Interval
+    wilson: Interval | None
+    trials: int
+    events: int | None
+    discarded: int | None
+    runs: tuple[float, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the estimate as a JSON object."""
+        return {
+            "method": self.method,
+            "event": self.event,
+            "probability": self.probability,
+            "interval": list(self.interval),
+            "wilson": None if self.wilson is None else list(self.wilson),
+            "trials": self.trials,
+            "events": self.events,
+            "discarded": self.discarded,
+            "runs": list(self.runs),
+        }
+
+
+def estimate(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    *,
+    event: str = "1.collision",
+    below: float = 0.0,
+    method: str = "monte-carlo",
+    trials: int | None = None,
+    seed: int = 0,
+    duration: float | None = None,
+    particles: int = PARTICLES,
+    runs: int = RUNS,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Probability:
+    """Return the probability that the margin of a rule gets to `below` or less in a trial of a configuration.
+
+    Parameters
+    ----------
+    configuration : Configuration, path or name
+        What the trials are drawn from.
+    controller : str or callable
+        As `run_batch` takes it.
+    event : str
+        The rule.
+    below : float
+        The margin (docs/scores.md); 0: the rule is broken.
+    method : str
+        ``monte-carlo``, or ``splitting`` for what is rare.
+    trials : int, optional
+        How many trials Monte Carlo runs; by default 10,000.
+    seed : int
+        What all follows from.
+    duration : float, optional
+        Seconds of a trial; by default as the configuration says.
+    particles, runs : int
+        Of the splitting: how many trials are on their way at a time, and how many independent runs there are.
+    workers : int
+        Processes that run the trials of Monte Carlo.
+    progress : callable, optional
+        Is told how many trials have run.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong.
+    """
+    own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
+    if event not in EGO_RULES:
+        expected = f"one of {', '.join(EGO_RULES)}"
+        raise InputError("no rule of the ego's", file="--event", value=event, expected=expected)
+    if method not in METHODS:
+        raise InputError(
+            "no such method", file="--method", value=method, expected=f"one of {', '.join(METHODS)}"
+        )
+    own = prepared(own, duration, {})
+    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+    told = progress or _silent
+    if method == "splitting":
+        begin = beginner(maker(controller), name, event)
+        return by_splitting(drawn(own, seed), begin, event, below, particles, runs, seed, told)
+    count = trials or 10_000
+    with crew_of(controller, name, workers, None) as crew:
+        return by_counting(draw_many(own, seed, range(count)), crew, event, below, told)
+
+
+def by_counting(
+    instances: Iterable[Instance], crew: Crew, event: str, below: float, progress: Progress
+) -> Probability:
+    """Return what Monte Carlo gives on some trials; the parameters are those of `estimate`."""
+    count = happened = discarded = 0
+    waiting: list[Instance] = []
+
+    def run() -> None:
+        nonlocal count, happened, discarded
+        for tried in crew.run(waiting).tried:
+            discarded += tried.discarded
+            happened += not tried.discarded and tried.margins.get(event, np.inf) <= below
+        count += len(waiting)
+        waiting.clear()
+        progress(count)
+
+    for instance in instances:
+        waiting.append(instance)
+        if len(waiting) == BATCH:
+            run()
+    if waiting:
+        run()
+    return Probability(
+        "monte-carlo", words(event, below), happened / count, clopper_pearson(happened, count),
+        wilson(happened, count), count, happened, discarded,
+    )  # fmt: skip
+
+
+def by_splitting(
+    draw: Callable[[range], list[Instance]], begin: Begin, event: str, below: float, particles: int, runs: int,
+    seed: int, progress: Progress,
+) -> Probability:  # fmt: skip
+    """Return what multilevel splitting gives; `draw` gives the instances of numbers, the rest is as of `estimate`."""
+    for name, value, least in (("particles", particles, 10), ("runs", runs, 2)):
+        if value < least:
+            raise InputError("too few", field=name, value=value, expected=f"at least {least}")
+    found: list[float] = []
+    trials = 0
+    for run in range(runs):
+        instances = draw(range(run * particles, (run + 1) * particles))
+        dice = np.random.default_rng([STREAM, seed, run, 1])
+        once = split(instances, begin, below, instances[0].ticks, dice)
+        found.append(once.probability)
+        trials += once.trials
+        progress(trials)
+    mean = float(np.mean(found))
+    interval = of_mean(found) if mean > 0.0 else clopper_pearson(0, runs * particles)
+    return Probability(
+        "splitting", words(event, below), mean, interval, None, trials, None, None, tuple(found)
+    )
+
+
+def drawn(configuration: Configuration, seed: int) -> Callable[[range], list[Instance]]:
+    """Return what draws the instances of numbers from a configuration, all of the longest duration that it allows."""
+
+    def draw(numbers: range) -> list[Instance]:
+        found = list(draw_many(configuration, seed, numbers))
+        longest = max(own.duration for own in found)
+        return [own if own.duration == longest else replace(own, duration=longest) for own in found]
+
+    return draw
+
+
+def _silent(done: int) -> None:
+    """Tell nobody."""
+
+
+def words(event: str, below: float) -> str:
+    """Return an event in words."""
+    return f"{event} is broken" if below <= 0.0 else f"the margin of {event} gets to {below:g} or less"

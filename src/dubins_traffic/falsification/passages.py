@@ -1,0 +1,214 @@
+"""The ego's way through a trial in stretches: along a road, through a disc, and what it did there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.falsification.cells import CELLS, DEGREES, MANOEUVRES, Cell, Manoeuvre
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.scoring.verdict import EGO_RULES
+
+OVER: Final = -2
+"""Stands for the lane state after the end of a trial."""
+BARRED: Final = 1 << 40
+"""Beside the flags of `rules.propositions`: has come to a crossing that was not clear."""
+STRAIGHT_WITHIN: Final = 0.5
+"""Sine of the largest turn that still counts as going straight on, 30 degrees."""
+_AT_CROSSINGS: Final = ("3.stop", "3.order", "3.clear")
+
+
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Passages:
+    """The stretches of some trials, one row each, in order of trial and time.
+
+    Attributes
+    ----------
+    trial : (P,) int64
+        Which of the trials.
+    first, end : (P,) int64
+        Its first frame, and the frame after its last.
+    manoeuvre, degree : (P,) int64
+        What the ego did, and how many roads meet in the disc, or in the one at the end of the road.
+    in_disc : (P,) bool
+        Whether it leads through a disc.
+    flags : (P,) int64
+        The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`.
+    before : (P,) int64
+        The flags of the stretch before, 0 for the first one of a trial.
+    """
+
+    trial: Ints
+    first: Ints
+    end: Ints
+    manoeuvre: Ints
+    degree: Ints
+    in_disc: Bools
+    flags: Ints
+    before: Ints
+
+    def cell(self, rule: str, trial: int, tick: int) -> Cell:
+        """Return the cell of a breach of `rule` at a frame of a trial.
+
+        A breach of rule 3 belongs to the way through the disc that the ego enters; its body meets a disc before its
+        centre does.
+        """
+        last = int(np.searchsorted(self.trial, trial, side="right"))
+        row = int(np.searchsorted(self.trial, trial, side="left"))
+        while row + 1 < last and self.end[row] <= tick:
+            row += 1
+        if rule in _AT_CROSSINGS and not self.in_disc[row]:
+            if row + 1 == last:
+                return Cell(rule, Manoeuvre.ENTERING, int(self.degree[row]))
+            row += 1
+        return Cell(rule, Manoeuvre(int(self.manoeuvre[row])), int(self.degree[row]))
+
+    def exercised(self, crossing_degree: int) -> Ints:
+        """Return how often each cell was put to the test, (`CELLS`,): what could have been broken there.
+
+        Rule 3 is put to the test by entering a crossing (a disc where `crossing_degree` roads meet, or more), its order
+        and clearance only if somebody was before the ego or in the crossing; rule 2 by something that stands in the
+        way; a collision needs somebody near.
+        """
+        seen, came = self.flags, self.before
+        met = _held(came, FLAG.AHEAD | BARRED)
+        blocked = _held(seen, FLAG.BLOCKED | FLAG.OVERTAKING)
+        entered = self.in_disc & (self.manoeuvre != Manoeuvre.LEAVING) & (self.degree >= crossing_degree)
+        tested: dict[str, Bools] = {
+            "1.collision": np.where(self.in_disc, met, blocked | _held(seen, FLAG.AHEAD | BARRED)),
+            "1.road": np.ones(len(seen), dtype=bool),
+            "2.left": ~self.in_disc & (blocked | _held(seen, FLAG.LEFT)),
+            "2.return": ~self.in_disc & _held(seen, FLAG.LEFT),
+            "3.stop": entered,
+            "3.order": entered & _held(came, FLAG.AHEAD),
+            "3.clear": entered & _held(came, BARRED),
+        }
+        within = self.manoeuvre * DEGREES + self.degree
+        count = np.zeros(CELLS, dtype=np.int64)
+        for rule, happened in tested.items():
+            numbers = EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[happened]
+            count += np.bincount(numbers, minlength=CELLS)
+        return count
+
+
+def find_passages(
+    lane: Ints, bits: npt.NDArray[np.integer[Any]], frames: Ints, networks: Sequence[RoadNetwork]
+) -> Passages:
+    """Return the stretches of some trials.
+
+    Parameters
+    ----------
+    lane : (K, F) int64
+        Lane state of each ego in each frame, -1 for none.
+    bits : (K, F)
+        Its flags.
+    frames : (K,)
+        How many frames each trial has, at most F.
+    networks : sequence of RoadNetwork
+        That of each trial.
+    """
+    width: int = lane.shape[1]
+    running: Bools = np.less(np.arange(width), frames[:, None])
+    whole = np.where(running, lane, OVER)
+    begins = np.ones(whole.shape, dtype=bool)
+    begins[:, 1:] = whole[:, 1:] != whole[:, :-1]
+    place = np.flatnonzero(begins)
+    flags: Ints = bits.astype(np.int64)
+    waits = _held(flags, FLAG.APPROACH | FLAG.STOPPED)
+    flags |= np.where(waits & ~_held(flags, FLAG.CLEAR), BARRED, 0)
+    held = np.bitwise_or.reduceat(flags.ravel(), place)
+    ends = np.append(place[1:], whole.size)
+    kept = whole.ravel()[place] != OVER
+    place, held, ends = place[kept], held[kept], ends[kept]
+    trial, first = place // width, place % width
+    own = whole.ravel()[place]
+    manoeuvre, degree = _manoeuvres(trial, own, held, _ground(networks))
+    fresh = np.append(True, trial[1:] != trial[:-1])
+    return Passages(
+        trial,
+        first,
+        ends - trial * width,
+        manoeuvre,
+        degree,
+        own < 0,
+        held,
+        np.where(fresh, 0, np.roll(held, 1)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Ground:
+    """The roads of several trials, one network after another, and where those of each trial begin."""
+
+    head: Ints
+    """Degree of the intersection at the end of each lane."""
+    tail: Ints
+    """That of the intersection at its beginning."""
+    tangent: npt.NDArray[np.float64]
+    base: Ints
+    """Number of the first lane of each trial."""
+
+
+def _ground(networks: Sequence[RoadNetwork]) -> _Ground:
+    distinct = {id(network): network for network in networks}
+    tables = [_lanes(network) for network in distinct.values()]
+    sizes = np.cumsum([0, *(len(head) for head, _, _ in tables)])
+    base = dict(zip(distinct, sizes.tolist(), strict=False))
+    heads, tails, tangents = zip(*tables, strict=True)
+    place = np.array([base[id(network)] for network in networks])
+    return _Ground(np.concatenate(heads), np.concatenate(tails), np.concatenate(tangents), place)
+
+
+def _held(flags: Ints, wanted: int) -> Bools:
+    """Tell of which stretches one of the flags `wanted` held."""
+    return (flags & wanted) != 0
+
+
+def _lanes(network: RoadNetwork) -> tuple[Ints, Ints, npt.NDArray[np.float64]]:
+    """Return the degrees at the end and at the beginning of each lane, and its direction; kept with the network."""
+    found = network.known.get(_LANES)
+    if found is None:
+        ends = network.degrees[network.ends]
+        head = np.stack([ends[:, 1], ends[:, 0]], axis=1).ravel()
+        tail = np.stack([ends[:, 0], ends[:, 1]], axis=1).ravel()
+        tangent = np.stack([network.tangents, -network.tangents], axis=1).reshape(-1, 2)
+        found = network.known[_LANES] = head, tail, tangent
+    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+
+
+_LANES = "falsify lanes"
+
+
+def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[Ints, Ints]:
+    """Return manoeuvre and degree of each stretch."""
+    same = trial[1:] == trial[:-1]
+    came = np.append(-1, np.where(same, lane[:-1], -1))
+    goes = np.append(np.where(same, lane[1:], -1), -1)
+    base = ground.base[trial]
+    before, after, own = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
+    t0, t1 = ground.tangent[before], ground.tangent[after]
+    sine = t0[:, 0] * t1[:, 1] - t0[:, 1] * t1[:, 0]
+    ahead = t0[:, 0] * t1[:, 0] + t0[:, 1] * t1[:, 1] > 0.0
+    through = np.select(
+        [came < 0, goes < 0, goes == came ^ 1, ahead & (np.abs(sine) <= STRAIGHT_WITHIN), sine > 0.0],
+        [Manoeuvre.LEAVING, Manoeuvre.ENTERING, Manoeuvre.BACK, Manoeuvre.STRAIGHT, Manoeuvre.LEFT],
+        Manoeuvre.RIGHT,
+    )
+    along = np.select(
+        [_held(flags, FLAG.OVERTAKING), _held(flags, FLAG.TURNED)],
+        [Manoeuvre.OVERTAKING, Manoeuvre.TURNED],
+        Manoeuvre.DRIVING,
+    )
+    in_disc = lane < 0
+    degree = np.where(in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[own])
+    unknown = in_disc & (came < 0) & (goes < 0)
+    return np.where(in_disc, through, along), np.where(unknown, 0, degree)

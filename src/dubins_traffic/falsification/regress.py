@@ -1,0 +1,115 @@
+"""Regression: a folder of cases is run with a controller, and what it still breaks is told."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.archive import files
+from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.falsification.judging import judge
+from dubins_traffic.falsification.sentences import sentence_of
+from dubins_traffic.record.sink import FAULTS
+from dubins_traffic.scoring.verdict import EGO_NAME, Ruling
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.verdict import Violation
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a controller did in a case.
+
+    Attributes
+    ----------
+    file : Path
+        The case.
+    case : Case
+        What it was.
+    verdict : str
+        The ruling, or how the trial ended if by a fault.
+    broken : tuple of str
+        The rules that the ego broke before the assumption fell, in order of time.
+    sentence : str
+        Who did what when; empty if the ego broke nothing.
+    """
+
+    file: Path
+    case: Case
+    verdict: str
+    broken: tuple[str, ...]
+    sentence: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the ego broke nothing for which it must answer, and no fault ended the trial."""
+        return not self.broken and self.verdict in {own.value for own in Ruling}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the outcome as a JSON object."""
+        return {
+            "file": self.file.name,
+            "rule": self.case.story.rule,
+            "verdict": self.verdict,
+            "broken": list(self.broken),
+            "sentence": self.sentence,
+            "passed": self.passed,
+        }
+
+
+def regress(folder: str | os.PathLike[str], controller: str | Maker) -> list[Outcome]:
+    """Run every case of a folder with a controller.
+
+    Parameters
+    ----------
+    folder : path
+        A folder of cases, or that of a search.
+    controller : str or callable
+        As `run_batch` takes it.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, it holds no case, or a file in it is none.
+    """
+    return list(outcomes(cases_in(folder), controller))
+
+
+def cases_in(folder: str | os.PathLike[str]) -> list[tuple[Path, Case]]:
+    """Return the cases of a folder and their files, in order."""
+    place = Path(folder)
+    if not place.is_dir():
+        raise InputError("no such folder", file=str(place), expected="a folder of cases")
+    found = [(path, read_case(path)) for path in files(place)]
+    if not found:
+        raise InputError("no case in it", file=str(place), expected="files *.json that `falsify` wrote")
+    return found
+
+
+def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker) -> Iterator[Outcome]:
+    """Run cases with a controller, and yield what it did in each."""
+    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+    make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
+    controllers.made(make)
+    for path, case in cases:
+        judged = judge(case.instance, make, name)
+        verdict, ending = judged.score.verdict, judged.record.ending
+        if verdict is None:
+            raise InputError("is not judged by the rules", file=str(path), field="rules", expected="true")
+        own = [broken for broken in verdict.violations if broken.car == EGO_NAME]
+        own = own if verdict.verdict is Ruling.VIOLATED else []
+        faulty = ending is not None and ending.end in FAULTS
+        said = ending.end.value if faulty and ending is not None else verdict.verdict.value
+        of_it = [broken for broken in own if broken.rule == case.story.rule] or own
+        told = sentence_of(judged.record, judged.score, of_it[0]) if own else ""
+        yield Outcome(path, case, said, _rules(own), told)
+
+
+def _rules(own: Sequence[Violation]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(broken.rule for broken in own))

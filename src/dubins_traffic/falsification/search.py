@@ -1,0 +1,331 @@
+"""The search for the worst case: propose, run, judge afresh, keep one case of each kind of failure."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification import archive as archives
+from dubins_traffic.falsification.archive import Archive
+from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.coverage import Row, coverage, possible
+from dubins_traffic.falsification.crew import Crew, crew_of
+from dubins_traffic.falsification.judging import confirm
+from dubins_traffic.falsification.least import Least
+from dubins_traffic.falsification.sampling import DURATION, Source, prepared
+from dubins_traffic.falsification.sentences import sentence_of
+from dubins_traffic.falsification.strategies import Strategy, make
+from dubins_traffic.falsification.trying import DONE, FORMULA, Tried
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.scoring.verdict import EGO_RULES
+
+GENERATION: Final = 128
+"""Trials that are proposed at a time, whoever runs them."""
+TRIALS: Final = 10_000
+SAVE: Final = 20.0
+"""Seconds after which a search writes down where it goes on."""
+
+Progress = Callable[["Search"], object]
+
+
+@dataclass(slots=True)
+class Counts:
+    """What became of the trials of a search: how many ran, and of these broke the assumption, failed, broke a rule."""
+
+    trials: int = 0
+    discarded: int = 0
+    faulty: int = 0
+    violated: int = 0
+    unconfirmed: int = 0
+    """Breaches that did not stand when they were judged afresh."""
+    exercised: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
+    broken: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the counts as a JSON object."""
+        names = ("trials", "discarded", "faulty", "violated", "unconfirmed")
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search leaves.
+
+    Attributes
+    ----------
+    folder : Path
+        Its folder.
+    cases : dict of str to Case
+        One case for each kind of failure, by the name of its cell.
+    trials, discarded, faulty, violated : int
+        How many trials it has run; of these, in how many the assumption was broken first, how many ended by a fault,
+        and in how many the ego broke a rule that was asked for.
+    coverage : list of Row
+        Which rule, manoeuvre and crossing were put to the test.
+    """
+
+    folder: Path
+    cases: Mapping[str, Case]
+    trials: int
+    discarded: int
+    faulty: int
+    violated: int
+    coverage: list[Row]
+
+
+class Search:
+    """A search under way.
+
+    Parameters
+    ----------
+    archive : Archive
+        Its folder.
+    settings : JSON
+        What tells it from others.
+    source : Source
+        Where the instances come from.
+    strategy : Strategy
+        What is tried next.
+    targets : sequence of str
+        The rules, and formulas, that are asked for.
+    crew : Crew
+        Who runs the trials.
+    """
+
+    def __init__(
+        self,
+        archive: Archive,
+        settings: Any,
+        source: Source,
+        strategy: Strategy,
+        targets: Sequence[str],
+        crew: Crew,
+    ) -> None:
+        self.archive, self.counts = archive, Counts()
+        self._settings, self._source, self._strategy = settings, source, strategy
+        self._targets, self._crew = tuple(targets), crew
+        self._expected: set[int] = set()
+        self._least = Least()
+        state = archive.state()
+        if state is not None:
+            self._restore(state)
+
+    def generation(self, most: int) -> None:
+        """Try the next trials, at most `most`."""
+        first = self.counts.trials
+        numbers = range(first, first + min(GENERATION, most))
+        genomes = self._strategy.propose(numbers)
+        instances = self._source.build(genomes)
+        findings = self._crew.run(instances)
+        places = {id(own.problem.network): own for own in instances}
+        self._expected.update(cell.number for cell in possible(places.values()))
+        for number, genome, instance, tried in zip(numbers, genomes, instances, findings.tried, strict=True):
+            self._least.take(number, genome, tried)
+            known = self._take(instance, tried)
+            self._strategy.tell(number, genome, tried, known)
+        self.counts.exercised += findings.exercised
+        self.counts.trials += len(numbers)
+
+    def _take(self, instance: Instance, tried: Tried) -> bool:
+        """Count a trial and keep its failures; tell whether it broke a rule."""
+        counts = self.counts
+        counts.discarded += tried.discarded
+        counts.faulty += tried.faulty
+        wanted = [cell for cell, _ in tried.cells if cell.rule in self._targets]
+        counts.violated += bool(wanted)
+        for cell in wanted:
+            if cell.number >= 0:
+                counts.broken[cell.number] += 1
+            if cell.name not in self.archive.cases and not self._keep(instance, cell):
+                counts.unconfirmed += 1
+        return bool(wanted)
+
+    def _keep(self, instance: Instance, cell: Cell) -> bool:
+        """Judge a failure afresh, and keep it as a case if it stands."""
+        make, name = self._crew.make, self._crew.name
+        found = confirm(instance, cell.rule, make, name)
+        breach = None if found is None else found.breach(cell.rule)
+        if found is None or breach is None:
+            return False
+        story = Story(
+            cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
+            sentence_of(found.record, found.score, breach),
+        )  # fmt: skip
+        self.archive.keep(cell.name, Case(found.record.instance, story))
+        return True
+
+    def result(self) -> Found:
+        """Return what has been found so far."""
+        counts = self.counts
+        return Found(
+            self.archive.folder, dict(sorted(self.archive.cases.items())), counts.trials, counts.discarded,
+            counts.faulty, counts.violated, self.coverage(),
+        )  # fmt: skip
+
+    def coverage(self) -> list[Row]:
+        """Return which rule, manoeuvre and crossing have been put to the test."""
+        expected = [Cell.of(number) for number in self._expected]
+        rows = coverage(expected, self.counts.exercised, self.counts.broken)
+        return [row for row in rows if row.cell.rule in self._targets or self._targets[0] not in EGO_RULES]
+
+    def save(self) -> None:
+        """Write down what has been found, and where the search goes on."""
+        if DONE in self._targets:
+            for name, case in self._least.cases(self._source, self._crew).items():
+                self.archive.keep(name, case)
+        rows = [row.to_json() for row in self.coverage()]
+        cases = {name: case.story.sentence for name, case in sorted(self.archive.cases.items())}
+        report = {"settings": self._settings, **self.counts.to_json(), "cases": cases, "coverage": rows}
+        self.archive.write(archives.REPORT, report)
+        state = {
+            "settings": self._settings,
+            "counts": self.counts.to_json(),
+            "exercised": self.counts.exercised.tolist(),
+            "broken": self.counts.broken.tolist(),
+            "expected": sorted(self._expected),
+            "strategy": self._strategy.state(),
+            "least": self._least.state() if DONE in self._targets else [],
+        }
+        self.archive.write(archives.STATE, state, indent=None)
+
+    def _restore(self, state: Any) -> None:
+        self.counts = Counts(**state["counts"])
+        self.counts.exercised += np.array(state["exercised"], dtype=np.int64)
+        self.counts.broken += np.array(state["broken"], dtype=np.int64)
+        self._expected = set(state["expected"])
+        self._strategy.restore(state["strategy"])
+        self._least.restore(state["least"])
+
+
+def falsify(
+    configuration: Configuration | str | os.PathLike[str],
+    controller: str | Maker = COMPILED,
+    folder: str | os.PathLike[str] = "falsified",
+    *,
+    rules: Sequence[str] = (),
+    formula: str | None = None,
+    least_score: bool = False,
+    trials: int | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+    strategy: str = "evolution",
+    duration: float | None = DURATION,
+    workers: int = 1,
+    ray: str | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Found:
+    """Search for trials in which an ego breaks the rules while all others keep the assumption.
+
+    The e-agents of the kind `lawful` choose what the law leaves free to them (kind `chosen`): exits, speeds, when to
+    go. The search looks for choices with which the ego breaks a rule; each failure is cut to its breach, written as an
+    instance and a record, judged afresh, and kept if it stands: one for each rule,
+    manoeuvre and degree of the crossing.
+
+    Parameters
+    ----------
+    configuration : Configuration, path or name
+        What the instances are drawn from.
+    controller : str or callable
+        As `run_batch` takes it.
+    folder : path
+        What is found is kept here; made if missing.
+    rules : sequence of str
+        The rules that are asked for, such as ``3.clear``; by default all.
+    formula : str, optional
+        A formula of one's own that is asked for instead.
+    least_score : bool
+        Whether the trials in which the ego gets least done are looked for instead.
+    trials : int, optional
+        How many trials are run; by default 10,000, or as many as `seconds` allow.
+    seconds : float, optional
+        After so many seconds the search ends, with the generation that it is in.
+    seed : int
+        What all follows from: the same seed and number of trials give the same files, byte for byte.
+    strategy : str
+        ``evolution``, ``uniform``, or ``cma``, which needs the extra `falsify`.
+    duration : float or None
+        Seconds of a trial; None: as the configuration says.
+    workers : int
+        Processes that run the trials; more than one need a controller given by name.
+    ray : str, optional
+        Run on a Ray cluster instead: its address, or ``local`` for one of `workers` processors on this machine.
+    resume : bool
+        Whether to go on with what has been begun in `folder`.
+    progress : callable, optional
+        Is told after every generation of the search how far it is.
+
+    Raises
+    ------
+    InputError
+        If anything of this is wrong, or the folder holds something else.
+    KeyboardInterrupt
+        On Ctrl-C; what has been found is kept.
+    """
+    own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
+    targets = _targets(rules, formula, least_score=least_score)
+    own = prepared(own, duration, {} if formula is None else {ASKED: formula})
+    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+    if trials is None and seconds is None:
+        trials = TRIALS
+    settings = {
+        "configuration": hashlib.sha256(json.dumps(own.to_document(), sort_keys=True).encode()).hexdigest(),
+        "controller": name, "targets": list(targets), "seed": seed, "strategy": strategy,
+    }  # fmt: skip
+    source = Source(own, seed)
+    proposing = make(strategy, source, targets)
+    with (
+        archives.opened(Path(folder), settings, resume=resume) as archive,
+        crew_of(controller, name, workers, ray) as crew,
+    ):
+        search = Search(archive, settings, source, proposing, targets, crew)
+        try:
+            for _ in _generations(search, trials, seconds):
+                if progress is not None:
+                    progress(search)
+        finally:
+            search.save()
+        return search.result()
+
+
+ASKED: Final = "asked"
+"""The name by which a problem carries the formula that a search asks for."""
+
+
+def _targets(rules: Sequence[str], formula: str | None, *, least_score: bool) -> tuple[str, ...]:
+    unknown = [rule for rule in rules if rule not in EGO_RULES]
+    if unknown:
+        expected = f"one of {', '.join(EGO_RULES)}"
+        raise InputError("no rule of the ego's", file="--rule", value=unknown[0], expected=expected)
+    if least_score:
+        return (DONE,)
+    if formula is not None:
+        return (f"{FORMULA} {ASKED}",)
+    return tuple(rules) or EGO_RULES
+
+
+def _generations(search: Search, trials: int | None, seconds: float | None) -> Iterator[int]:
+    """Run generations until there have been enough; yield after each how many trials there have been."""
+    began = saved = time.monotonic()
+    while (trials is None or search.counts.trials < trials) and (
+        seconds is None or time.monotonic() - began < seconds
+    ):
+        search.generation(GENERATION if trials is None else trials - search.counts.trials)
+        if time.monotonic() - saved > SAVE:
+            search.save()
+            saved = time.monotonic()
+        yield search.counts.trials

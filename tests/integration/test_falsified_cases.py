@@ -1,0 +1,35 @@
+"""The project's own cases: what its drivers break, and what mutants of `rules` break and `rules` does not."""
+
+from pathlib import Path
+
+import pytest
+
+from dubins_traffic.falsification.regress import cases_in, outcomes
+
+CASES = Path(__file__).parents[1] / "cases"
+
+
+def test_rules_passes_the_cases_of_its_mutants() -> None:
+    assert [own.file.name for own in outcomes(cases_in(CASES / "rules"), "rules") if not own.passed] == []
+
+
+def test_the_shield_passes_the_cases_of_lanes() -> None:
+    assert [
+        own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed
+    ] == []
+
+
+@pytest.mark.parametrize("controller", ["lanes", "simple"])
+def test_a_known_case_is_told_in_the_same_words_again(controller: str) -> None:
+    found = list(outcomes(cases_in(CASES / controller), controller))
+    assert len(found) >= 3
+    for own in found:
+        assert not own.passed
+        assert own.case.story.rule in own.broken
+        assert own.sentence == own.case.story.sentence
+
+
+def test_most_cases_are_small() -> None:
+    cases = [case for folder in CASES.iterdir() for _, case in cases_in(folder)]
+    small = [case for case in cases if len(case.instance.starts) <= 3]
+    assert len(small) >= 0.8 * len(cases)

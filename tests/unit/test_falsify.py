@@ -1,0 +1,129 @@
+"""Cells, passages, cases and splitting, each by itself."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dubins_traffic.agents.choices import CHOICE
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.archive import opened
+from dubins_traffic.falsification.case import Case, Story, read_case
+from dubins_traffic.falsification.cells import CELLS, Cell, Manoeuvre
+from dubins_traffic.falsification.coverage import coverage, possible
+from dubins_traffic.falsification.passages import find_passages
+from dubins_traffic.falsification.sampling import Genome, Source, prepared
+from dubins_traffic.falsification.strategies import make
+from dubins_traffic.falsification.trying import Tried
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.propositions import FLAG
+
+JUNCTION = load_config("junction")
+STORY = Story("3.clear", "left", 4, "simple", 2.0, 60, "At 2.00 s the ego entered.")
+
+
+def test_cells_are_numbered_one_by_one() -> None:
+    assert [Cell.of(number).number for number in range(CELLS)] == list(range(CELLS))
+    assert Cell("3.clear", Manoeuvre.LEFT, 4).name == "3.clear-left-4"
+
+
+def _lanes(network: RoadNetwork, way: list[tuple[int, int]]) -> list[int]:
+    """Return the lanes along a way of lattice points."""
+    found: list[int] = []
+    for (x0, y0), (x1, y1) in pairwise(way):
+        for s, road in enumerate(network.segments):
+            found += [2 * s] * (road == (x0, y0, x1, y1)) + [2 * s + 1] * (road == (x1, y1, x0, y0))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("last", "manoeuvre"),
+    [
+        ((2, 1), Manoeuvre.STRAIGHT),
+        ((1, 2), Manoeuvre.LEFT),
+        ((1, 0), Manoeuvre.RIGHT),
+        ((0, 1), Manoeuvre.BACK),
+    ],
+)
+def test_a_passage_is_what_the_ego_did_in_the_disc(last: tuple[int, int], manoeuvre: Manoeuvre) -> None:
+    network = JUNCTION.network
+    assert network is not None
+    first, second = _lanes(network, [(0, 1), (1, 1), last])
+    lane = np.array([[first] * 4 + [-1] * 3 + [second] * 2 + [0]])
+    bits = np.zeros((1, 10), dtype=np.uint32)
+    bits[0, 2] = FLAG.STOPPED | FLAG.AHEAD
+    found = find_passages(lane, bits, np.array([9]), [network])
+    assert found.first.tolist() == [0, 4, 7]
+    assert found.end.tolist() == [4, 7, 9]
+    assert found.cell("1.collision", 0, 5) == Cell("1.collision", manoeuvre, 4)
+    assert found.cell("3.stop", 0, 3) == Cell("3.stop", manoeuvre, 4)
+    assert found.cell("1.collision", 0, 2) == Cell("1.collision", Manoeuvre.DRIVING, 4)
+    tested = found.exercised(3)
+    assert tested[Cell("3.order", manoeuvre, 4).number] == 1
+    assert tested[Cell("3.clear", manoeuvre, 4).number] == 1
+    assert tested[Cell("2.left", Manoeuvre.DRIVING, 4).number] == 0
+
+
+def test_an_empty_cell_stands_in_the_coverage() -> None:
+    instance = draw(JUNCTION, 1, 0)
+    expected = possible([instance])
+    assert Cell("3.order", Manoeuvre.LEFT, 4) in expected
+    nothing = np.zeros(CELLS, dtype=np.int64)
+    rows = coverage(expected, nothing, nothing)
+    assert [row.cell for row in rows] == expected
+    assert not any(row.tested or row.broken for row in rows)
+
+
+def test_a_case_is_read_as_it_was_written(tmp_path: Path) -> None:
+    case = Case(draw(JUNCTION, 1, 0), STORY)
+    case.write(tmp_path / "case.json")
+    again = read_case(tmp_path / "case.json")
+    assert again.story == STORY
+    assert again.to_text() == case.to_text()
+    other = tmp_path / "other.json"
+    other.write_text(case.to_text().replace('"rule": "3', '"law": "3'))
+    with pytest.raises(InputError, match="not a case"):
+        read_case(other)
+
+
+def test_a_genome_comes_back_from_json_and_builds_the_same_instance() -> None:
+    source = Source(prepared(JUNCTION, 15.0, {}), 3)
+    genome = source.fresh(5)
+    child = source.varied(genome, source.dice(6))
+    for own in (genome, child):
+        again = Genome.from_json(own.to_json())
+        assert source.build([again]) == source.build([own])
+    assert source.build([genome])[0].starts == source.build([child])[0].starts
+    assert {agent.kind for agent in source.build([genome])[0].e_agents} == {"chosen"}
+
+
+def test_a_folder_holds_one_search(tmp_path: Path) -> None:
+    with opened(tmp_path / "a", {"seed": 1}, resume=False) as archive:
+        archive.write("state.json", {"settings": {"seed": 1}})
+    with pytest.raises(InputError, match="holds a search"), opened(tmp_path / "a", {"seed": 1}, resume=False):
+        pass
+    with (
+        pytest.raises(InputError, match="another search: seed"),
+        opened(tmp_path / "a", {"seed": 2}, resume=True),
+    ):
+        pass
+
+
+def test_cma_moves_by_what_it_is_told_and_goes_the_same_way_again() -> None:
+    source = Source(prepared(JUNCTION, 6.0, {}), 3)
+    targets = ("3.order", "3.clear")
+    first, second = (make("cma", source, targets) for _ in range(2))
+    for generation in range(4):
+        numbers = range(32 * generation, 32 * generation + 32)
+        for number, genome in zip(numbers, first.propose(numbers), strict=True):
+            near = float(np.nansum(genome.tables[1][:, CHOICE.HOLD]))
+            first.tell(number, genome, Tried(False, False, dict.fromkeys(targets, near), ()), False)
+    second.restore(first.state())
+    ways = [own.propose(range(128, 160)) for own in (first, second)]
+    assert [own.to_json() for own in ways[0]] == [own.to_json() for own in ways[1]]
+    begun = make("cma", source, targets).propose(range(32))
+    held = [np.mean([own.tables[1][:, CHOICE.HOLD].sum() for own in way]) for way in (begun, ways[0])]
+    assert held[1] < 0.9 * held[0]
