@@ -37,6 +37,9 @@ def network(
         tuple[int, int] | None,
         typer.Option("--grid", metavar="ROWS COLS", help="The complete grid.", show_default="3 4"),
     ] = None,
+    bent: Annotated[
+        float, typer.Option("--bent", metavar="SHARE", min=0.0, max=1.0, help="of which about a SHARE bend.")
+    ] = 0.0,
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
     output: options.Output = None,
@@ -56,5 +59,5 @@ def network(
         missing = "--intersections" if intersections is None else "--segments"
         raise InputError("missing", file=missing, expected="both --intersections and --segments")
     else:
-        made = generate(intersections, segments, seed)
+        made = generate(intersections, segments, seed, bent=bent)
     options.write(made.to_json() if format is Format.JSON else made.to_text(), output)

@@ -11,7 +11,14 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
@@ -22,7 +29,17 @@ Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
 Seconds = Annotated[float, Field(ge=0, le=limits.SECONDS)]
 Share = Annotated[float, Field(ge=0, le=1)]
-LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
+NetworkPoint = Annotated[
+    list[
+        Annotated[
+            float,
+            Field(ge=-limits.METRES, le=limits.METRES),
+            AfterValidator(lambda number: int(number) if number.is_integer() else number),
+        ]
+    ],
+    Field(min_length=2, max_length=2),
+]
+"""A point of a network's own frame; whole numbers are integers."""
 TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
@@ -52,7 +69,7 @@ class Wander(Strict):
 class Loop(Strict):
     """Drives round a cycle of segments on the right lanes."""
 
-    cycle: list[LatticePoint] | None = Field(
+    cycle: list[NetworkPoint] | None = Field(
         default=None,
         min_length=2,
         max_length=limits.GOALS,
@@ -113,7 +130,7 @@ class Lawful(Strict):
     goes: Literal["wander", "loop", "places"] = Field(
         default="wander", description="at random, round a cycle, or between random intersections"
     )
-    cycle: list[LatticePoint] | None = Field(
+    cycle: list[NetworkPoint] | None = Field(
         default=None,
         min_length=2,
         max_length=limits.GOALS,

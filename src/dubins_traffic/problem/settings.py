@@ -13,12 +13,11 @@ from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
-from dubins_traffic.problem.kinds import KINDS, NAMES_2016
+from dubins_traffic.problem.kinds import KINDS, NAMES_2016, NetworkPoint
 from dubins_traffic.problem.parts import (
     CarModel,
     DisturbancesModel,
     LaserSwitch,
-    LatticePoint,
     Length,
     ObstacleModel,
     RoadReference,
@@ -51,7 +50,7 @@ GoalBounds = Annotated[
 
 
 Seconds = Annotated[float, Field(gt=0, le=limits.SECONDS)]
-Goals = Annotated[list[LatticePoint], Field(max_length=limits.GOALS)]
+Goals = Annotated[list[NetworkPoint], Field(max_length=limits.GOALS)]
 
 
 class AgentEntry0(Open):
@@ -108,6 +107,9 @@ class RandomNetwork(Strict):
         description="smallest angle between two segments at an intersection, rad, or what the rules need if larger",
     )
     rigid_motion: bool = Field(default=False, description="whether the network is turned and moved at random")
+    bent: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="about which share of the segments bend, where there is room"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> RandomNetwork:
