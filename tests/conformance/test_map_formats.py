@@ -12,7 +12,7 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.roads.formats import registry
-from dubins_traffic.roads.formats.registry import MapFormat, WritesMaps
+from dubins_traffic.roads.formats.registry import MapFormat, ReducesMaps, WritesMaps
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.sources import load
@@ -71,7 +71,8 @@ def test_what_it_writes_it_reads_again(form: MapFormat) -> None:
             again = RoadNetwork.from_text(text, "town", form)
             assert sorted(again.segments) == sorted(network.segments)
             assert (again.length, again.transform) == (network.length, network.transform)
-            assert (again.shape, again.extra) == (network.shape, network.extra)
+            assert again.shape == network.shape
+            assert again.extra == ({} if isinstance(form, ReducesMaps) else network.extra)
             assert form.write(again.to_document()) == text  # pyright: ignore[reportAttributeAccessIssue]
 
 
