@@ -1,4 +1,4 @@
-"""Sines and cosines without a mathematical library: plain functions, compiled in `kernels.trig`."""
+"""Sines, cosines and angles without a mathematical library: plain functions, compiled in `kernels.trig`."""
 
 from __future__ import annotations
 
@@ -42,3 +42,40 @@ def sincos(theta: float) -> tuple[float, float]:
     if quadrant == 2:
         return -cosine, -sine
     return sine, -cosine
+
+
+HALF_PI = 1.5707963267948966
+QUARTER_PI = 0.7853981633974483
+TAN_EIGHTH_PI = 0.41421356237309503
+P0, P1, P2, P3, P4 = (
+    -6.485021904942025371773e1, -1.228866684490136173410e2, -7.500855792314704667340e1, -1.615753718733365076637e1,
+    -8.750608600031904122785e-1,
+)  # fmt: skip
+Q0, Q1, Q2, Q3, Q4 = (
+    1.945506571482613964425e2, 4.853903996359136964868e2, 4.328810604912902668951e2, 1.650270098316988542046e2,
+    2.485846490142306297962e1,
+)  # fmt: skip
+
+
+def angle(y: float, x: float) -> float:
+    """Return the angle of the vector (x, y) for y >= 0, in [0, pi], rad; within 2 ulp; 0 for the vector 0.
+
+    The rational approximation of the arctangent on [0, tan(pi/8)] is that of Cephes; other angles come back to it.
+    """
+    wide = abs(x)
+    low, high = (y, wide) if y <= wide else (wide, y)
+    if high == 0.0:
+        return 0.0
+    t = low / high
+    turned = t > TAN_EIGHTH_PI
+    if turned:
+        t = (low - high) / (low + high)
+    z = t * t
+    over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
+    under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
+    found = t + t * (over / under)
+    if turned:
+        found = QUARTER_PI + found
+    if y > wide:
+        found = HALF_PI - found
+    return 2.0 * HALF_PI - found if x < 0.0 else found

@@ -195,7 +195,9 @@ def shipped_names() -> list[str]:
     return sorted(item.name.removesuffix(".json") for item in folder.iterdir() if item.name.endswith(".json"))
 
 
-def check_goal(network: RoadNetwork, goal: list[int] | tuple[int, ...], index: int) -> tuple[int, int]:
+def check_goal(
+    network: RoadNetwork, goal: list[float] | tuple[float, ...], index: int
+) -> tuple[float, float]:
     """Return the `index`-th goal as a lattice point.
 
     Raises

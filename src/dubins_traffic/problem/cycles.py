@@ -9,7 +9,7 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.network import RoadNetwork
 
 
-def draw_cycle(network: RoadNetwork, draws: Draws) -> list[list[int]]:
+def draw_cycle(network: RoadNetwork, draws: Draws) -> list[list[float]]:
     """Return the lattice points of a random cycle along lanes; it turns round at dead ends only.
 
     A random walk along lanes is cut where it comes back to an intersection from which it may go on as it did.
@@ -24,7 +24,7 @@ def draw_cycle(network: RoadNetwork, draws: Draws) -> list[list[int]]:
         walk.append(following[draws.below(len(following))])
 
 
-def cycle_lanes(network: RoadNetwork, points: Sequence[Sequence[int]]) -> tuple[int, ...]:
+def cycle_lanes(network: RoadNetwork, points: Sequence[Sequence[float]]) -> tuple[int, ...]:
     """Return the lanes of a cycle of lattice points, the last joined to the first (which may stand again at the end).
 
     Raises

@@ -31,7 +31,9 @@ class Stream(IntEnum):
     CYCLES = 5
 
 
-def draw_goals(network: RoadNetwork, bounds: tuple[int, int], draws: Draws) -> tuple[tuple[int, int], ...]:
+def draw_goals(
+    network: RoadNetwork, bounds: tuple[int, int], draws: Draws
+) -> tuple[tuple[float, float], ...]:
     """Return goals, as many as drawn from `bounds` (both included), distinct while there are intersections."""
     count = draws.between(*bounds)
     places = len(network.intersections)

@@ -64,7 +64,7 @@ class Problem(Pictured):
     """
 
     network: RoadNetwork
-    goals: tuple[tuple[int, int], ...]
+    goals: tuple[tuple[float, float], ...]
     intersection_radius: float
     car: Car
     rate: float

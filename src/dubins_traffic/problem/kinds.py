@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
@@ -21,7 +21,17 @@ Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
 Seconds = Annotated[float, Field(ge=0, le=limits.SECONDS)]
 Share = Annotated[float, Field(ge=0, le=1)]
-LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
+NetworkPoint = Annotated[
+    list[
+        Annotated[
+            float,
+            Field(ge=-limits.METRES, le=limits.METRES),
+            AfterValidator(lambda number: int(number) if number.is_integer() else number),
+        ]
+    ],
+    Field(min_length=2, max_length=2),
+]
+"""A point of a network's own frame; whole numbers are integers."""
 TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
@@ -51,7 +61,7 @@ class Wander(Strict):
 class Loop(Strict):
     """Drives round a cycle of segments on the right lanes."""
 
-    cycle: list[LatticePoint] | None = Field(
+    cycle: list[NetworkPoint] | None = Field(
         default=None,
         min_length=2,
         max_length=limits.GOALS,
@@ -112,7 +122,7 @@ class Lawful(Strict):
     goes: Literal["wander", "loop", "places"] = Field(
         default="wander", description="at random, round a cycle, or between random intersections"
     )
-    cycle: list[LatticePoint] | None = Field(
+    cycle: list[NetworkPoint] | None = Field(
         default=None,
         min_length=2,
         max_length=limits.GOALS,

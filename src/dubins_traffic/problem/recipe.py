@@ -155,7 +155,7 @@ class Recipe:
             site.lots = lots(site.ground, self._areas(site).outside, site.wishes)
         return site.lots
 
-    def _goals(self, network: RoadNetwork, seed: int, trial: int) -> tuple[tuple[int, int], ...]:
+    def _goals(self, network: RoadNetwork, seed: int, trial: int) -> tuple[tuple[float, float], ...]:
         settings = self._settings
         if settings.goals is not None:
             return tuple(check_goal(network, goal, k) for k, goal in enumerate(settings.goals))

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -23,20 +23,22 @@ from dubins_traffic.problem.trial_data import TrialDataModel
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 ID = "urn:dubins-traffic:"
 Transform = Annotated[list[float], Field(min_length=3, max_length=3)]
-Segment = Annotated[list[int], Field(min_length=4, max_length=4)]
+Segment = Annotated[list[float], Field(min_length=4)]
 
 
 class RoadNetworkModel(Open):
-    """Road network description (RND), version 0. Unknown keys are kept."""
+    """Road network description (RND), version 0 or 2. Unknown keys are kept."""
 
-    version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
+    version: Literal[0, 2] = Field(description="0, or 2 where segments bend or end off the integer lattice")
     length: Length = Field(description="metres of a lattice unit")
     transform: Transform = Field(default=[0, 0, 0], description="rigid motion [x, y, theta], m and rad")
     shape: LatticePoint | None = Field(
         default=None, description="[rows, columns]; without segments: the complete grid of that shape"
     )
     segments: Annotated[list[Segment], Field(min_length=1)] | None = Field(
-        default=None, description="segments [x0, y0, x1, y1] between points of the integer lattice"
+        default=None,
+        description="segments [x0, y0, x1, y1] between points of the integer lattice; in version 2 between any points, "
+        "and followed by x, y, radius for each corner",
     )
 
 
@@ -90,6 +92,9 @@ def _road_network() -> dict[str, Any]:
         schema["properties"][name].update(variants[0])
         del schema["properties"][name]["default"]
     schema["anyOf"] = [{"required": ["shape"]}, {"required": ["segments"]}]
+    plain = {"type": "array", "items": {"type": "integer"}, "maxItems": 4}
+    schema["if"] = {"properties": {"version": {"const": 0}}}
+    schema["then"] = {"properties": {"segments": {"items": plain}}}
     return schema
 
 

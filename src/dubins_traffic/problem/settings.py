@@ -13,12 +13,11 @@ from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
-from dubins_traffic.problem.kinds import KINDS, NAMES_2016
+from dubins_traffic.problem.kinds import KINDS, NAMES_2016, NetworkPoint
 from dubins_traffic.problem.parts import (
     CarModel,
     DisturbancesModel,
     LaserSwitch,
-    LatticePoint,
     Length,
     ObstacleModel,
     RoadReference,
@@ -51,7 +50,7 @@ GoalBounds = Annotated[
 
 
 Seconds = Annotated[float, Field(gt=0, le=limits.SECONDS)]
-Goals = Annotated[list[LatticePoint], Field(max_length=limits.GOALS)]
+Goals = Annotated[list[NetworkPoint], Field(max_length=limits.GOALS)]
 
 
 class AgentEntry0(Open):

@@ -1,4 +1,4 @@
-"""Is it a network? Planar, connected, at most four roads a point; exact, in integers.
+"""Is it a network? Planar, connected, at most four roads a point; for straight roads on the lattice exact, in integers.
 
 Every fault is an InputError that names the segment: ``segments[3]``.
 """
@@ -12,18 +12,22 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.cells import covered, pairs
-from dubins_traffic.roads.formats.rnd import Segment, extent
+from dubins_traffic.roads.crossings import first_crossing
+from dubins_traffic.roads.formats.rnd import Corners, Segment, extent
 from dubins_traffic.roads.room import LARGEST_DEGREE
 
 OFF_LATTICE = 0.37
 """Moves the borders of cells off the lattice, so that roads along it lie in few cells."""
 
 
-def check(segments: Sequence[Segment], shape: tuple[int, int]) -> None:
-    """Raise InputError unless the segments form a network of this shape."""
+def check(segments: Sequence[Segment], shape: tuple[int, int], corners: Sequence[Corners] = ()) -> None:
+    """Raise InputError unless the segments, with their `corners`, form a network of this shape."""
     measured = extent(segments)
     _check_each(segments)
-    _check_planar(np.array(segments, dtype=np.int64))
+    if not corners and all(isinstance(number, int) for segment in segments for number in segment):
+        _check_planar(np.array(segments, dtype=np.int64))
+    else:
+        _check_apart(segments, corners)
     _check_connected(segments)
     if tuple(shape) != measured:
         raise InputError(
@@ -37,7 +41,7 @@ def check(segments: Sequence[Segment], shape: tuple[int, int]) -> None:
 def _check_each(segments: Sequence[Segment]) -> None:
     """Refuse segments without length, given twice, or the fifth at a point."""
     seen: dict[Segment, int] = {}
-    degree: dict[tuple[int, int], int] = {}
+    degree: dict[tuple[float, float], int] = {}
     for s, (x0, y0, x1, y1) in enumerate(segments):
         a, b = (x0, y0), (x1, y1)
         if a == b:
@@ -71,6 +75,15 @@ def _check_planar(segment: Ints) -> None:
         rows = [(int(a), int(b), int(c), int(d)) for a, b, c, d in segment]
         problem = f"{_how(segment[earlier], segment[later])} segments[{earlier}]"
         raise _fault(rows, later, problem, "roads that meet at common ends only")
+
+
+def _check_apart(segments: Sequence[Segment], corners: Sequence[Corners]) -> None:
+    """Refuse chains of lines and arcs that meet elsewhere than at common ends, and that meet themselves."""
+    found = first_crossing(segments, corners)
+    if found is not None:
+        earlier, later = found
+        problem = "crosses itself" if earlier == later else f"meets segments[{earlier}]"
+        raise _fault(segments, later, problem, "roads that meet at common ends only")
 
 
 def _cross(ax: Ints, ay: Ints, bx: Ints, by: Ints) -> Ints:
@@ -115,7 +128,7 @@ def _how(p: Ints, q: Ints) -> str:
 
 def _check_connected(segments: Sequence[Segment]) -> None:
     """Refuse segments that can't be reached from the first."""
-    roads: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    roads: dict[tuple[float, float], list[tuple[float, float]]] = {}
     for x0, y0, x1, y1 in segments:
         roads.setdefault((x0, y0), []).append((x1, y1))
         roads.setdefault((x1, y1), []).append((x0, y0))

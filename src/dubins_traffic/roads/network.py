@@ -1,4 +1,4 @@
-"""Road networks: straight segments between points of an integer lattice, embedded by scale and rigid motion."""
+"""Road networks: segments, straight or bent, between points of a plane, embedded by scale and rigid motion."""
 
 from __future__ import annotations
 
@@ -14,29 +14,28 @@ import numpy.typing as npt
 from dubins_traffic import files
 from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.chains import sides
 from dubins_traffic.roads.checks import check
+from dubins_traffic.roads.embedding import Embedding, Point
 from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
-from dubins_traffic.roads.formats.rnd import Segment
+from dubins_traffic.roads.formats.rnd import Corners, Segment
 from dubins_traffic.roads.formats.rnd_json import write_json
 from dubins_traffic.roads.formats.rnd_text import write_lines
 from dubins_traffic.roads.routes import Routes, arms, shortest
 from dubins_traffic.roads.surface import Surface
 
-Line = tuple[tuple[float, float], tuple[float, float]]
-
 
 @dataclass(frozen=True)
-class RoadNetwork(Pictured):
-    """A planar, connected network of straight roads; at most four meet at an intersection.
+class RoadNetwork(Embedding, Pictured):
+    """A planar, connected network of roads; at most four meet at an intersection.
 
     Parameters
     ----------
     segments : sequence of (x0, y0, x1, y1)
-        Ends of the roads, points of the integer lattice.
+        Ends of the roads: points of the integer lattice, or others.
     length : float
         Metres of a lattice unit.
     transform : (float, float, float)
@@ -46,11 +45,15 @@ class RoadNetwork(Pictured):
         Rows and columns of the lattice that the segments span.
     extra : mapping
         Keys of the document that are not ours, kept.
+    corners : sequence of sequences of (x, y, radius)
+        The corners of each segment between its ends, in the lattice's frame and unit; each is rounded by an arc of
+        that radius, tangent to both sides (`roads.chain`). Empty where all are straight.
 
     Raises
     ------
     InputError
-        If it is no network: roads that cross or overlap, a fifth road at a point, zero length, not connected.
+        If it is no network: roads that cross or overlap, a fifth road at a point, zero length, not connected, arcs
+        that do not fit.
 
     Notes
     -----
@@ -63,6 +66,7 @@ class RoadNetwork(Pictured):
     transform: tuple[float, float, float]
     shape: tuple[int, int]
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any], hash=False)
+    corners: tuple[Corners, ...] = ()
 
     def __post_init__(self) -> None:
         plain = {
@@ -71,10 +75,11 @@ class RoadNetwork(Pictured):
             "transform": rnd.checked_transform(self.transform),
             "shape": rnd.checked_shape(self.shape),
             "extra": rnd.checked_extra(self.extra),
+            "corners": rnd.checked_corners(self.corners, len(self.segments)),
         }
         for name, value in plain.items():
             object.__setattr__(self, name, value)
-        check(self.segments, self.shape)
+        check(self.segments, self.shape, self.corners)
         reach = max(max(abs(number) for number in segment) for segment in self.segments)
         if self.length * reach > rnd.WORLD:
             raise InputError(
@@ -93,7 +98,8 @@ class RoadNetwork(Pictured):
         rows, columns = self.shape
         segments, points = len(self.segments), len(self.intersections)
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
-        return f"{found} on a {rows} x {columns} lattice"
+        bent = sum(1 for own in self.corners if own)
+        return f"{found} on a {rows} x {columns} lattice" + (f", {bent} bent" if bent else "")
 
     def __deepcopy__(self, memo: object) -> RoadNetwork:
         """Return this very network, which never changes."""
@@ -117,7 +123,7 @@ class RoadNetwork(Pictured):
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any], file: str | None = None) -> RoadNetwork:
-        """Return the network of an RND document, version 0; errors name `file` and the field."""
+        """Return the network of an RND document; errors name `file` and the field."""
         try:
             return cls(**rnd.fields(document)._asdict())
         except InputError as error:
@@ -140,13 +146,16 @@ class RoadNetwork(Pictured):
         return cls.from_text(files.read_text(path), str(path), map_format)
 
     def to_document(self) -> dict[str, Any]:
-        """Return the RND document, version 0: segments written out, whole numbers as integers."""
+        """Return the RND document: segments written out, whole numbers as integers; version 0 wherever that says it."""
+        rows = [list(segment) for segment in self.segments]
+        for row, own in zip(rows, self.corners, strict=False):
+            row += [number for corner in own for number in corner]
         return {
-            "version": 0,
+            "version": 0 if self.is_straight and self.on_lattice else 2,
             "length": _number(self.length),
             "transform": [_number(entry) for entry in self.transform],
             "shape": list(self.shape),
-            "segments": [list(segment) for segment in self.segments],
+            "segments": rows,
             **self.extra,
         }
 
@@ -172,21 +181,17 @@ class RoadNetwork(Pictured):
         return self.shape
 
     @cached_property
+    def on_lattice(self) -> bool:
+        """Whether all intersections are points of the integer lattice."""
+        return all(isinstance(number, int) for segment in self.segments for number in segment)
+
+    @cached_property
     def is_grid(self) -> bool:
         """Whether every segment joins two neighbours of the lattice, so that the network is a grid or part of one."""
-        return all(abs(x1 - x0) + abs(y1 - y0) == 1 for x0, y0, x1, y1 in self.segments)
+        neighbours = all(abs(x1 - x0) + abs(y1 - y0) == 1 for x0, y0, x1, y1 in self.segments)
+        return neighbours and self.is_straight and self.on_lattice
 
-    @cached_property
-    def intersections(self) -> tuple[tuple[int, int], ...]:
-        """Lattice points where roads end, sorted by x, then y."""
-        points = {(x0, y0) for x0, y0, _, _ in self.segments} | {(x1, y1) for _, _, x1, y1 in self.segments}
-        return tuple(sorted(points))
-
-    @cached_property
-    def _numbers(self) -> dict[tuple[int, int], int]:
-        return {point: v for v, point in enumerate(self.intersections)}
-
-    def vertex(self, point: tuple[int, int]) -> int:
+    def vertex(self, point: Point) -> int:
         """Return the number of the intersection at a lattice point; InputError if there is none."""
         x, y = point
         number = self._numbers.get((x, y))
@@ -195,7 +200,7 @@ class RoadNetwork(Pictured):
             raise InputError("not an intersection of the network", value=list(point), expected=expected)
         return number
 
-    def vertices(self, points: Sequence[tuple[int, int]]) -> tuple[int, ...]:
+    def vertices(self, points: Sequence[Point]) -> tuple[int, ...]:
         """Return the numbers of the intersections at lattice points; InputError if there is none at one of them."""
         numbers = self._numbers
         try:
@@ -203,61 +208,22 @@ class RoadNetwork(Pictured):
         except KeyError:
             return tuple([self.vertex(point) for point in points])
 
-    @cached_property
-    def points(self) -> Floats:
-        """World coordinates of the intersections, (V, 2), metres."""
-        return _fixed(self.to_world(np.array(self.intersections, dtype=np.float64)))
-
-    @cached_property
-    def ends(self) -> Ints:
-        """Numbers of the intersections at both ends of each segment, (S, 2)."""
-        rows = [(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments]
-        ends = np.array(rows, dtype=np.int64)
-        ends.flags.writeable = False
-        return ends
-
-    @cached_property
-    def _steps(self) -> Floats:
-        """Lattice vectors from the first to the second end of each segment, (S, 2)."""
-        segment = np.array(self.segments, dtype=np.float64)
-        return segment[:, 2:] - segment[:, :2]
-
-    @cached_property
-    def lengths(self) -> Floats:
-        """Lengths of the segments, (S,), metres; a rigid motion does not change a bit of them."""
-        dx, dy = self._steps.T
-        return _fixed(self.length * np.sqrt(dx * dx + dy * dy))
-
-    @cached_property
-    def tangents(self) -> Floats:
-        """Unit vectors along the segments, from the first end, (S, 2)."""
-        dx, dy = self._steps.T
-        norm = np.sqrt(dx * dx + dy * dy)
-        return _fixed(_turned(np.stack([dx / norm, dy / norm], axis=-1), *sincos(self.transform[2])))
-
-    @cached_property
-    def degrees(self) -> Ints:
-        """Number of roads at each intersection, (V,)."""
-        degrees = np.bincount(self.ends.ravel(), minlength=len(self.intersections)).astype(np.int64)
-        degrees.flags.writeable = False
-        return degrees
-
     @property
     def lanes(self) -> int:
         """Number of lanes: two a segment."""
         return 2 * len(self.segments)
 
-    def lane_ends(self, lane: int) -> tuple[int, int]:
-        """Return the intersections in which a lane begins and ends."""
-        first, second = self.ends[lane >> 1].tolist()
-        return (second, first) if lane & 1 else (first, second)
-
     @cached_property
     def _arms(self) -> list[tuple[int, ...]]:
-        return arms(self.segments, self.ends, len(self.intersections))
+        return arms(self._sides, self.ends, len(self.intersections))
+
+    @cached_property
+    def _sides(self) -> list[Segment]:
+        """The first and the last side (dx, dy) of each segment's polygon, in the lattice's frame."""
+        return sides(self.segments, self.corners)
 
     def arms(self, v: int) -> tuple[int, ...]:
-        """Return the lanes out of an intersection, counter-clockwise by bearing from the lattice's x axis."""
+        """Return the lanes out of an intersection, counter-clockwise by bearing there from the lattice's x axis."""
         return self._arms[v]
 
     def successors(self, lane: int) -> tuple[int, ...]:
@@ -291,22 +257,12 @@ class RoadNetwork(Pictured):
             routes = self._routes[v] = shortest(v, *self._lane_graph)
         return routes
 
-    def to_world(self, points: npt.ArrayLike) -> Floats:
-        """Map lattice points (..., 2) to the world."""
-        tx, ty, theta = self.transform
-        turned = _turned(self.length * np.asarray(points, dtype=np.float64), *sincos(theta))
-        return turned + np.array([tx, ty])
-
-    def to_lattice(self, points: npt.ArrayLike) -> Floats:
-        """Map world points (..., 2) to the lattice, where they need not be whole."""
-        tx, ty, theta = self.transform
-        c, s = sincos(theta)
-        return _turned(np.asarray(points, dtype=np.float64) - np.array([tx, ty]), c, -s) / self.length
-
     @cached_property
     def surface(self) -> Surface:
         """The segments and intersections in the world, with look-up by place."""
-        return Surface(self.points, self.ends, self.tangents, self.lengths)
+        return Surface(
+            self.points, self.ends, self.tangents, self.lengths, None if self.is_straight else self.chains
+        )
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest segment of points (..., 2); ties: the lower number."""
@@ -323,24 +279,6 @@ class RoadNetwork(Pictured):
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
         return self.surface.lane_coordinates(lane, points)
-
-    def lane_line(self, lane: int, offset: float) -> Line:
-        """Return the line parallel to a lane, `offset` metres left of the centre line: the right lane's is -w."""
-        start, end = self.lane_ends(lane)
-        tx, ty = self.tangents[lane >> 1].tolist()
-        left = -offset if lane & 1 else offset
-        (x0, y0), (x1, y1) = self.points[start].tolist(), self.points[end].tolist()
-        return (x0 - left * ty, y0 + left * tx), (x1 - left * ty, y1 + left * tx)
-
-
-def _turned(vectors: Floats, c: float, s: float) -> Floats:
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
-
-
-def _fixed(array: Floats) -> Floats:
-    array.flags.writeable = False
-    return array
 
 
 def _number(value: float) -> float | int:

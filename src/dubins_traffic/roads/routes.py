@@ -42,17 +42,20 @@ class Routes:
         return path
 
 
-def arms(segments: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ...]]:
-    """Return the lanes out of each of `count` intersections, counter-clockwise by bearing from the lattice's x axis."""
-    out: list[list[tuple[int, int, int]]] = [[] for _ in range(count)]
-    for s, (x0, y0, x1, y1) in enumerate(segments):
-        out[int(ends[s, 0])].append((x1 - x0, y1 - y0, 2 * s))
-        out[int(ends[s, 1])].append((x0 - x1, y0 - y1, 2 * s + 1))
+def arms(sides: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ...]]:
+    """Return the lanes out of each of `count` intersections, counter-clockwise by bearing from the lattice's x axis.
+
+    `sides` are the vectors (dx, dy, dx, dy) along each segment where it begins and where it ends.
+    """
+    out: list[list[tuple[float, float, int]]] = [[] for _ in range(count)]
+    for s, (ax, ay, bx, by) in enumerate(sides):
+        out[int(ends[s, 0])].append((ax, ay, 2 * s))
+        out[int(ends[s, 1])].append((-bx, -by, 2 * s + 1))
     return [tuple(lane for _, _, lane in sorted(own, key=cmp_to_key(_turn))) for own in out]
 
 
-def _turn(p: tuple[int, int, int], q: tuple[int, int, int]) -> int:
-    """Compare two directions by bearing in [0, 2 pi), exactly."""
+def _turn(p: tuple[float, float, int], q: tuple[float, float, int]) -> int:
+    """Compare two directions by bearing in [0, 2 pi), exactly on the lattice."""
     lower_p = p[1] < 0 or (p[1] == 0 and p[0] < 0)
     lower_q = q[1] < 0 or (q[1] == 0 and q[0] < 0)
     if lower_p != lower_q:

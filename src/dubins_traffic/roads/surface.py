@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.chains import Bars, Chains
 
 CELLS_PER_SEGMENT = 8.0
 POINTS_AT_ONCE = 1 << 15
@@ -58,14 +59,19 @@ class Surface:
         Unit vectors along the segments.
     lengths : array (S,)
         Lengths of the segments, metres.
+    chains : Chains or None
+        Those of the segments that bend.
     """
 
-    def __init__(self, points: Floats, ends: Ints, tangents: Floats, lengths: Floats) -> None:
+    def __init__(
+        self, points: Floats, ends: Ints, tangents: Floats, lengths: Floats, chains: Chains | None = None
+    ) -> None:
         self.points = points
         self.start = points[ends[:, 0]]
         self.end = points[ends[:, 1]]
         self.tangents = tangents
         self.lengths = lengths
+        self.chains = chains
         self.rasters: dict[float, RoadRaster] = {}
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
@@ -92,12 +98,17 @@ class Surface:
         rx, ry = points[..., 0] - self.start[s, 0], points[..., 1] - self.start[s, 1]
         tx, ty = self.tangents[s, 0], self.tangents[s, 1]
         along, left = rx * tx + ry * ty, tx * ry - ty * rx
+        if self.chains is not None and self.chains.bends(s):
+            flat = points.reshape(-1, 2)
+            found = self.chains.coordinates(flat[:, 0], flat[:, 1], np.full(len(flat), s))
+            along, left = (each.reshape(points.shape[:-1]) for each in found)
         return (self.lengths[s] - along, -left) if lane & 1 else (along, left)
 
     @cached_property
     def cells(self) -> Cells:
         """The cells, made when first asked for."""
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        corners = self.points if self.chains is None else np.concatenate([self.points, self.bars(1.0).start])
+        low, high = corners.min(axis=0), corners.max(axis=0)
         margin = 0.5 * float(self.lengths.mean())
         x0, y0 = (low - margin).tolist()
         width, height = (high - low + 2.0 * margin).tolist()
@@ -111,6 +122,22 @@ class Surface:
 
     def distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
         """Return the squared distances from points (x, y) to segments s; the three are broadcast."""
+        straight = self._straight_distance2(x, y, s)
+        if self.chains is None:
+            return straight
+        x, y, s = np.broadcast_arrays(x, y, s)
+        bent = self.chains.bends(s)
+        found = np.array(straight)
+        found[bent] = self.chains.distance2(x[bent], y[bent], s[bent])
+        return found
+
+    def bars(self, sagitta: float) -> Bars:
+        """Return straight bars that stand for the segments: chains leave them by at most `sagitta` metres."""
+        if self.chains is None:
+            return Bars(np.arange(len(self.start)), self.start, self.end)
+        return self.chains.bars(self.start, self.end, sagitta)
+
+    def _straight_distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
         rx, ry = x - self.start[s, 0], y - self.start[s, 1]
         qx, qy = x - self.end[s, 0], y - self.end[s, 1]
         tx, ty = self.tangents[s, 0], self.tangents[s, 1]

@@ -157,6 +157,10 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
 def _table(network: RoadNetwork, half_width: float) -> RoadTable:
     """Return the table of one network (kept for next time, never to be written to)."""
     key = RoadTable, half_width
+    if not network.is_straight:
+        raise InputError(
+            "segments that bend can't be driven yet", field="segments", expected="straight segments"
+        )
     if key not in network.known:
         raster, cells = road_raster(network.surface, half_width), network.surface.cells
         network.known[key] = RoadTable(

@@ -37,7 +37,7 @@ from dubins_traffic.logic.temporal import always, eventually, yesterday
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 
-Point = tuple[int, int]
+Point = tuple[float, float]
 
 _OF_ENVIRONMENT = ("overtaking", "clear", "ahead")
 """What is said of the ego but is up to the others."""

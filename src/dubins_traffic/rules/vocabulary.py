@@ -134,7 +134,7 @@ class Vocabulary:
             if car is not None:
                 yield Proposition(word, car, vertex)
 
-    def _along(self, stem: str, line: tuple[int, int, int, int]) -> Iterator[Proposition]:
+    def _along(self, stem: str, line: tuple[float, float, float, float]) -> Iterator[Proposition]:
         segment = self._segments.get(line)
         car = self._car(stem.removesuffix("_s"), stem)
         if segment is not None and car is not None:

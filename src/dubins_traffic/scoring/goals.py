@@ -63,7 +63,7 @@ class Rounds:
 class GoalVisits:
     """Visits of one goal; `longest_gap_s` is the longest time without one, from frame 0 to the planned end."""
 
-    goal: tuple[int, int]
+    goal: tuple[float, float]
     visits: int
     longest_gap_s: float
 

@@ -49,8 +49,8 @@ class Place:
 
     x: float
     y: float
-    intersection: tuple[int, int] | None
-    segment: tuple[int, int, int, int] | None
+    intersection: tuple[float, float] | None
+    segment: tuple[float, float, float, float] | None
 
     def to_json(self) -> dict[str, Any]:
         """Return the place as a JSON object."""

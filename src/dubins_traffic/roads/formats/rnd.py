@@ -1,9 +1,10 @@
-"""Road network descriptions (RND), version 0: the fields, checked. Every map format is read into them.
+"""Road network descriptions (RND), versions 0 and 2: the fields, checked. Every map format is read into them.
 
 Their containers are map formats of their own: `rnd_json` and `rnd_text`.
 
 Source: the documentation of the 2016 benchmark. A point (x, y) of the integer lattice maps to
-R(theta) (length x, length y) + (tx, ty), with `transform` = [tx, ty, theta].
+R(theta) (length x, length y) + (tx, ty), with `transform` = [tx, ty, theta]. In version 2 points
+need not be whole, and a segment may go on with corners: [x0, y0, x1, y1, x, y, radius, x, y, radius, ...].
 """
 
 from __future__ import annotations
@@ -16,26 +17,33 @@ from typing import Any, NamedTuple, TypeGuard, cast
 
 from dubins_traffic.errors import InputError
 
-Segment = tuple[int, int, int, int]
+Segment = tuple[float, float, float, float]
+"""Ends x0, y0, x1, y1; whole numbers are integers."""
+Corners = tuple[tuple[float, float, float], ...]
+"""The corners x, y, radius of a segment that bends."""
 
 LARGEST_POINT = 1_000_000
 LARGEST_GRID = 100_000
 LENGTHS = (1e-3, 1e6)
 WORLD = 1e6
 TURNS = 1e5
+MOST_CORNERS = 10_000
+"""Of one segment."""
 DEEPEST = 100
 """Most levels of what stands under a key that version 0 does not know."""
+VERSIONS = (0, 2)
 FIELDS = ("version", "length", "transform", "shape", "segments")
 
 
 class Description(NamedTuple):
-    """The checked fields of a description; `extra` holds the keys that version 0 does not know."""
+    """The checked fields of a description; `extra` holds the keys that it does not know."""
 
     segments: tuple[Segment, ...]
     length: float
     transform: tuple[float, float, float]
     shape: tuple[int, int]
     extra: dict[str, Any]
+    corners: tuple[Corners, ...] = ()
 
 
 def fields(document: object) -> Description:
@@ -55,20 +63,23 @@ def fields(document: object) -> Description:
         if name not in document:
             raise InputError("missing", field=name, expected="0" if name == "version" else "a number > 0")
     version = document["version"]
-    if not is_integer(version) or version != 0:
-        raise InputError("unknown version of RND", field="version", value=version, expected="0")
+    if not is_integer(version) or version not in VERSIONS:
+        raise InputError("unknown version of RND", field="version", value=version, expected="0 or 2")
     if "shape" not in document and "segments" not in document:
         raise InputError("neither segments nor shape", field="segments", expected="at least one of them")
     length = checked_length(document["length"])
     transform = checked_transform(document.get("transform", (0, 0, 0)))
     given = checked_shape(document["shape"]) if "shape" in document else None
-    if "segments" in document:
-        segments = checked_segments(document["segments"])
+    corners: tuple[Corners, ...] = ()
+    if "segments" in document and version == 0:
+        segments = checked_segments(document["segments"], lattice=True)
+    elif "segments" in document:
+        segments, corners = _bent(document["segments"])
     else:
         segments = grid_segments(*given) if given else ()
     shape = given if given is not None else extent(segments)
     extra = {key: value for key, value in document.items() if key not in FIELDS}
-    return Description(segments, length, transform, shape, checked_extra(extra))
+    return Description(segments, length, transform, shape, checked_extra(extra), corners)
 
 
 def grid_segments(rows: int, columns: int) -> tuple[Segment, ...]:
@@ -86,12 +97,12 @@ def grid_segments(rows: int, columns: int) -> tuple[Segment, ...]:
 
 
 def extent(segments: Sequence[Segment]) -> tuple[int, int]:
-    """Return the shape (rows, columns) of segments: (ymax - ymin + 1, xmax - xmin + 1)."""
+    """Return the shape (rows, columns) of segments: (ymax - ymin + 1, xmax - xmin + 1), rounded down."""
     if not segments:
         raise InputError("no segments", field="segments", value=[], expected="at least one segment")
     xs = [x for a, _, b, _ in segments for x in (a, b)]
     ys = [y for _, a, _, b in segments for y in (a, b)]
-    return max(ys) - min(ys) + 1, max(xs) - min(xs) + 1
+    return math.floor(max(ys) - min(ys)) + 1, math.floor(max(xs) - min(xs)) + 1
 
 
 def is_integer(value: object) -> TypeGuard[int]:
@@ -146,25 +157,84 @@ def checked_shape(value: object) -> tuple[int, int]:
     return rows, columns
 
 
-def checked_segments(value: object) -> tuple[Segment, ...]:
-    """Return the segments as integers [x0, y0, x1, y1]; how they lie to each other is not looked at."""
+def checked_segments(value: object, lattice: bool = False) -> tuple[Segment, ...]:
+    """Return the segments [x0, y0, x1, y1], integers if `lattice`; how they lie to each other is not looked at."""
+    rows = _rows(value)
+    return tuple(_segment(row, s, lattice) for s, row in enumerate(rows))
+
+
+def checked_corners(value: object, count: int) -> tuple[Corners, ...]:
+    """Return the corners [x, y, radius] of each of `count` segments; none at all if no segment has any."""
+    rows = _row(value)
+    if rows is None or len(rows) not in (0, count):
+        expected = f"corners [x, y, radius] for each of the {count} segments, or none"
+        raise InputError("not a list", field="corners", value=value, expected=expected)
+    found = tuple(_corners(_row(entry), s, entry) for s, entry in enumerate(rows))
+    return found if any(found) else ()
+
+
+def _bent(value: object) -> tuple[tuple[Segment, ...], tuple[Corners, ...]]:
+    """Return the segments of version 2, and their corners."""
+    rows: list[list[Any]] = []
+    for s, entry in enumerate(_rows(value)):
+        row = _row(entry)
+        if row is None or len(row) < 4 or (len(row) - 4) % 3:
+            expected = "[x0, y0, x1, y1] and three numbers x, y, radius for each corner"
+            raise InputError("not a segment", field=f"segments[{s}]", value=entry, expected=expected)
+        rows.append(row)
+    segments = checked_segments([row[:4] for row in rows])
+    corners = [[row[k : k + 3] for k in range(4, len(row), 3)] for row in rows]
+    return segments, checked_corners(corners, len(segments))
+
+
+def _rows(value: object) -> list[Any]:
     rows = _row(value)
     if rows is None:
         expected = "a list of segments [x0, y0, x1, y1]"
         raise InputError("not a list", field="segments", value=value, expected=expected)
-    segments: list[Segment] = []
-    for s, entry in enumerate(rows):
-        row = _row(entry)
-        if row is None or len(row) != 4:
-            expected = "four integers [x0, y0, x1, y1]"
-            raise InputError("not a segment", field=f"segments[{s}]", value=entry, expected=expected)
-        for k, number in enumerate(row):
-            if not is_integer(number) or abs(number) > LARGEST_POINT:
-                expected = f"an integer in [-{LARGEST_POINT}, {LARGEST_POINT}]"
-                field = f"segments[{s}][{k}]"
-                raise InputError("not a lattice coordinate", field=field, value=number, expected=expected)
-        segments.append((int(row[0]), int(row[1]), int(row[2]), int(row[3])))
-    return tuple(segments)
+    return rows
+
+
+def _segment(entry: Any, s: int, lattice: bool) -> Segment:
+    row = _row(entry)
+    if row is None or len(row) != 4:
+        expected = "four integers [x0, y0, x1, y1]" if lattice else "four numbers [x0, y0, x1, y1]"
+        raise InputError("not a segment", field=f"segments[{s}]", value=entry, expected=expected)
+    kind = "an integer" if lattice else "a number"
+    for k, number in enumerate(row):
+        right = is_integer(number) if lattice else is_finite(number)
+        if not right or abs(number) > LARGEST_POINT:
+            expected = f"{kind} in [-{LARGEST_POINT}, {LARGEST_POINT}]"
+            problem = "not a lattice coordinate" if lattice else "not a coordinate"
+            raise InputError(problem, field=f"segments[{s}][{k}]", value=number, expected=expected)
+    return _plain(row[0]), _plain(row[1]), _plain(row[2]), _plain(row[3])
+
+
+def _corners(row: list[Any] | None, s: int, entry: Any) -> Corners:
+    triples = None if row is None else [_row(corner) for corner in row]
+    if triples is None or len(triples) > MOST_CORNERS:
+        expected = f"at most {MOST_CORNERS} corners [x, y, radius]"
+        raise InputError("not corners", field=f"segments[{s}]", value=entry, expected=expected)
+    found: list[tuple[float, float, float]] = []
+    for k, triple in enumerate(triples):
+        right = triple is not None and len(triple) == 3 and all(is_finite(number) for number in triple)
+        if (
+            triple is None
+            or not right
+            or max(abs(number) for number in triple) > LARGEST_POINT
+            or triple[2] <= 0
+        ):
+            expected = f"[x, y, radius], a radius above 0, numbers up to {LARGEST_POINT}"
+            raise InputError(
+                f"corner {k}: not a corner", field=f"segments[{s}]", value=triple, expected=expected
+            )
+        found.append((_plain(triple[0]), _plain(triple[1]), _plain(triple[2])))
+    return tuple(found)
+
+
+def _plain(number: Any) -> float:
+    """Return a number as an integer where it is whole."""
+    return int(number) if is_integer(number) else float(number)
 
 
 def checked_extra(extra: Mapping[Any, Any]) -> dict[str, Any]:

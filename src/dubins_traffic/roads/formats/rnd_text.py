@@ -61,7 +61,7 @@ def write_lines(document: Mapping[str, Any]) -> str:
             plain = raw and value and "#" not in value and value.isascii()
             lines.append(f"{name}: {value if plain else _escaped(value, '#')}")
     lines.append("segments:")
-    lines += [" ".join(str(number) for number in segment) for segment in document["segments"]]
+    lines += [" ".join(_json(number) for number in segment) for segment in document["segments"]]
     return "\n".join(lines) + "\n"
 
 

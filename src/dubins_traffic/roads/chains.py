@@ -1,0 +1,239 @@
+"""The segments of a network that bend, as arrays of pieces in the world, and where points lie along them, in NumPy.
+
+`roads.bends` says the same for kernels, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, sqrt
+from typing import NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.angles import (
+    HALF_PI,
+    P0,
+    P1,
+    P2,
+    P3,
+    P4,
+    Q0,
+    Q1,
+    Q2,
+    Q3,
+    Q4,
+    QUARTER_PI,
+    TAN_EIGHTH_PI,
+    sincos,
+)
+from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.chain import Corner, Piece, chain
+from dubins_traffic.roads.formats.rnd import Segment
+
+FINEST = 64
+"""An arc is never drawn with more chords."""
+
+
+class Bars(NamedTuple):
+    """Straight bars in the place of segments: the segment of each (K,), and its ends (K, 2)."""
+
+    owner: Ints
+    start: Floats
+    end: Floats
+
+
+class Chains:
+    """The pieces of the segments that bend, one segment after another; a straight segment has none.
+
+    Parameters
+    ----------
+    segments, corners
+        As of `RoadNetwork`.
+    unit : float
+        Metres of a lattice unit.
+    transform : (float, float, float)
+        As of `RoadNetwork`.
+
+    Attributes
+    ----------
+    first : (S + 1,) int64
+        First piece of each segment.
+    owner : (P,) int64
+        Segment of each piece.
+    start, tangent, end, end_tangent, centre : (P, 2) float64
+        Where a piece begins and ends, the unit vectors along the chain there, the centre of an arc; world, metres.
+    length, base, radius, side : (P,) float64
+        Its length, the length of the chain before it, metres; radius of an arc, 1 where it turns left, -1 right; a
+        line has 0 for both.
+    lengths : (S,) float64
+        Lengths of the chains, 0 for straight segments.
+    """
+
+    def __init__(
+        self,
+        segments: Sequence[Segment],
+        corners: Sequence[Sequence[Corner]],
+        unit: float,
+        transform: tuple[float, float, float],
+    ) -> None:
+        given = pieces(segments, corners)
+        self.first: Ints = np.concatenate([[0], np.cumsum([len(own) for own in given])]).astype(np.int64)
+        self.owner: Ints = np.repeat(np.arange(len(given)), np.diff(self.first))
+        rows = np.array([piece for own in given for piece in own], dtype=np.float64)
+        rows = rows.reshape(-1, len(Piece._fields))
+        tx, ty, theta = transform
+        turn, shift = sincos(theta), np.array([tx, ty])
+        self.start = turned(unit * rows[:, 0:2], *turn) + shift
+        self.tangent = turned(rows[:, 2:4], *turn)
+        self.centre = turned(unit * rows[:, 5:7], *turn) + shift
+        self.end = turned(unit * rows[:, 9:11], *turn) + shift
+        self.end_tangent = turned(rows[:, 11:13], *turn)
+        self.length: Floats = unit * rows[:, 4]
+        self.radius: Floats = unit * rows[:, 7]
+        self.side: Floats = rows[:, 8].copy()
+        self.base = np.zeros(len(rows))
+        self.lengths = np.zeros(len(given))
+        for k, s in enumerate(self.owner.tolist()):
+            self.base[k] = self.lengths[s]
+            self.lengths[s] += self.length[k]
+
+    def bends(self, s: Ints | int) -> npt.NDArray[np.bool_]:
+        """Whether segments bend."""
+        return self.first[s] < self.first[np.add(s, 1)]
+
+    def bars(self, start: Floats, end: Floats, sagitta: float) -> Bars:
+        """Return bars for all segments, the straight ones from `start` to `end` (S, 2); see `Surface.bars`."""
+        straight = np.flatnonzero(~self.bends(np.arange(len(start))))
+        owner, begins, stops = [straight], [start[straight]], [end[straight]]
+        for s in np.unique(self.owner).tolist():
+            line, _ = self.places(s, self.marks(s, sagitta))
+            owner.append(np.full(len(line) - 1, s))
+            begins.append(line[:-1])
+            stops.append(line[1:])
+        return Bars(np.concatenate(owner), np.concatenate(begins), np.concatenate(stops))
+
+    def distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
+        """Return the squared distances from points (x, y) to the chains s, all (N,)."""
+        return self._nearest(x, y, s)[1]
+
+    def coordinates(self, x: Floats, y: Floats, s: Ints) -> tuple[Floats, Floats]:
+        """Return (along, left) of points (x, y) on the chains s, all (N,): metres.
+
+        Beyond the ends of a chain its first and last line go on.
+        """
+        k, _ = self._nearest(x, y, s)
+        rx, ry = x - self.start[k, 0], y - self.start[k, 1]
+        ox, oy = x - self.centre[k, 0], y - self.centre[k, 1]
+        tx, ty, side, radius = self.tangent[k, 0], self.tangent[k, 1], self.side[k], self.radius[k]
+        swept = radius * angles(np.maximum(ox * tx + oy * ty, 0.0), side * (ox * ty - oy * tx))
+        bent = side != 0.0
+        along = self.base[k] + np.where(bent, swept, rx * tx + ry * ty)
+        off = cast(Floats, np.where(bent, side * (radius - np.sqrt(ox * ox + oy * oy)), tx * ry - ty * rx))
+        return along, off
+
+    def places(self, s: int, along: Floats) -> tuple[Floats, Floats]:
+        """Return points (N, 2) of chain s and the unit vectors (N, 2) along it, so many metres from its start."""
+        own: Ints = np.arange(int(self.first[s]), int(self.first[s + 1]))
+        k: Ints = own[np.clip(np.searchsorted(self.base[own], along, side="right") - 1, 0, len(own) - 1)]
+        gone = along - self.base[k]
+        tangent, side, radius = self.tangent[k], self.side[k], self.radius[k]
+        bent = side != 0.0
+        turn = np.divide(gone, radius, out=np.zeros_like(gone), where=bent)
+        c, s1 = (np.array(each) for each in zip(*(sincos(one) for one in turn.tolist()), strict=True))
+        forth = np.where(bent, radius * s1, gone)
+        aside = side * radius * (1.0 - c)
+        left = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+        point = self.start[k] + forth[:, None] * tangent + aside[:, None] * left
+        return point, c[:, None] * tangent + (side * s1)[:, None] * left
+
+    def marks(self, s: int, sagitta: float) -> Floats:
+        """Return how far along chain s the corners of a line drawn along it stand, ends included, metres.
+
+        Between them it leaves the chain by at most `sagitta` metres (unless an arc needs more than `FINEST` chords).
+        """
+        found = [0.0]
+        for k in range(int(self.first[s]), int(self.first[s + 1])):
+            count = self._chords(k, sagitta)
+            found += [float(self.base[k] + (j + 1) * self.length[k] / count) for j in range(count)]
+        return np.array(found)
+
+    def _chords(self, k: int, sagitta: float) -> int:
+        """Return how many chords stand for piece k."""
+        if self.side[k] == 0.0:
+            return 1
+        return max(1, min(FINEST, ceil(self.length[k] / sqrt(8.0 * self.radius[k] * sagitta))))
+
+    def _nearest(self, x: Floats, y: Floats, s: Ints) -> tuple[Ints, Floats]:
+        """Return the nearest pieces of the chains s, the first of equally near ones, and squared distances, (N,)."""
+        count = self.first[s + 1] - self.first[s]
+        best, least = self.first[s].copy(), np.full(x.shape, np.inf)
+        for j in range(int(count.max(initial=0))):
+            has = np.flatnonzero(j < count)
+            k = self.first[s[has]] + j
+            square = self._piece_distance2(x[has], y[has], k)
+            nearer = square < least[has]
+            best[has[nearer]] = k[nearer]
+            least[has[nearer]] = square[nearer]
+        return best, least
+
+    def _piece_distance2(self, x: Floats, y: Floats, k: Ints) -> Floats:
+        rx, ry = x - self.start[k, 0], y - self.start[k, 1]
+        qx, qy = x - self.end[k, 0], y - self.end[k, 1]
+        ox, oy = x - self.centre[k, 0], y - self.centre[k, 1]
+        tx, ty = self.tangent[k, 0], self.tangent[k, 1]
+        bent = self.side[k] != 0.0
+        past = ox * self.end_tangent[k, 0] + oy * self.end_tangent[k, 1]
+        forth = cast(Floats, np.where(bent, ox * tx + oy * ty, rx * tx + ry * ty))
+        within = cast(npt.NDArray[np.bool_], np.where(bent, past <= 0.0, forth <= self.length[k]))
+        beside = (forth >= 0.0) & within
+        off = cast(Floats, np.where(bent, np.sqrt(ox * ox + oy * oy) - self.radius[k], tx * ry - ty * rx))
+        return np.where(beside, off * off, np.minimum(rx * rx + ry * ry, qx * qx + qy * qy))
+
+
+def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[tuple[Piece, ...]]:
+    """Return the pieces of each segment that bends, none for the others; an InputError names segment and corner."""
+    found: list[tuple[Piece, ...]] = []
+    for s, (x0, y0, x1, y1) in enumerate(segments):
+        own = corners[s] if corners else ()
+        try:
+            found.append(chain((x0, y0), own, (x1, y1)) if own else ())
+        except InputError as error:
+            raise error.within(field=f"segments[{s}]") from None
+    return found
+
+
+def sides(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[Segment]:
+    """Return the first and the last side of each segment's polygon: (dx, dy, dx, dy)."""
+    found: list[Segment] = []
+    for s, (x0, y0, x1, y1) in enumerate(segments):
+        own = corners[s] if corners else ()
+        (ax, ay), (bx, by) = (own[0][:2], own[-1][:2]) if own else ((x1, y1), (x0, y0))
+        found.append((ax - x0, ay - y0, x1 - bx, y1 - by))
+    return found
+
+
+def angles(y: Floats, x: Floats) -> Floats:
+    """Return `kernels.angles.angle` of arrays, bit for bit."""
+    wide = np.abs(x)
+    steep = y > wide
+    low, high = np.where(steep, wide, y), np.where(steep, y, wide)
+    t = np.divide(low, high, out=np.zeros_like(low), where=high != 0.0)
+    turn = t > TAN_EIGHTH_PI
+    t = np.where(turn, np.divide(low - high, low + high, out=np.zeros_like(low), where=high != 0.0), t)
+    z = t * t
+    over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
+    under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
+    found = t + t * (over / under)
+    found = np.where(turn, QUARTER_PI + found, found)
+    found = np.where(steep, HALF_PI - found, found)
+    found = np.where(x < 0.0, 2.0 * HALF_PI - found, found)
+    return np.where(high == 0.0, 0.0, found)
+
+
+def turned(vectors: Floats, c: float, s: float) -> Floats:
+    """Return vectors (..., 2) turned by the angle whose cosine and sine are given."""
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
