@@ -9,10 +9,10 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.foreign import WrittenFormat
-from dubins_traffic.roads.formats.sumo_net import CORNERS, FRAME, write_net
+from dubins_traffic.roads.formats.hints import with_hints
+from dubins_traffic.roads.formats.sumo_net import write_net
 from dubins_traffic.roads.formats.xml_text import Reader, parse, place, root_name
 from dubins_traffic.roads.maps.model import Junction, RoadMap
-from dubins_traffic.roads.maps.ours import read_corners, read_frame
 from dubins_traffic.roads.maps.pairing import OneWay, paired
 
 LANE_WIDTH = 3.2
@@ -53,13 +53,8 @@ def read_net(text: str, file: str | None = None) -> RoadMap:
     }
     edges = reader.unique(each for each in root.iter("edge") if each.get("function", "normal") == "normal")
     directions = [_direction(reader, each, junctions) for each in edges.values()]
-    frames = [own for each in edges.values() if (own := _parameter(each, FRAME)) is not None]
-    made = RoadMap(
-        junctions,
-        paired([one for one in directions if one.lanes]),
-        read_frame(frames[0], file) if frames else None,
-    )
-    return made.checked(file)
+    made = RoadMap(junctions, paired([one for one in directions if one.lanes]))
+    return with_hints(made, text, file).checked(file)
 
 
 def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) -> OneWay:
@@ -80,13 +75,7 @@ def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) ->
     line = (
         read_shape(reader, edge, shape) if shape else np.array([junctions[end][:2] for end in (first, last)])
     )
-    corners = _parameter(edge, CORNERS)
-    exact = None if corners is None else read_corners(corners, reader.file)
-    return OneWay(str(edge.get("id")), first, last, line, len(lanes), width, exact, not cars)
-
-
-def _parameter(edge: Element, key: str) -> str | None:
-    return next((each.get("value", "") for each in edge.findall("param") if each.get("key") == key), None)
+    return OneWay(str(edge.get("id")), first, last, line, len(lanes), width, closed=not cars)
 
 
 def _lets(lane: Element, classes: frozenset[str]) -> bool:

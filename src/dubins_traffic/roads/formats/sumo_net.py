@@ -9,13 +9,11 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.formats.hints import hints_text
 from dubins_traffic.roads.formats.xml_text import document, number_text
 from dubins_traffic.roads.maps.model import Road, RoadMap
-from dubins_traffic.roads.maps.ours import corners_text
 from dubins_traffic.roads.maps.polylines import offset, true_length
 
-FRAME, CORNERS = "dubins-traffic.frame", "dubins-traffic.corners"
-"""Keys of parameters: how the network lay on its lattice; the exact shape of a road that bends."""
 SPEED = 1.0
 TURN = pi / 4
 """Roads that go on within this angle go straight on."""
@@ -41,14 +39,14 @@ def write_net(made: RoadMap) -> str:
     lanes: list[Lane] = []
     for number, road in enumerate(made.roads):
         lanes += _lanes(number, road)
-        _edge(root, lanes[-2], road, road.line, made if number == 0 else None)
-        _edge(root, lanes[-1], road, road.line[::-1], None)
+        _edge(root, lanes[-2], road, road.line)
+        _edge(root, lanes[-1], road, road.line[::-1])
     links = {name: _links(name, lanes) for name in made.junctions}
     for name in made.junctions:
         _junction(root, name, made, [lane for lane in lanes if lane.last == name], links[name])
     for name, own in links.items():
         _connections(root, own, made.junctions[name].all_way_stop)
-    return document(root)
+    return document(root, hints_text(made, [road.name for road in made.roads]))
 
 
 def _lanes(number: int, road: Road) -> tuple[Lane, Lane]:
@@ -61,7 +59,7 @@ def _bearing(line: Floats) -> float:
     return atan2(line[1, 1] - line[0, 1], line[1, 0] - line[0, 0])
 
 
-def _edge(root: Element, lane: Lane, road: Road, line: Floats, framed: RoadMap | None) -> None:
+def _edge(root: Element, lane: Lane, road: Road, line: Floats) -> None:
     edge = SubElement(root, "edge", {"id": lane.edge, "from": lane.first, "to": lane.last, "priority": "1"})
     if len(line) > 2:
         edge.set("shape", shape_text(line))
@@ -70,10 +68,6 @@ def _edge(root: Element, lane: Lane, road: Road, line: Floats, framed: RoadMap |
     row.set("length", number_text(length))
     row.set("width", number_text(road.lane_width))
     row.set("shape", shape_text(offset(line, -0.5 * road.lane_width)))
-    if road.corners and not lane.edge.startswith("-"):
-        SubElement(edge, "param", key=CORNERS, value=corners_text(road.corners))
-    if framed is not None and framed.frame is not None:
-        SubElement(edge, "param", key=FRAME, value=framed.frame.text())
 
 
 def shape_text(line: Floats) -> str:

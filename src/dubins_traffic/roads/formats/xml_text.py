@@ -167,9 +167,9 @@ def number_text(value: float) -> str:
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(float(value))
 
 
-def document(root: Element) -> str:
-    """Return the text of a tree of elements, indented, with its declaration."""
+def document(root: Element, prolog: str = "") -> str:
+    """Return the text of a tree of elements, indented, with its declaration and a `prolog` of whole lines."""
     from xml.etree.ElementTree import indent, tostring
 
     indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{prolog}{tostring(root, encoding="unicode")}\n'

@@ -34,7 +34,7 @@ def conflicts(
     width : float
         Width of a road, metres of the map: two roads are not nearer to each other.
     """
-    drops: dict[int, Reason] = {}
+    drops = {s: Reason.CROSSING for s, line in enumerate(lines) if on_itself(line, width)}
     for s, other in _near(lines, max(room.aside, width)):
         if s in drops or other in drops:
             continue
@@ -76,10 +76,8 @@ def _too_near(
 
 def on_itself(line: Floats, width: float) -> bool:
     """Tell whether a line comes too near itself: nearer than the width of a road, farther along than a half turn."""
-    points = dense(line, 0.25 * width)
+    points = dense(line, 0.5 * width)
     where = along(points)
-    for k in range(len(points)):
-        rest = points[where > where[k] + 2.0 * width]
-        if len(rest) > 1 and float(to_segments(points[k : k + 1], rest)[0]) < width:
-            return True
-    return False
+    step = points[:, None, :] - points[None]
+    near = (step * step).sum(axis=2) < width * width
+    return bool((near & (np.abs(where[:, None] - where) > 4.0 * width)).any())

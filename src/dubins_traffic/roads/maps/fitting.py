@@ -30,8 +30,6 @@ REACHES = (1.05, 1.4, 1.9)
 """Where the line may be joined again after the straight beginning, in lengths of that."""
 REJOINS = (0.5, 1.0, 1.6)
 """The same after a beginning in a given direction, beyond it."""
-SPARE = 1.0 - 1e-9
-"""Radii are smaller by this, so that rounding does not make arcs overlap."""
 LARGEST_RADIUS = 1e5
 COLLINEAR = 1e-7
 """Corners with a smaller tangent of half their turn are none."""
@@ -186,7 +184,7 @@ def radii_of(polygon: Floats, limits: Limits) -> Floats | None:
     # An arc leaves its corner by r (sqrt(1 + tan^2) - 1).
     off = 0.7 * limits.tolerance / np.maximum(np.sqrt(1.0 + inner * inner) - 1.0, 1e-300)
     wanted = np.minimum(np.maximum(off, limits.radius), LARGEST_RADIUS)
-    return SPARE * np.minimum(np.minimum(room[:-1], room[1:]), wanted / SPARE)
+    return np.minimum(np.minimum(room[:-1], room[1:]), wanted)
 
 
 def _judged(polygon: Floats, samples: Floats, length: float, limits: Limits) -> Fit | None:
