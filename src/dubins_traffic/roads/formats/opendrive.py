@@ -16,6 +16,7 @@ from dubins_traffic.roads.formats.xml_text import Reader, parse, place, root_nam
 from dubins_traffic.roads.maps.geometry import Placed, clothoid, cubic, cubic_over, straight
 from dubins_traffic.roads.maps.junctions import End, Union, joined_where_equal, junctions_of
 from dubins_traffic.roads.maps.model import Road, RoadMap
+from dubins_traffic.roads.maps.pairing import OneWay, paired
 from dubins_traffic.roads.maps.polylines import cleaned
 
 LANE_WIDTH = 3.5
@@ -45,12 +46,17 @@ class OpenDrive(WrittenFormat):
         lines = {name: _line(reader, each) for name, each in outer.items()}
         junctions, names = junctions_of(_joined(reader, elements, outer, lines), lines)
         roads: list[Road] = []
+        single: list[OneWay] = []
         for name, each in outer.items():
             forward, backward, width = _lanes(reader, each)
-            if forward or backward:
-                ends = names[End(name, True)], names[End(name, False)]
-                roads.append(Road(name, *ends, lines[name], forward, backward, width))
-        return with_hints(RoadMap(junctions, tuple(roads)), text, file).checked(file)
+            first, last = names[End(name, True)], names[End(name, False)]
+            if forward and backward:
+                roads.append(Road(name, first, last, lines[name], forward, backward, width))
+            elif forward:
+                single.append(OneWay(name, first, last, lines[name], forward, width))
+            elif backward:
+                single.append(OneWay(name, last, first, lines[name][::-1], backward, width))
+        return with_hints(RoadMap(junctions, (*roads, *paired(single))), text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
         """Return the text of a map."""
