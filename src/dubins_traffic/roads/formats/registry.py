@@ -22,6 +22,7 @@ from dubins_traffic.roads.formats.rnd_text import may_be
 BUILT_IN = {
     "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
     "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
+    "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
     "opendrive": ("dubins_traffic.roads.formats.opendrive", "OpenDrive"),
     "sumo": ("dubins_traffic.roads.formats.sumo", "SumoNet"),
 }
