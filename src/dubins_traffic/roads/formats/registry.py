@@ -23,6 +23,7 @@ BUILT_IN = {
     "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
     "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
     "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
+    "lanelet2": ("dubins_traffic.roads.formats.lanelet2", "Lanelet2"),
     "opendrive": ("dubins_traffic.roads.formats.opendrive", "OpenDrive"),
     "sumo": ("dubins_traffic.roads.formats.sumo", "SumoNet"),
 }
