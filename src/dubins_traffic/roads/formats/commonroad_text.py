@@ -39,7 +39,13 @@ class _Ids:
 def write_commonroad(made: RoadMap) -> str:
     """Return the text of a scenario without cars; an intersection for each junction of three roads or more."""
     root = Element("commonRoad", commonRoadVersion="2020a", benchmarkID="USA_DubinsTraffic-1_1_T-1")
-    root.attrib |= {"date": "2016-05-16", "author": "", "affiliation": "", "source": "dubins-traffic", "timeStepSize": "0.1"}
+    root.attrib |= {
+        "date": "2016-05-16",
+        "author": "",
+        "affiliation": "",
+        "source": "dubins-traffic",
+        "timeStepSize": "0.1",
+    }
     location = SubElement(root, "location")
     for tag, value in (("geoNameId", "-999"), ("gpsLatitude", "999"), ("gpsLongitude", "999")):
         SubElement(location, tag).text = value
@@ -52,7 +58,7 @@ def write_commonroad(made: RoadMap) -> str:
             _lanelet(root, number, road, back, out, signs)
     for name, sign in signs.items():
         _sign(root, sign, made, name)
-    for name, arms in out.items():
+    for arms in out.values():
         if len(arms) > 2:
             _intersection(root, ids, arms)
     return document(root, hints_text(made, [ids.lanelet(k, False) for k in range(len(made.roads))]))
@@ -129,7 +135,13 @@ def _intersection(root: Element, ids: _Ids, arms: list[Arm]) -> None:
         for other, way_back, out in arms:
             if other != road:
                 turn = (out - bearing - pi + pi) % (2.0 * pi) - pi
-                tag = "successorsStraight" if abs(turn) < TURN else "successorsLeft" if turn > 0 else "successorsRight"
+                tag = (
+                    "successorsStraight"
+                    if abs(turn) < TURN
+                    else "successorsLeft"
+                    if turn > 0
+                    else "successorsRight"
+                )
                 ways[tag].append(_Ids.lanelet(other, way_back))
         for tag, names in ways.items():
             for name in names:

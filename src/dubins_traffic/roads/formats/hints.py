@@ -1,7 +1,8 @@
 """What a map written by us says to be found again exactly: processing instructions that other programs pass over.
 
-``<?dubins-traffic frame LENGTH X Y THETA?>`` says how the network lay on its lattice, ``<?dubins-traffic corners NAME X Y
-RADIUS ...?>`` how a road bends. They are believed as far as the lines in the file lie where they say (`roads.maps.ours`).
+``<?dubins-traffic frame LENGTH X Y THETA?>`` says how the network lay on its lattice, and
+``<?dubins-traffic corners NAME X Y RADIUS ...?>`` how a road bends. They are believed as far as the lines in the file
+lie where they say (`roads.maps.ours`).
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def hints_text(made: RoadMap, names: Sequence[str]) -> str:
 
 
 def with_hints(found: RoadMap, text: str, file: str | None) -> RoadMap:
-    """Return a map with what the instructions before the root element of its text say; InputError if they are broken."""
+    """Return a map with what the instructions before the root of its text say; InputError if they are broken."""
     root = _ROOT.search(text)
     frame = found.frame
     corners: dict[str, str] = {}

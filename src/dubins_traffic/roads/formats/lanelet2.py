@@ -112,6 +112,8 @@ def _stopping(osm: Osm) -> set[str]:
     found: set[str] = set()
     for relation in osm.relations.values():
         if tags(relation).get("subtype") == "all_way_stop":
-            members = [each for each in relation.findall("member") if each.get("role") in ("yield", "lanelet")]
+            members = [
+                each for each in relation.findall("member") if each.get("role") in ("yield", "lanelet")
+            ]
             found |= {each.get("ref", "") for each in members}
     return found

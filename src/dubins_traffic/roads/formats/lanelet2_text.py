@@ -24,7 +24,9 @@ def write_lanelet2(made: RoadMap) -> str:
     text = _Text()
     centres = {name: text.node(np.array(junction[:2])) for name, junction in made.junctions.items()}
     lanelets: list[tuple[str, str]] = []
-    stops: dict[str, list[tuple[str, str]]] = {name: [] for name, at in made.junctions.items() if at.all_way_stop}
+    stops: dict[str, list[tuple[str, str]]] = {
+        name: [] for name, at in made.junctions.items() if at.all_way_stop
+    }
     for road in made.roads:
         forward, backward = _road(text, road, centres)
         lanelets.append((forward, backward))

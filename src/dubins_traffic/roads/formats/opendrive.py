@@ -121,7 +121,9 @@ def _piece(reader: Reader, geometry: Element) -> Floats:
     if shape.tag == "poly3":
         return cubic_over(where, _coefficients(reader, shape, "abcd", ""))
     last = where.length if shape.get("pRange", "normalized") == "arcLength" else 1.0
-    return cubic(where, _coefficients(reader, shape, "abcd", "U"), _coefficients(reader, shape, "abcd", "V"), last)
+    return cubic(
+        where, _coefficients(reader, shape, "abcd", "U"), _coefficients(reader, shape, "abcd", "V"), last
+    )
 
 
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")

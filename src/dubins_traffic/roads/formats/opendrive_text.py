@@ -39,7 +39,9 @@ def _road(
     first, last = made.junctions[road.first], made.junctions[road.last]
     pieces = chain((first.x, first.y), road.corners or (), (last.x, last.y))
     length = sum(piece.length for piece in pieces)
-    element = SubElement(root, "road", id=str(number), name=road.name, junction="-1", length=number_text(length))
+    element = SubElement(
+        root, "road", id=str(number), name=road.name, junction="-1", length=number_text(length)
+    )
     link = SubElement(element, "link")
     for tag, at, here in (("predecessor", road.first, "start"), ("successor", road.last, "end")):
         others = [end for end in meet[at] if end != (number, here)]
@@ -56,7 +58,13 @@ def _plan(road: Element, pieces: tuple[Piece, ...]) -> None:
     plan = SubElement(road, "planView")
     s = 0.0
     for piece in pieces:
-        values = {"s": s, "x": piece.x, "y": piece.y, "hdg": atan2(piece.ty, piece.tx), "length": piece.length}
+        values = {
+            "s": s,
+            "x": piece.x,
+            "y": piece.y,
+            "hdg": atan2(piece.ty, piece.tx),
+            "length": piece.length,
+        }
         geometry = SubElement(plan, "geometry", {name: number_text(value) for name, value in values.items()})
         if piece.side == 0.0:
             SubElement(geometry, "line")

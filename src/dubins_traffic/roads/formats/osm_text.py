@@ -15,12 +15,16 @@ from dubins_traffic.roads.maps.mercator import middle_meridian, to_metres
 
 
 class Osm(NamedTuple):
-    """An OSM file; places of nodes are metres, from the first node on unless the file has metres itself."""
+    """An OSM file; places of nodes are metres, from the first node on unless the file has metres itself.
+
+    `stops` says of nodes with a stop sign for whom it is: ``all``, ``minor``, or nothing.
+    """
 
     reader: Reader
     nodes: Mapping[str, tuple[float, float]]
     ways: Mapping[str, Element]
     relations: Mapping[str, Element]
+    stops: Mapping[str, str]
 
     def refs(self, way: Element) -> list[str]:
         """Return the nodes of a way; InputError if one is missing, or there are fewer than two."""
@@ -44,7 +48,9 @@ def read_osm(text: str, file: str | None = None) -> Osm:
     nodes = reader.unique(iter(root.findall("node")))
     ways = reader.unique(iter(root.findall("way")))
     relations = reader.unique(iter(root.findall("relation")))
-    return Osm(reader, _places(reader, nodes), ways, relations)
+    signs = {name: tags(each) for name, each in nodes.items() if len(each)}
+    stops = {name: own.get("stop", "") for name, own in signs.items() if own.get("highway") == "stop"}
+    return Osm(reader, _places(reader, nodes), ways, relations, stops)
 
 
 def tags(element: Element) -> dict[str, str]:
@@ -56,10 +62,16 @@ def _places(reader: Reader, nodes: Mapping[str, Element]) -> dict[str, tuple[flo
     own = {name: tags(each) for name, each in nodes.items()}
     if own and all("local_x" in each and "local_y" in each for each in own.values()):
         return {
-            name: (reader.parsed(each["local_x"], f"node[{name}]"), reader.parsed(each["local_y"], f"node[{name}]"))
+            name: (
+                reader.parsed(each["local_x"], f"node[{name}]"),
+                reader.parsed(each["local_y"], f"node[{name}]"),
+            )
             for name, each in own.items()
         }
-    found = {name: (_degrees(reader, each, "lat", 85.0), _degrees(reader, each, "lon", 180.0)) for name, each in nodes.items()}
+    found = {
+        name: (_degrees(reader, each, "lat", 85.0), _degrees(reader, each, "lon", 180.0))
+        for name, each in nodes.items()
+    }
     if not found:
         return {}
     first = next(iter(found.values()))
@@ -75,5 +87,7 @@ def _degrees(reader: Reader, node: Element, name: str, most: float) -> float:
     value = reader.number(node, name)
     if abs(value) > most:
         field = f"{place(node)}.{name}"
-        raise InputError("out of range", file=reader.file, field=field, value=value, expected=f"degrees up to {most:g}")
+        raise InputError(
+            "out of range", file=reader.file, field=field, value=value, expected=f"degrees up to {most:g}"
+        )
     return value

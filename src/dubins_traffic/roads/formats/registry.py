@@ -24,6 +24,7 @@ BUILT_IN = {
     "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
     "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
     "lanelet2": ("dubins_traffic.roads.formats.lanelet2", "Lanelet2"),
+    "osm": ("dubins_traffic.roads.formats.osm", "OpenStreetMap"),
     "opendrive": ("dubins_traffic.roads.formats.opendrive", "OpenDrive"),
     "sumo": ("dubins_traffic.roads.formats.sumo", "SumoNet"),
 }

@@ -70,7 +70,10 @@ def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) ->
         raise reader.fault("has no lanes", edge, edge.get("id"), "at least one <lane>")
     cars = [lane for lane in every if _lets(lane, CARS)]
     lanes = cars or [lane for lane in every if _lets(lane, ROAD_TRAFFIC)]
-    width = max((reader.number(lane, "width", LANE_WIDTH) for lane in lanes), default=LANE_WIDTH)
+    widths = [reader.number(lane, "width", LANE_WIDTH) for lane in lanes]
+    if any(not width > 0.0 for width in widths):
+        raise reader.fault("not the width of a lane", edge, min(widths), "metres above 0")
+    width = max(widths, default=LANE_WIDTH)
     shape = edge.get("shape")
     line = (
         read_shape(reader, edge, shape) if shape else np.array([junctions[end][:2] for end in (first, last)])

@@ -64,7 +64,7 @@ def joined_where_equal(union: Union, lines: Mapping[str, Floats]) -> None:
 def junctions_of(
     union: Union, lines: Mapping[str, Floats], stops: Iterable[End] = ()
 ) -> tuple[dict[str, Junction], dict[End, str]]:
-    """Return the junctions of the ends of lines, and the name of the junction at each end; `stops`: ends where all stop."""
+    """Return the junctions of the ends of lines, and the name of that at each end; at `stops` everybody stops."""
     groups: dict[End, list[End]] = {}
     for name in lines:
         for end in (End(name, True), End(name, False)):
@@ -90,8 +90,10 @@ def _place(lines: list[Floats]) -> tuple[float, float]:
     across = np.eye(2)[None] - unit[:, :, None] * unit[:, None, :]
     whole = across.sum(axis=0)
     if float(np.linalg.eigvalsh(whole)[0]) > PARALLEL * len(lines):
-        found = np.linalg.solve(whole, np.einsum("nij,nj->i", across, ends))
+        crossing = np.asarray(
+            np.linalg.solve(whole, (across @ ends[:, :, None]).sum(axis=0)[:, 0]), dtype=np.float64
+        )
         reach = float(np.sqrt(((ends - mean) ** 2).sum(axis=1)).max())
-        if float(np.hypot(*(found - mean))) <= 2.0 * reach:
-            mean = found
+        if float(np.sqrt(((crossing - mean) ** 2).sum())) <= 2.0 * reach:
+            return float(crossing[0]), float(crossing[1])
     return float(mean[0]), float(mean[1])

@@ -1,7 +1,7 @@
 """Degrees of latitude and longitude to metres and back: the transverse Mercator projection of UTM, WGS 84.
 
-Source: Krueger's series to the fourth order in the third flattening; see Karney, Transverse Mercator with an accuracy of
-a few nanometers, 2011.
+Source: Krueger's series to the fourth order in the third flattening; see Karney, Transverse Mercator with an accuracy
+of a few nanometers, 2011.
 """
 
 from __future__ import annotations
@@ -68,4 +68,6 @@ def _conformal(tau: float) -> float:
 
 def _slope(tau: float) -> float:
     """Return about how fast the latitude's tangent grows with the conformal latitude's."""
-    return (1.0 + (1.0 - _E * _E) * tau * tau) / ((1.0 - _E * _E) * hypot(1.0, tau) * hypot(1.0, _conformal(tau)))
+    return (1.0 + (1.0 - _E * _E) * tau * tau) / (
+        (1.0 - _E * _E) * hypot(1.0, tau) * hypot(1.0, _conformal(tau))
+    )
