@@ -10,16 +10,15 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Junction
 from dubins_traffic.roads.maps.polylines import along, dense, to_segments
 from dubins_traffic.roads.maps.reasons import Reason
+from dubins_traffic.roads.maps.settings import Room
 from dubins_traffic.roads.maps.strands import Strand
-from dubins_traffic.roads.room import Clearances
 
 
 def conflicts(
     strands: Sequence[Strand],
     lines: Sequence[Floats],
     junctions: Mapping[str, Junction],
-    room: Clearances,
-    width: float,
+    room: Room,
 ) -> dict[int, Reason]:
     """Return the strands that must go, so that no two are too near each other: the shorter of each such pair.
 
@@ -29,16 +28,14 @@ def conflicts(
         Strands and the lines that are to stand for them, metres of the map.
     junctions : mapping
         All junctions by name.
-    room : Clearances
+    room : Room
         What the network must keep, metres of the map.
-    width : float
-        Width of a road, metres of the map: two roads are not nearer to each other.
     """
-    drops = {s: Reason.CROSSING for s, line in enumerate(lines) if on_itself(line, width)}
-    for s, other in _near(lines, max(room.aside, width)):
+    drops = {s: Reason.CROSSING for s, line in enumerate(lines) if on_itself(line, room)}
+    for s, other in _near(lines, max(room.aside, room.roads)):
         if s in drops or other in drops:
             continue
-        if _too_near(strands[s], strands[other], (lines[s], lines[other]), junctions, room, width):
+        if _too_near(strands[s], strands[other], (lines[s], lines[other]), junctions, room):
             short = s if strands[s].length < strands[other].length else other
             drops[short] = Reason.CROSSING
     return drops
@@ -58,8 +55,7 @@ def _too_near(
     other: Strand,
     lines: tuple[Floats, Floats],
     junctions: Mapping[str, Junction],
-    room: Clearances,
-    width: float,
+    room: Room,
 ) -> bool:
     common = {one.first, one.last} & {other.first, other.last}
     for strand, line in ((one, lines[1]), (other, lines[0])):
@@ -67,17 +63,17 @@ def _too_near(
         places = np.array([junctions[name][:2] for name in loose]).reshape(-1, 2)
         if len(places) and float(to_segments(places, line).min()) < room.aside:
             return True
-    points = dense(lines[0], 0.25 * width)
+    points = dense(lines[0], 0.25 * room.roads)
     for name in common:
         away = points - np.array(junctions[name][:2])
-        points = points[(away * away).sum(axis=1) > (0.5 * room.length) ** 2]
-    return bool(len(points)) and float(to_segments(points, lines[1]).min()) < width
+        points = points[(away * away).sum(axis=1) > room.straight**2]
+    return bool(len(points)) and float(to_segments(points, lines[1]).min()) < room.roads
 
 
-def on_itself(line: Floats, width: float) -> bool:
-    """Tell whether a line comes too near itself: nearer than the width of a road, farther along than a half turn."""
-    points = dense(line, 0.5 * width)
+def on_itself(line: Floats, room: Room) -> bool:
+    """Tell whether a line comes too near itself: nearer than two roads may be, farther along than a half turn."""
+    points = dense(line, 0.3 * room.roads)
     where = along(points)
     step = points[:, None, :] - points[None]
-    near = (step * step).sum(axis=2) < width * width
-    return bool((near & (np.abs(where[:, None] - where) > 4.0 * width)).any())
+    near = (step * step).sum(axis=2) < room.roads * room.roads
+    return bool((near & (np.abs(where[:, None] - where) > room.half_turn)).any())

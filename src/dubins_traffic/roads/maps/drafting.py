@@ -74,11 +74,8 @@ class Drafter:
         aims, sharp = self._aims(draft)
         if draft.drop(sharp) or draft.drop(self._fit(draft, aims)):
             return draft
-        room = self._settings.room.in_units(self._scale)
         lines = [self._line(draft, s) for s in range(len(draft.strands))]
-        draft.drop(
-            conflicts(draft.strands, lines, draft.junctions, room, 4.0 * self._settings.w / self._scale)
-        )
+        draft.drop(conflicts(draft.strands, lines, draft.junctions, self._settings.room(self._scale)))
         return draft
 
     def _contract(self, draft: Draft) -> Drops:
@@ -121,7 +118,7 @@ class Drafter:
             return drops
         names = list(ends)
         places = np.array([draft.junctions[name][:2] for name in names])
-        apart = self._settings.room.apart / self._scale
+        apart = self._settings.room(self._scale).apart
         for k in range(len(names) - 1):
             step = places[k + 1 :] - places[k]
             for other in np.flatnonzero((step * step).sum(axis=1) < apart * apart).tolist():

@@ -31,6 +31,8 @@ REACHES = (1.05, 1.4, 1.9)
 REJOINS = (0.5, 1.0, 1.6)
 """The same after a beginning in a given direction, beyond it."""
 LARGEST_RADIUS = 1e5
+ON_LINE = 0.7
+"""An arc leaves its corner by at least this share of the tolerance."""
 COLLINEAR = 1e-7
 """Corners with a smaller tangent of half their turn are none."""
 
@@ -156,7 +158,7 @@ def _feasible(polygon: Floats, fixed: tuple[bool, bool], samples: Floats, limits
     """Return the polygon without the corners that leave no room for the least radius."""
     while True:
         polygon = _without_collinear(polygon, fixed)
-        radii = radii_of(polygon, limits)
+        radii = radii_of(polygon, samples, limits)
         if radii is None:
             return None
         tight = np.flatnonzero(radii < limits.radius)
@@ -169,8 +171,11 @@ def _feasible(polygon: Floats, fixed: tuple[bool, bool], samples: Floats, limits
         polygon = min(options, key=lambda each: float(to_segments(samples, each).max()))
 
 
-def radii_of(polygon: Floats, limits: Limits) -> Floats | None:
-    """Return the radii (N - 2,) that fit between the legs of a polygon, None where its ends can't be straight."""
+def radii_of(polygon: Floats, samples: Floats, limits: Limits) -> Floats | None:
+    """Return the radii (N - 2,) that fit between the legs of a polygon, None where its ends can't be straight.
+
+    A corner beside the line is rounded so that the arc meets it, one on the line by less than the tolerance.
+    """
     step = np.diff(polygon, axis=0)
     legs = np.sqrt((step * step).sum(axis=1))
     if len(legs) == 1:
@@ -182,13 +187,14 @@ def radii_of(polygon: Floats, limits: Limits) -> Floats | None:
     room = legs / np.maximum(half[:-1] + half[1:], 1e-300)
     inner = half[1:-1]
     # An arc leaves its corner by r (sqrt(1 + tan^2) - 1).
-    off = 0.7 * limits.tolerance / np.maximum(np.sqrt(1.0 + inner * inner) - 1.0, 1e-300)
+    away = np.maximum(to_segments(polygon[1:-1], samples), ON_LINE * limits.tolerance)
+    off = away / np.maximum(np.sqrt(1.0 + inner * inner) - 1.0, 1e-300)
     wanted = np.minimum(np.maximum(off, limits.radius), LARGEST_RADIUS)
     return np.minimum(np.minimum(room[:-1], room[1:]), wanted)
 
 
 def _judged(polygon: Floats, samples: Floats, length: float, limits: Limits) -> Fit | None:
-    radii = radii_of(polygon, limits)
+    radii = radii_of(polygon, samples, limits)
     if radii is None or (radii < limits.radius).any():
         return None
     corners = tuple((float(x), float(y), float(r)) for (x, y), r in zip(polygon[1:-1], radii, strict=True))

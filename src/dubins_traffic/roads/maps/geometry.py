@@ -71,7 +71,7 @@ def _value(c: Floats, p: Floats) -> Floats:
 
 
 def _count(length: float, curvature: float) -> int:
-    return min(MOST, max(2, ceil(length / sqrt(8.0 * SAGITTA / max(curvature, 1e-12)))))
+    return min(MOST, max(16, ceil(length / sqrt(8.0 * SAGITTA / max(curvature, 1e-12)))))
 
 
 def _moved(place: Placed, points: Floats) -> Floats:

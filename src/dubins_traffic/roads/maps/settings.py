@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import acos, isfinite, pi
+from typing import NamedTuple
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.maps.fitting import Limits
@@ -11,8 +12,28 @@ from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, c
 
 SPARE = 1e-3
 """What is made is larger than what is demanded by this share."""
+HALF_TURN = 9.0
+"""Points of a road this many w apart along it are apart like those of two roads."""
 LEAST_BEND = 3.0
 """Arcs of a road have a radius of at least this many w."""
+
+
+class Room(NamedTuple):
+    """What a network must keep, metres of the map.
+
+    Attributes
+    ----------
+    apart, aside, roads : float
+        Least distances between intersections, from an intersection to a road beside it, and between roads.
+    straight, half_turn : float
+        Roads that meet may be nearer than that so far from where they meet; so may points of one road so far along it.
+    """
+
+    apart: float
+    aside: float
+    roads: float
+    straight: float
+    half_turn: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +82,25 @@ class ImportSettings:
         return self.w / 0.3 if self.radius is None else self.radius
 
     @property
-    def room(self) -> Clearances:
-        """What a network must keep, metres of the network."""
+    def _clearances(self) -> Clearances:
         return clearances(self.disc, self.reach, self.w, self.slack)
+
+    def room(self, scale: float) -> Room:
+        """Return what a network must keep in metres of the map."""
+        wide = (1.0 + SPARE) / scale
+        metres = self._clearances
+        return Room(
+            metres.apart * wide,
+            metres.aside * wide,
+            (4.0 * self.w + self.reach) * wide,
+            (self.disc + self.reach + self.slack) / wide / scale**2,
+            HALF_TURN * self.w / scale,
+        )
 
     @property
     def least_angle(self) -> float:
         """Least angle between two arms, radians."""
-        return acos(max(-1.0, self.room.cosine)) + SPARE * pi
+        return acos(max(-1.0, self._clearances.cosine)) + SPARE * pi
 
     def limits(self, scale: float) -> Limits:
         """Return the limits of a fit in metres of the map."""
