@@ -6,10 +6,12 @@ Headings are carried as unit vectors (cos, sin); an angle enters only at the edg
 from __future__ import annotations
 
 from dubins_traffic.kernels.angles import C2, C4, C6, C8, C10, C12, C14, C16, S3, S5, S7, S9, S11, S13, S15
+from dubins_traffic.kernels.angles import angle as _plain_angle
 from dubins_traffic.kernels.angles import sincos as _plain_sincos
 from dubins_traffic.kernels.compile import jit
 
 sincos = jit(_plain_sincos)
+angle = jit(_plain_angle)
 
 
 @jit

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
+from dubins_traffic.problem.bend_preconditions import check_bends
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -122,6 +123,19 @@ class Instance(Pictured):
     end_on_collision: bool = False
     simulator: str = "embedded"
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def __post_init__(self) -> None:
+        problem = self.problem
+        if not problem.network.is_straight:
+            kinds = [agent.kind for agent in self.e_agents]
+            check_bends(
+                problem.network,
+                problem.intersection_radius,
+                problem.car,
+                bool(problem.obstacles),
+                kinds,
+                problem.rules,
+            )
 
     def __deepcopy__(self, memo: object) -> Self:
         """Return this very instance, which never changes."""

@@ -23,11 +23,12 @@ class Lines(NamedTuple):
 
     @staticmethod
     def right(network: RoadNetwork, w: float) -> Lines:
-        """Return the centre lines of the right lanes, `w` metres right of the segments'."""
+        """Return the centre lines of the right lanes, `w` metres right of the segments': the longest straight runs."""
         lanes = np.arange(network.lanes)
         segment, back = lanes >> 1, (lanes & 1).astype(np.bool_)
-        tangent = np.where(back[:, None], -network.tangents[segment], network.tangents[segment])
-        start = network.points[np.where(back, network.ends[segment, 1], network.ends[segment, 0])]
+        runs = network.runs
+        tangent = np.where(back[:, None], -runs.tangent[segment], runs.tangent[segment])
+        start = np.where(back[:, None], runs.end[segment], runs.start[segment])
         tx, ty = tangent[:, 0] + 0.0, tangent[:, 1] + 0.0  # no negative zeros
         return Lines(start[:, 0] + w * ty, start[:, 1] - w * tx, tx, ty)
 

@@ -37,7 +37,7 @@ class Intervals(NamedTuple):
 
 
 class Places:
-    """Intervals of right lanes' centre lines in which the centre of a car may stand.
+    """Intervals of right lanes' centre lines in which the centre of a car may stand, those of straight runs only.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Places:
         self._near = _Near(network, w)
         self._network = network
         lane = np.arange(network.lanes)
-        self._free = Intervals(lane, np.zeros(len(lane)), np.repeat(network.lengths, 2))
+        self._free = Intervals(lane, np.zeros(len(lane)), np.repeat(network.runs.length, 2))
 
     @property
     def count(self) -> int:
@@ -172,8 +172,7 @@ class _Near:
     def __init__(self, network: RoadNetwork, w: float) -> None:
         self._network = network
         self._w = w
-        self._start = network.points[network.ends[:, 0]]
-        self._end = network.points[network.ends[:, 1]]
+        self._start, self._end = network.runs.start, network.runs.end
         self._size = float(network.lengths.mean())
         self._cells: dict[tuple[int, int], list[int]] | None = None
 

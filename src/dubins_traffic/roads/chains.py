@@ -45,6 +45,15 @@ class Bars(NamedTuple):
     end: Floats
 
 
+class Runs(NamedTuple):
+    """A straight run of each segment: its ends and the unit vector along it (S, 2), its length (S,)."""
+
+    start: Floats
+    end: Floats
+    tangent: Floats
+    length: Floats
+
+
 class Chains:
     """The pieces of the segments that bend, one segment after another; a straight segment has none.
 
@@ -65,9 +74,9 @@ class Chains:
         Segment of each piece.
     start, tangent, end, end_tangent, centre : (P, 2) float64
         Where a piece begins and ends, the unit vectors along the chain there, the centre of an arc; world, metres.
-    length, base, radius, side : (P,) float64
-        Its length, the length of the chain before it, metres; radius of an arc, 1 where it turns left, -1 right; a
-        line has 0 for both.
+    length, base, rest, radius, side : (P,) float64
+        Its length, that of the chain before it and of the chain from where it begins, metres; radius of an arc, 1
+        where it turns left, -1 right; a line has 0 for both.
     lengths : (S,) float64
         Lengths of the chains, 0 for straight segments.
     """
@@ -99,6 +108,7 @@ class Chains:
         for k, s in enumerate(self.owner.tolist()):
             self.base[k] = self.lengths[s]
             self.lengths[s] += self.length[k]
+        self.rest = self.lengths[self.owner] - self.base
 
     def bends(self, s: Ints | int) -> npt.NDArray[np.bool_]:
         """Whether segments bend."""
@@ -115,12 +125,26 @@ class Chains:
             stops.append(line[1:])
         return Bars(np.concatenate(owner), np.concatenate(begins), np.concatenate(stops))
 
+    def runs(self, straight: Runs) -> Runs:
+        """Return the longest line of each segment; `straight` has those of the segments that do not bend."""
+        start, end, tangent, length = (each.copy() for each in straight)
+        for s in np.unique(self.owner).tolist():
+            own = np.arange(int(self.first[s]), int(self.first[s + 1]))
+            k = own[np.argmax(np.where(self.side[own] == 0.0, self.length[own], 0.0))]
+            start[s], end[s], tangent[s], length[s] = (
+                self.start[k],
+                self.end[k],
+                self.tangent[k],
+                self.length[k],
+            )
+        return Runs(start, end, tangent, length)
+
     def distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
         """Return the squared distances from points (x, y) to the chains s, all (N,)."""
         return self._nearest(x, y, s)[1]
 
-    def coordinates(self, x: Floats, y: Floats, s: Ints) -> tuple[Floats, Floats]:
-        """Return (along, left) of points (x, y) on the chains s, all (N,): metres.
+    def coordinates(self, x: Floats, y: Floats, s: Ints, back: bool = False) -> tuple[Floats, Floats]:
+        """Return (along, left) of points (x, y) on the chains s, all (N,), from their second ends if `back`: metres.
 
         Beyond the ends of a chain its first and last line go on.
         """
@@ -130,9 +154,10 @@ class Chains:
         tx, ty, side, radius = self.tangent[k, 0], self.tangent[k, 1], self.side[k], self.radius[k]
         swept = radius * angles(np.maximum(ox * tx + oy * ty, 0.0), side * (ox * ty - oy * tx))
         bent = side != 0.0
-        along = self.base[k] + np.where(bent, swept, rx * tx + ry * ty)
+        along = cast(Floats, np.where(bent, swept, rx * tx + ry * ty))
+        along = self.rest[k] - along if back else self.base[k] + along
         off = cast(Floats, np.where(bent, side * (radius - np.sqrt(ox * ox + oy * oy)), tx * ry - ty * rx))
-        return along, off
+        return along, -off if back else off
 
     def places(self, s: int, along: Floats) -> tuple[Floats, Floats]:
         """Return points (N, 2) of chain s and the unit vectors (N, 2) along it, so many metres from its start."""

@@ -9,11 +9,15 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.roads.bend_clearance import bend_faults
 from dubins_traffic.roads.cells import covered, pairs
+from dubins_traffic.roads.chains import Bars
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
 
 ROUNDING = 1e-9
+STRAIGHTENED = 1e-3
+"""How far a bend may be from the bars that stand for it where its clearance is measured, metres."""
 
 
 class Tight(NamedTuple):
@@ -41,7 +45,26 @@ def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
     """Return the places where segments between `points` (V, 2) with `ends` (S, 2) fall short of `least`."""
     a, b = points[ends[:, 0]], points[ends[:, 1]]
     short = np.flatnonzero(_norm(b - a) < least.length - ROUNDING)
-    count = len(ends)
+    close, beside = _crowded(points, ends, Bars(np.arange(len(ends)), a, b), least)
+    hub, tip, segment = _tips(ends)
+    return Tight(short, close, beside, _sharp(hub, points[tip] - points[hub], segment, least.cosine))
+
+
+def bent_tight(network: RoadNetwork, least: Clearances) -> Tight:
+    """Return the places where a network whose segments bend falls short of `least`."""
+    short = np.flatnonzero(network.lengths < least.length - ROUNDING)
+    bars = network.surface.bars(STRAIGHTENED)
+    close, beside = _crowded(network.points, network.ends, bars, least)
+    hub = np.concatenate([network.ends[:, 0], network.ends[:, 1]])
+    step = np.concatenate([network.tangents, -network.end_tangents])
+    order = np.argsort(hub, kind="stable")
+    segment = order % max(len(network.ends), 1)
+    return Tight(short, close, beside, _sharp(hub[order], step[order], segment, least.cosine))
+
+
+def _crowded(points: Floats, ends: Ints, bars: Bars, least: Clearances) -> tuple[Ints, Ints]:
+    """Return the pairs of points that are too close, and of points and segments, which the `bars` stand for."""
+    a, b, count = bars.start, bars.end, len(bars.owner)
     wide = max(least.apart, least.aside)
     size = max(wide, float(np.abs(b - a).mean()))
     rows = covered(np.concatenate([a, points]), np.concatenate([b, points]), 0.5 * wide, size)
@@ -54,22 +77,28 @@ def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
         gap = _norm(points[couple[:, 0]] - points[couple[:, 1]])
         close.append(couple[gap < least.apart - ROUNDING])
         mixed = (low < count) & (high >= count)
-        s, v = low[mixed], high[mixed] - count
-        loose = (ends[s] != v[:, None]).all(axis=1)
-        s, v = s[loose], v[loose]
-        far = distances(points[v], a[s], b[s])
-        beside.append(np.stack([v, s], axis=-1)[far < least.aside - ROUNDING])
-    return Tight(short, _distinct(close), _distinct(beside), _sharp(points, ends, least.cosine))
+        k, v = low[mixed], high[mixed] - count
+        loose = (ends[bars.owner[k]] != v[:, None]).all(axis=1)
+        k, v = k[loose], v[loose]
+        far = distances(points[v], a[k], b[k])
+        beside.append(np.stack([v, bars.owner[k]], axis=-1)[far < least.aside - ROUNDING])
+    return _distinct(close), _distinct(beside)
 
 
-def _sharp(points: Floats, ends: Ints, cosine: float) -> Ints:
-    """Return intersections and pairs of segments that make an angle there whose cosine is not below `cosine`."""
+def _tips(ends: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return the roads out of intersections, by these: intersection, the one at the other end, segment."""
     hub = np.concatenate([ends[:, 0], ends[:, 1]])
     tip = np.concatenate([ends[:, 1], ends[:, 0]])
     order = np.argsort(hub, kind="stable")
-    hub, tip, segment = hub[order], tip[order], order % max(len(ends), 1)
-    step = points[tip] - points[hub]
-    step /= _norm(step)[:, None]
+    return hub[order], tip[order], order % max(len(ends), 1)
+
+
+def _sharp(hub: Ints, step: Floats, segment: Ints, cosine: float) -> Ints:
+    """Return intersections and pairs of segments that make an angle there whose cosine is not below `cosine`.
+
+    `hub` (K,), ascending, are the intersections out of which roads lead in the direction `step` (K, 2).
+    """
+    step = step / _norm(step)[:, None]
     found: list[Ints] = []
     for gap in (1, 2, 3):
         same = np.flatnonzero(hub[:-gap] == hub[gap:]) if len(hub) > gap else np.empty(0, dtype=np.int64)
@@ -103,8 +132,14 @@ def clearance_faults(
     if radius < LEAST_RADIUS * w - ROUNDING:
         expected = f"at least {LEAST_RADIUS} w = {LEAST_RADIUS * w:.6g} m"
         faults.append(InputError("too small", field="intersection_radius", value=radius, expected=expected))
+    if not network.is_straight:
+        faults += bend_faults(network, radius, reach, w, slack)
+        if faults:
+            return faults
     if least not in network.known:
-        network.known[least] = tight(points, ends, least)
+        network.known[least] = (
+            tight(points, ends, least) if network.is_straight else bent_tight(network, least)
+        )
     found = cast(Tight, network.known[least])
     for s in found.short.tolist():
         faults.append(_fault("too short", s, float(network.lengths[s]), least.length))
@@ -114,7 +149,7 @@ def clearance_faults(
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
         faults.append(_fault(problem, s, gap, least.apart))
     for v, s in _couples(found.beside):
-        gap = float(distances(points[v], points[ends[s, 0]], points[ends[s, 1]]))
+        gap = float(np.sqrt(network.surface.distance2(points[v, 0], points[v, 1], np.array(s))))
         faults.append(_fault(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside))
     for v, first, second in found.sharp.tolist():
         faults.append(_sharp_fault(network, v, first, second, least.cosine))
@@ -146,8 +181,8 @@ def _fault(problem: str, s: int, value: float, least: float) -> InputError:
 
 def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: float) -> InputError:
     low, high = sorted((first, second))
-    step = [network.points[network.ends[s].sum() - v] - network.points[v] for s in (low, high)]
-    between = float((step[0] * step[1]).sum() / (_norm(step[0]) * _norm(step[1])))
+    step = [network.tangents[s] if network.ends[s, 0] == v else -network.end_tangents[s] for s in (low, high)]
+    between = float((step[0] * step[1]).sum())
     return InputError(
         f"too sharp an angle with segments[{low}] at {list(network.intersections[v])}",
         field=f"segments[{high}]",

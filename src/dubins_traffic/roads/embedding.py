@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.chains import Chains, turned
+from dubins_traffic.roads.chains import Chains, Runs, turned
 from dubins_traffic.roads.formats.rnd import Corners, Segment
 
 Point = tuple[float, float]
@@ -101,6 +101,14 @@ class Embedding:
         return turned(np.stack([dx / norm, dy / norm], axis=-1), *sincos(self.transform[2]))
 
     @cached_property
+    def runs(self) -> Runs:
+        """The longest straight run of each segment."""
+        straight = Runs(
+            self.points[self.ends[:, 0]], self.points[self.ends[:, 1]], self.tangents, self.lengths
+        )
+        return straight if self.is_straight else self.chains.runs(straight)
+
+    @cached_property
     def degrees(self) -> Ints:
         """Number of roads at each intersection, (V,)."""
         degrees = np.bincount(self.ends.ravel(), minlength=len(self.intersections)).astype(np.int64)
@@ -122,6 +130,16 @@ class Embedding:
         tx, ty, theta = self.transform
         c, s = sincos(theta)
         return turned(np.asarray(points, dtype=np.float64) - np.array([tx, ty]), c, -s) / self.length
+
+    def lane_places(self, lane: int, along: Floats) -> tuple[Floats, Floats]:
+        """Return points (N, 2) so many metres along the middle of a lane's road, and unit vectors (N, 2) along it."""
+        s, back = lane >> 1, bool(lane & 1)
+        if self.bent[s]:
+            point, way = self.chains.places(s, self.lengths[s] - along if back else along)
+            return point, -way if back else way
+        way = -self.tangents[s] if back else self.tangents[s]
+        start = self.points[self.ends[s, 1 if back else 0]]
+        return start + along[:, None] * way, np.broadcast_to(way, (len(along), 2))
 
     def lane_line(self, lane: int, offset: float) -> Line:
         """Return the ends of the line parallel to a lane, `offset` m left of the centre line (the right lane: -w)."""

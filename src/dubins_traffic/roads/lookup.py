@@ -11,6 +11,7 @@ from math import sqrt
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import record
+from dubins_traffic.roads.bends import bent_coordinates, bent_direction, bent_distance2
 from dubins_traffic.roads.road_raster import CELL
 from dubins_traffic.roads.table import RoadTable
 
@@ -25,6 +26,8 @@ def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
     """Return the squared distance from a point to segment `s` (segment)."""
     row: int = t.seg_off[net] + s
     own = t.segment[row]
+    if own.piece >= 0:
+        return bent_distance2(t.piece, own, x, y)
     rx = x - own.x
     ry = y - own.y
     qx = x - own.end_x
@@ -220,6 +223,8 @@ def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> t
     """Return (s, l) of a point: metres along a lane from its start, metres left of the segment's centre line."""
     row: int = t.seg_off[net] + (lane >> 1)
     own = t.segment[row]
+    if own.piece >= 0:
+        return bent_coordinates(t.piece, own, lane & 1 != 0, x, y)
     rx = x - own.x
     ry = y - own.y
     along = rx * own.tx + ry * own.ty
@@ -231,12 +236,45 @@ def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> t
 
 @jit_inline
 def lane_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
-    """Return the unit vector along a lane."""
+    """Return the unit vector along a lane where it begins."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    if lane & 1:
+        return -own.end_tx, -own.end_ty
+    return own.tx, own.ty
+
+
+@jit_inline
+def lane_end_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
+    """Return the unit vector along a lane where it ends."""
     row: int = t.seg_off[net] + (lane >> 1)
     own = t.segment[row]
     if lane & 1:
         return -own.tx, -own.ty
-    return own.tx, own.ty
+    return own.end_tx, own.end_ty
+
+
+@jit_inline
+def lane_direction_at(t: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float]:
+    """Return the unit vector along a lane where its centre line is nearest to a point."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    if own.piece < 0:
+        return lane_direction(t, net, lane)
+    tx, ty = bent_direction(t.piece, own, x, y)
+    if lane & 1:
+        return -tx, -ty
+    return tx, ty
+
+
+@jit_inline
+def straight_start(t: RoadTable, net: int, lane: int) -> float:
+    """Return how far a lane runs straight from where it begins, metres."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    if own.piece < 0:
+        return own.length
+    return t.piece[own.last if lane & 1 else own.piece].length
 
 
 @jit_inline

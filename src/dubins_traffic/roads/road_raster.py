@@ -12,6 +12,8 @@ from dubins_traffic.roads.cells import RoadRaster, covered
 from dubins_traffic.roads.surface import Surface
 
 CELLS_PER_SEGMENT: Final = 256.0
+SAGITTA: Final = 0.1
+"""How far the bars that stand for an arc may leave it, in half widths of the road."""
 
 
 class _Cell(NamedTuple):
@@ -44,9 +46,14 @@ def _drawn(surface: Surface, half_width: float) -> RoadRaster:
     nx, ny = ceil(width / side), ceil(height / side)
     slack = 1e-9 * (side + half_width + abs(cells.x0) + abs(cells.y0) + width + height)
     origin = np.array([cells.x0, cells.y0])
-    item, cx, cy = covered(surface.start - origin, surface.end - origin, half_width + slack, side)
+    owner, start, end = surface.bars(slack + SAGITTA * half_width)
+    spread = 0.0 if surface.chains is None else SAGITTA * half_width
+    item, cx, cy = covered(start - origin, end - origin, half_width + slack + spread, side)
     keep = (cx >= 0) & (cx < nx) & (cy >= 0) & (cy < ny)
-    item, cx, cy = item[keep], cx[keep], cy[keep]
+    item, cx, cy = owner[item[keep]], cx[keep], cy[keep]
+    if surface.chains is not None:
+        number = np.unique((item * ny + cy) * nx + cx)
+        item, cy, cx = number // (ny * nx), number // nx % ny, number % nx
     x = cast(Floats, cells.x0 + (cx + 0.5) * side)
     y = cast(Floats, cells.y0 + (cy + 0.5) * side)
     distance: Floats = np.sqrt(surface.distance2(x, y, item))

@@ -100,8 +100,9 @@ class Surface:
         along, left = rx * tx + ry * ty, tx * ry - ty * rx
         if self.chains is not None and self.chains.bends(s):
             flat = points.reshape(-1, 2)
-            found = self.chains.coordinates(flat[:, 0], flat[:, 1], np.full(len(flat), s))
+            found = self.chains.coordinates(flat[:, 0], flat[:, 1], np.full(len(flat), s), bool(lane & 1))
             along, left = (each.reshape(points.shape[:-1]) for each in found)
+            return along, left
         return (self.lengths[s] - along, -left) if lane & 1 else (along, left)
 
     @cached_property

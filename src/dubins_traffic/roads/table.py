@@ -20,7 +20,7 @@ from dubins_traffic.roads.surface import Cells
 
 @record
 class Segment:
-    """A segment: its first end, the unit vector along it, its length, its second end, m; the vertices at its ends."""
+    """A segment: its first end, the unit vector along it there, its length, its second end, m; its vertices."""
 
     x: float
     y: float
@@ -31,6 +31,39 @@ class Segment:
     end_y: float
     first: int
     second: int
+    end_tx: float
+    """The unit vector along it at its second end: the same, unless the segment bends."""
+    end_ty: float
+    piece: int
+    """Row of its first piece in `RoadTable.piece`, -1 for a straight segment."""
+    last: int
+    """Row of its last piece."""
+
+
+@record
+class Piece:
+    """A line or an arc of a segment that bends, m: from where to where, and the unit vectors along it there."""
+
+    x: float
+    y: float
+    tx: float
+    ty: float
+    end_x: float
+    end_y: float
+    end_tx: float
+    end_ty: float
+    length: float
+    base: float
+    """Length of the segment before it."""
+    rest: float
+    """Length of the segment from where it begins."""
+    cx: float
+    cy: float
+    """Centre of an arc."""
+    radius: float
+    """Of an arc, 0 for a line."""
+    side: float
+    """1 for an arc that turns left, -1 right, 0 for a line."""
 
 
 @record
@@ -72,6 +105,8 @@ class RoadTable(Tables):
         First row of each network in `segment` and `ends`.
     segment : table (S,) of Segment
         The segments.
+    piece : table (P,) of Piece
+        The pieces of the segments that bend.
     ends : array (S, 2)
         Intersections at the ends.
     vert_off : array (K + 1,)
@@ -95,6 +130,7 @@ class RoadTable(Tables):
     half_width: Floats
     seg_off: Ints
     segment: Rows[Segment]
+    piece: Rows[Piece]
     ends: Ints
     vert_off: Ints
     vertex: Rows[Vertex]
@@ -108,7 +144,9 @@ class RoadTable(Tables):
     pave: Ints
 
 
-_NUMBERED = frozenset({"seg_off", "segment", "vert_off", "vertex", "grid", "seg_start", "vert_start"})
+_NUMBERED = frozenset(
+    {"seg_off", "segment", "piece", "vert_off", "vertex", "grid", "seg_start", "vert_start"}
+)
 """What is not just put one after another where several networks are."""
 
 
@@ -146,7 +184,8 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
         **plain,
         seg_off=_offsets([len(own.segment) for own in tables]),
         vert_off=_offsets([len(own.vertex) for own in tables]),
-        segment=join([own.segment for own in tables]),
+        segment=_joined_segments(tables),
+        piece=join([own.piece for own in tables]),
         vertex=join([own.vertex for own in tables]),
         grid=_grids([own.grid for own in tables]),
         seg_start=_starts([own.seg_start for own in tables]),
@@ -157,16 +196,13 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
 def _table(network: RoadNetwork, half_width: float) -> RoadTable:
     """Return the table of one network (kept for next time, never to be written to)."""
     key = RoadTable, half_width
-    if not network.is_straight:
-        raise InputError(
-            "segments that bend can't be driven yet", field="segments", expected="straight segments"
-        )
     if key not in network.known:
         raster, cells = road_raster(network.surface, half_width), network.surface.cells
         network.known[key] = RoadTable(
             half_width=np.array([half_width], dtype=np.float64),
             seg_off=_offsets([len(network.segments)]),
             segment=_segments(network),
+            piece=_pieces(network),
             ends=network.ends.copy(),
             vert_off=_offsets([len(network.points)]),
             vertex=_vertices(network),
@@ -189,6 +225,39 @@ def _segments(network: RoadNetwork) -> Rows[Segment]:
     rows["length"] = network.lengths
     rows["end_x"], rows["end_y"] = network.points[network.ends[:, 1]].T
     rows["first"], rows["second"] = network.ends.T
+    rows["end_tx"], rows["end_ty"] = network.end_tangents.T
+    rows["piece"] = rows["last"] = -1
+    if not network.is_straight:
+        first = network.chains.first
+        rows["piece"] = np.where(network.bent, first[:-1], -1)
+        rows["last"] = np.where(network.bent, first[1:] - 1, -1)
+    return rows
+
+
+def _joined_segments(tables: Sequence[RoadTable]) -> Rows[Segment]:
+    """Return the segments of several networks one after another, their pieces numbered so, too."""
+    rows = join([own.segment for own in tables])
+    before = _offsets([len(own.piece) for own in tables])[:-1]
+    shift = np.repeat(before, [len(own.segment) for own in tables])
+    bent = rows["piece"] >= 0
+    rows["piece"] += np.where(bent, shift, 0)
+    rows["last"] += np.where(bent, shift, 0)
+    return rows
+
+
+def _pieces(network: RoadNetwork) -> Rows[Piece]:
+    if network.is_straight:
+        return table(Piece, 0)
+    chains = network.chains
+    rows = table(Piece, len(chains.owner))
+    rows["x"], rows["y"] = chains.start.T
+    rows["tx"], rows["ty"] = chains.tangent.T
+    rows["end_x"], rows["end_y"] = chains.end.T
+    rows["end_tx"], rows["end_ty"] = chains.end_tangent.T
+    rows["cx"], rows["cy"] = chains.centre.T
+    rows["length"], rows["base"], rows["radius"] = chains.length, chains.base, chains.radius
+    rows["rest"] = chains.rest
+    rows["side"] = chains.side
     return rows
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.roads.lookup import nearest_segment
+from dubins_traffic.roads.lookup import lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 
 FAR = 1 << 40
@@ -25,9 +25,8 @@ def frame(roads: RoadTable, net: int, lane: int) -> tuple[float, float, float, f
 def lane_at(roads: RoadTable, net: int, pose: Pose) -> int:
     """Return the lane of the nearest segment that leads along the heading (its first-to-second end on ties)."""
     segment, _ = nearest_segment(roads, net, pose.x, pose.y)
-    row: int = roads.seg_off[net] + segment
-    own = roads.segment[row]
-    return 2 * segment + (0 if pose.c * own.tx + pose.s * own.ty >= 0.0 else 1)
+    tx, ty = lane_direction_at(roads, net, 2 * segment, pose.x, pose.y)
+    return 2 * segment + (0 if pose.c * tx + pose.s * ty >= 0.0 else 1)
 
 
 @jit

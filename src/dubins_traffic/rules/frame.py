@@ -13,7 +13,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
-    lane_direction,
+    lane_direction_at,
     lane_end,
 )
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
@@ -262,14 +262,15 @@ def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, 
     """Tell whether a car that stands blocks the lane of car n, and whether one keeps it overtaking."""
     state, t, row = tables.state, tables.roads, tables.memory.car[b]
     own = tables.rules[b]
-    tx, ty = lane_direction(t, own.net, lane)
     here = row[n].progress
     blocked = False
     beside = False
     other = tables.memory.head[b, lane // 2].segment
     while other >= 0:
         if other != n and tables.labels.bits[b, other] & FLAG.STANDS != 0:
-            progress, lateral = lane_coordinates(t, own.net, lane, state.x[b, other], state.y[b, other])
+            x, y = state.x[b, other], state.y[b, other]
+            progress, lateral = lane_coordinates(t, own.net, lane, x, y)
+            tx, ty = lane_direction_at(t, own.net, lane, x, y)
             half = half_extent(
                 tx, ty, state.c[b, other], state.s[b, other], own.half_length, own.half_width, own.rounding
             )

@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK
-from dubins_traffic.kernels.compile import jit_inline
-from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell, lane_direction, lane_length
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.roads.bends import nearest_piece
+from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell, lane_direction, straight_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import Kept, TrialRules
 
@@ -33,6 +34,8 @@ def keep_road(
     block.vertex_x[k] = t.vertex[place].x
     block.vertex_y[k] = t.vertex[place].y
     row = int(t.seg_off[net]) + (lane >> 1 if lane >= 0 else segment)
+    if t.segment[row].piece >= 0:
+        return _keep_piece(block, k, lane, lateral, row, t, own)
     length = t.segment[row].length
     back = lane >= 0 and lane & 1 != 0
     block.from_x[k] = t.segment[row].x
@@ -45,6 +48,31 @@ def keep_road(
         _keep_strip(block, k, back, lateral, outside, length, t.half_width[net], own)
         return True
     return _keep_sides(block, k, length, t.half_width[net])
+
+
+@jit
+def _keep_piece(
+    block: Kept, k: int, lane: int, lateral: float, row: int, t: RoadTable, own: TrialRules
+) -> bool:
+    """Do what `keep_road` does on a segment that bends: on its lines, on the road. Elsewhere nothing is kept."""
+    net = own.net
+    place, _ = nearest_piece(t.piece, t.segment[row], block.here_x[k], block.here_y[k])
+    piece = t.piece[place]
+    back = lane >= 0 and lane & 1 != 0
+    block.from_x[k], block.from_y[k] = piece.x, piece.y
+    block.axis_x[k], block.axis_y[k] = piece.tx, piece.ty
+    block.base[k] = piece.rest if back else piece.base
+    block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
+    half = t.half_width[net]
+    certain = _keep_sides(block, k, piece.length, half)
+    rx = block.here_x[k] - piece.x
+    ry = block.here_y[k] - piece.y
+    if not certain or piece.side != 0.0 or abs(piece.tx * ry - piece.ty * rx) > half:
+        block.along_low[k] = HUGE
+        return False
+    if lane >= 0:
+        _keep_strip(block, k, back, lateral, 0.0, piece.length, half, own)
+    return True
 
 
 @jit_inline
@@ -124,7 +152,7 @@ def keep_arm(
     mine = 0
     for i in range(roads):
         arm: int = t.arms[row, i]
-        shortest = min(shortest, lane_length(t, net, arm))
+        shortest = min(shortest, straight_start(t, net, arm))
         if arm >> 1 == segment:
             mine = i
     room = shortest - CERTAIN

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction
+from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at
 from dubins_traffic.roads.table import RoadTable
 
 
 @jit
-def lane_by_heading(t: RoadTable, net: int, segment: int, c: float, s: float) -> int:
-    """Return the lane of `segment` that the heading (c, s) follows; direction 0 if it is square to both."""
-    tx, ty = lane_direction(t, net, 2 * segment)
-    return 2 * segment if c * tx + s * ty >= 0.0 else 2 * segment + 1
+def lane_by_heading(t: RoadTable, net: int, segment: int, pose: Pose) -> int:
+    """Return the lane of `segment` that the heading follows; direction 0 if it is square to both."""
+    tx, ty = lane_direction_at(t, net, 2 * segment, pose.x, pose.y)
+    return 2 * segment if pose.c * tx + pose.s * ty >= 0.0 else 2 * segment + 1
 
 
 @jit
@@ -53,11 +53,11 @@ def lane_here(
     if at_before >= 0:
         return lane_away(t, net, at_before, pose.x, pose.y), True
     if lane < 0:
-        return lane_by_heading(t, net, segment, pose.c, pose.s), True
+        return lane_by_heading(t, net, segment, pose), True
     half2 = t.half_width[net] * t.half_width[net]
     elsewhere = segment != lane // 2 and off2 <= half2
     if elsewhere and distance2(t, net, lane // 2, pose.x, pose.y) > half2:
-        return lane_by_heading(t, net, segment, pose.c, pose.s), True
+        return lane_by_heading(t, net, segment, pose), True
     return lane, False
 
 

@@ -18,7 +18,7 @@ from dubins_traffic.roads.lookup import (
     CERTAIN,
     ValidCell,
     distance2,
-    lane_direction,
+    lane_direction_at,
     lane_end,
     nearest_arm,
     valid_cell,
@@ -137,7 +137,7 @@ def _reach(
     if lane >= 0:
         half = own.rounding
         if not round_body:
-            tx, ty = lane_direction(t, net, lane)
+            tx, ty = lane_direction_at(t, net, lane, pose.x, pose.y)
             half = half_extent(tx, ty, pose.c, pose.s, own.half_length, own.half_width, half)
         reach = car.lateral + half
         end = lane_end(t, net, lane)
@@ -147,8 +147,9 @@ def _reach(
                 gap2 = _distance2_to_vertex(t, own, end, pose)
             outer2 = max(own.stop2, own.queue2)
             outer = sqrt(outer2) + CERTAIN
-            to_go = t.segment[int(t.seg_off[net]) + (lane >> 1)].length - car.progress
-            if end != v and to_go > outer + CERTAIN:
+            road = t.segment[int(t.seg_off[net]) + (lane >> 1)]
+            to_go = road.length - car.progress
+            if road.piece < 0 and end != v and to_go > outer + CERTAIN:
                 outside = outer
             elif end != v:
                 spare = max(sqrt(gap2) - outer, 0.0)

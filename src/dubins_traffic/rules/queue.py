@@ -7,7 +7,7 @@ from typing import NamedTuple
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows
-from dubins_traffic.roads.lookup import lane_direction
+from dubins_traffic.roads.lookup import lane_end_direction
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import CarMemory, TrialRules
 
@@ -37,8 +37,8 @@ def on_the_right(t: RoadTable, net: int, lane: int, other: int) -> bool:
 
     Their arms are (0, 180) degrees apart counter-clockwise, both arms pointing away from the vertex.
     """
-    ax, ay = lane_direction(t, net, lane)
-    bx, by = lane_direction(t, net, other)
+    ax, ay = lane_end_direction(t, net, lane)
+    bx, by = lane_end_direction(t, net, other)
     return ax * by - ay * bx > RIGHT
 
 

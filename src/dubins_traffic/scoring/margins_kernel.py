@@ -11,7 +11,7 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.logic.temporal import ticks
-from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction, nearest_segment
+from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
 
@@ -143,7 +143,7 @@ def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     lane = ego.lane
     if lane < 0:
         return -INFINITE
-    tx, ty = lane_direction(roads, net, lane)
+    tx, ty = lane_direction_at(roads, net, lane, ego.x, ego.y)
     c, s = ego.c, ego.s
     half = abs(c * ty - s * tx) * cars.half_length[b] + abs(c * tx + s * ty) * cars.half_width[b]
     _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)

@@ -19,6 +19,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
+from dubins_traffic.roads.straight import require_straight
 from dubins_traffic.roads.table import pack_distinct
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import REASON, REASONS, Overtakes, check_overtakes, egos, guards
@@ -58,6 +59,7 @@ class CarShields:
     ) -> None:
         for problem in {id(problem): problem for problem in problems}.values():
             check_fit(problem, owes=False)
+            require_straight(problem.network, "the shield")
         self._views = views
         self._places = cars.shape[1]
         self._rows: Ints = np.flatnonzero(cars)

@@ -12,7 +12,7 @@ from dubins_traffic.policies.rules.tables import Scratch, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD, body_at, gaps, may_hit, motion_is_safe, moved_by, travel_of
 from dubins_traffic.roads.lookup import (
     lane_coordinates,
-    lane_direction,
+    lane_direction_at,
     lane_end,
     nearest_segment,
     nearest_vertex,
@@ -190,7 +190,7 @@ def _leaves_lane(
         before, _ = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
         if progress < before:
             return REASON.TURN
-    tx, ty = lane_direction(roads, net, after)
+    tx, ty = lane_direction_at(roads, net, after, pose.x, pose.y)
     half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
@@ -208,7 +208,7 @@ def _reach(b: int, lane: int, traffic: Traffic, net: int, vehicle: Vehicle) -> f
     state, labels, roads = traffic.state, traffic.labels, traffic.roads
     if labels.lane[b, EGO] != lane:
         return 0.0
-    tx, ty = lane_direction(roads, net, lane)
+    tx, ty = lane_direction_at(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
     _, lateral = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
     return lateral + half_extent(
         tx, ty, state.c[b, EGO], state.s[b, EGO], vehicle.half_length, vehicle.half_width, vehicle.rounding

@@ -10,6 +10,7 @@ from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, 
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
+from dubins_traffic.roads.straight import require_straight
 from dubins_traffic.roads.table import pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
@@ -65,6 +66,7 @@ class ShieldFilter:
     def start(self, problem: Problem) -> None:
         """Prepare for a trial; InputError if the car can't keep the rules (`policies.rules.fitness`)."""
         check_fit(problem, owes=False)
+        require_straight(problem.network, "the shield")
         cars = 1 + len(problem.e_agents)
         self.intervention = None
         self.count = 0

@@ -17,7 +17,7 @@ from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.policy import decide_trial
 from dubins_traffic.policies.rules.tables import Drivers, Traffic, Vehicle
 from dubins_traffic.policies.safety import GUARD, travel_of
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction, nearest_segment, nearest_vertex
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
 from dubins_traffic.rules.propositions import FLAG
@@ -99,7 +99,7 @@ def surely_returns(
         pose = Pose(x, y, c, s)
         if _leaves(lane, pose, roads, net, vehicle) or _may_come(b, k, pose, sight2, state, guards, vehicle):
             return False
-        tx, ty = lane_direction(roads, net, lane)
+        tx, ty = lane_direction_at(roads, net, lane, x, y)
         half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
         if lateral + half < guards.ego[b].left_release:
             return True

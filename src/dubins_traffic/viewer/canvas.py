@@ -17,7 +17,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import nose, outline
 from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_lines, extent, lane_hints
+from dubins_traffic.viewer.scene import Extent, centre_lines, extent, lane_hints, road_lines
 
 SIDE_RANGE = (4.5, 13.0)
 INCHES_PER_METRE = 0.55
@@ -70,7 +70,7 @@ class Canvas:
         from matplotlib.collections import LineCollection
 
         network, half = self.network, 0.5 * self.car.road_width
-        lines = network.points[network.ends]
+        lines = road_lines(network)
         thin = max(0.35, KERB * self.points)
         for width, colour in (
             (2.0 * half * self.points + 2.0 * thin, palette.KERB_COLOUR),

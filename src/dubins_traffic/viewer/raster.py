@@ -19,7 +19,7 @@ from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.marks import goal_numbers
 from dubins_traffic.viewer.raster_ground import Cover, blend, rgb
 from dubins_traffic.viewer.raster_kernel import MARK, Image, View, paint
-from dubins_traffic.viewer.scene import centre_lines, extent, lane_hints, obstacle_points
+from dubins_traffic.viewer.scene import centre_lines, extent, lane_hints, obstacle_points, road_lines
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -145,7 +145,7 @@ class Raster:
             (palette.ROAD_COLOUR, half),
         ):
             roads = self._cover()
-            for first, last in network.points[network.ends]:
+            for first, last in road_lines(network):
                 roads.line(self.at(*first), self.at(*last), wide)
             blend(picture, roads, colour)
         lines, hints = self._cover(), self._cover()
@@ -200,8 +200,8 @@ def stop_lines(problem: Problem) -> list[tuple[Floats, Floats]]:
     network = problem.network
     least = RuleParameters.from_mapping(problem.rules).crossing_degree
     found: list[tuple[Floats, Floats]] = []
-    for ends, tangent in zip(network.ends, network.tangents, strict=True):
-        for vertex, away in ((int(ends[0]), tangent), (int(ends[1]), -tangent)):
+    for ends, tangent, last in zip(network.ends, network.tangents, network.end_tangents, strict=True):
+        for vertex, away in ((int(ends[0]), tangent), (int(ends[1]), -last)):
             if network.degrees[vertex] >= least:
                 middle = network.points[vertex] + problem.intersection_radius * away
                 right = np.array([-away[1], away[0]])

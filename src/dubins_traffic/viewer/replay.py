@@ -35,7 +35,7 @@ from dubins_traffic.viewer.marks import (
     marks_of,
     verdict_text,
 )
-from dubins_traffic.viewer.scene import centre_lines, lane_hints
+from dubins_traffic.viewer.scene import centre_lines, lane_hints, road_lines
 
 SCRIPTS = (
     "replay_marks.js",
@@ -183,6 +183,7 @@ def _roads(problem: Problem, origin: Floats) -> dict[str, Any]:
         "segments": [list(segment) for segment in network.segments],
         "centres": _f32(centre_lines(network, 0.5 * car.road_width) - origin),
         "hints": _f32(lane_hints(network, car.w) - origin),
+        **({} if network.is_straight else {"lines": _f32(road_lines(network) - origin)}),
     }
 
 

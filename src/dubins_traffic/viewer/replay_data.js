@@ -39,6 +39,8 @@ class Trial {
     this.segments = roads.segments;
     this.points = pairs(unpack(roads.points, Float32Array), 2);
     this.ends = pairs(unpack(roads.ends, Int32Array), 2);
+    const lines = roads.lines ? pairs(unpack(roads.lines, Float32Array), 4) : null;
+    this.lines = lines ?? this.ends.map(([first, second]) => [...this.points[first], ...this.points[second]]);
     this.centres = pairs(unpack(roads.centres, Float32Array), 4);
     this.hints = pairs(unpack(roads.hints, Float32Array), 6);
     for (const name of ["x", "y", "speed", "yawRate"]) this[name] = unpack(series[name], Float32Array);

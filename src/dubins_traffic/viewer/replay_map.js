@@ -41,9 +41,9 @@ class MapView {
     this.camera = new Camera();
     this.colours = {};
     this.roads = new Path2D();
-    for (const [first, second] of trial.ends) {
-      this.roads.moveTo(...trial.points[first]);
-      this.roads.lineTo(...trial.points[second]);
+    for (const [x0, y0, x1, y1] of trial.lines) {
+      this.roads.moveTo(x0, y0);
+      this.roads.lineTo(x1, y1);
     }
     this.centres = new Path2D();
     for (const [x0, y0, x1, y1] of trial.centres) {
@@ -78,8 +78,8 @@ class MapView {
   fit({ above, right: beside, below }) {
     const { trial, camera } = this;
     const margin = trial.width / 2 + 0.3;
-    const xs = trial.points.map(([x]) => x);
-    const ys = trial.points.map(([, y]) => y);
+    const xs = trial.lines.flatMap(([x0, , x1]) => [x0, x1]);
+    const ys = trial.lines.flatMap(([, y0, , y1]) => [y0, y1]);
     for (let car = 0; car < trial.cars.length; car += 1) {
       const pose = trial.pose(car, trial.start);
       xs.push(pose.x);

@@ -11,6 +11,8 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.network import RoadNetwork
 
 HINT_SPACING = 4.0
+SAGITTA = 0.005
+"""How far what is drawn may be from a bend, metres."""
 
 
 class Extent(NamedTuple):
@@ -32,17 +34,28 @@ class Extent(NamedTuple):
         return self.top - self.bottom
 
 
+def road_lines(network: RoadNetwork) -> Floats:
+    """Return lines that stand for the segments, (K, 2, 2) metres: one for each that is straight, chords of bends."""
+    _, start, end = network.surface.bars(SAGITTA)
+    return np.stack([start, end], axis=1)
+
+
 def centre_lines(network: RoadNetwork, half_width: float) -> Floats:
-    """Return the stretches of the segments' centre lines outside junctions, (S, 2, 2) metres.
+    """Return the stretches of the segments' centre lines outside junctions, (K, 2, 2) metres.
 
     An end at which other segments meet is drawn back by `half_width`, by at most 35 % of the segment.
     """
-    points, ends = network.points, network.ends
+    ends = network.ends
     trim = np.where(network.degrees[ends] > 1, half_width, 0.0)
     trim = np.minimum(trim, 0.35 * network.lengths[:, None])
-    start = points[ends[:, 0]] + trim[:, :1] * network.tangents
-    stop = points[ends[:, 1]] - trim[:, 1:] * network.tangents
-    return np.stack([start, stop], axis=1)
+    owner, start, stop = network.surface.bars(SAGITTA)
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    last = np.flatnonzero(np.diff(owner, append=-1))
+    s = owner[first]
+    lines = np.stack([start, stop], axis=1)
+    lines[first, 0] += trim[s, :1] * network.tangents[s]
+    lines[last, 1] -= trim[s, 1:] * network.end_tangents[s]
+    return lines
 
 
 def lane_hints(network: RoadNetwork, w: float) -> Floats:
@@ -51,12 +64,13 @@ def lane_hints(network: RoadNetwork, w: float) -> Floats:
     Each lane bears one in its middle, long ones more, about `HINT_SPACING` lane lengths of 2w * 5 apart.
     """
     hints: list[Floats] = []
-    for (first, second), length, tangent in zip(network.ends, network.lengths, network.tangents, strict=True):
-        count = max(1, round(float(length) / (HINT_SPACING * max(3.0 * w, 1e-9))))
+    for s, length in enumerate(network.lengths.tolist()):
+        count = max(1, round(length / (HINT_SPACING * max(3.0 * w, 1e-9))))
         places = (np.arange(count) + 0.5) / count * length
-        for origin, t in ((network.points[first], tangent), (network.points[second], -tangent)):
-            right = np.array([t[1], -t[0]])
-            tips = origin + places[:, None] * t + w * right + 0.22 * w * t
+        for lane in (2 * s, 2 * s + 1):
+            middle, t = network.lane_places(lane, places)
+            right = np.stack([t[:, 1], -t[:, 0]], axis=-1)
+            tips = middle + w * right + 0.22 * w * t
             back = 0.44 * w * t
             side = 0.32 * w * right
             hints.append(np.stack([tips - back - side, tips, tips - back + side], axis=1))
@@ -73,7 +87,7 @@ def obstacle_points(obstacle: Obstacle) -> Floats:
 
 def extent(network: RoadNetwork, half_width: float, *others: Floats) -> Extent:
     """Return the box that holds the roads and, of `others` (each (..., 2)), all finite points."""
-    points = network.points
+    points = network.points if network.is_straight else road_lines(network).reshape(-1, 2)
     low, high = points.min(axis=0) - half_width, points.max(axis=0) + half_width
     for other in others:
         flat = other.reshape(-1, 2)

@@ -16,7 +16,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import outline
 from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_lines, extent, obstacle_points
+from dubins_traffic.viewer.scene import Extent, centre_lines, extent, obstacle_points, road_lines
 
 WIDTH, HEIGHT = 460.0, 400.0
 """Most pixels of a picture."""
@@ -106,7 +106,7 @@ class Drawing:
         )
 
     def _roads(self) -> None:
-        lines = self.network.points[self.network.ends]
+        lines = road_lines(self.network)
         width = self.car.road_width * self.scale
         for colour, wide in ((palette.KERB_COLOUR, width + 2.0), (palette.ROAD_COLOUR, width)):
             for ends in lines:

@@ -14,6 +14,7 @@ import numpy as np
 
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.policies.lanes.turns import Piece, Site, Turn, along, angle_between, shape
+from dubins_traffic.roads.straight import require_straight
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -71,6 +72,7 @@ class PathMaker:
     """Makes the paths of one problem. `visited` are intersections whose discs every turn has to enter."""
 
     def __init__(self, problem: Problem) -> None:
+        require_straight(problem.network, "driving on lanes")
         self._problem = problem
         self._network = problem.network
         self._visited = frozenset(problem.goal_vertices)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import FEW
-from dubins_traffic.cars.state import Command, Labels, Pose
+from dubins_traffic.cars.state import Labels, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
@@ -21,7 +21,6 @@ from dubins_traffic.policies.rules.command_cache import (
     coast,
     cruise,
     drive_on,
-    keeps_to_road,
     look_who_coasts,
     stop_coasting,
 )
@@ -43,9 +42,10 @@ from dubins_traffic.policies.rules.seeing import (
 )
 from dubins_traffic.policies.rules.standing import watch
 from dubins_traffic.policies.rules.steering import follow_line, follows_line, move
+from dubins_traffic.policies.rules.straying import strays
 from dubins_traffic.policies.rules.tables import COMPANY, KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
-from dubins_traffic.policies.safety import leaves_road
+from dubins_traffic.policies.rules.unrolled import bends_ahead, roll_up, unroll
 from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.routing.lane_graph import lane_at
 from dubins_traffic.rules.propositions import FLAG
@@ -87,6 +87,7 @@ def decide_trial(
     if obstacles.off[b] != obstacles.off[b + 1]:
         enough = INFINITE
         others = COMPANY.CROWDED
+    bends = traffic.roads.piece.shape[0] > 0
     look_who_coasts(b, traffic)
     for n in range(state.count[b]):
         company = others if apart[n] > 0.0 else COMPANY.CROWDED
@@ -100,8 +101,10 @@ def decide_trial(
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
+        elif bends and bends_ahead(b, n, traffic):
+            drive_round_bend(b, n, tick, sight2, traffic, commands)
         elif company == COMPANY.CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
-            drive(b, n, tick, company, sight2, traffic, commands)
+            drive(b, n, tick, company, False, sight2, traffic, commands)
     if scratch.listed[0] != LISTED.NOBODY:
         unlist_cars(b, traffic)
 
@@ -115,9 +118,23 @@ def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
     return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (FLAG.APPROACH | FLAG.STOPPED) == 0
 
 
-@jit_inline
-def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of a car; `company` says what is known of the cars around it."""
+@jit
+def drive_round_bend(b: int, n: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
+    """Write the command of a car whose road bends between it and the end of its lane."""
+    enlist(b, n, sight2, traffic)
+    unroll(b, n, traffic)
+    drive(b, n, tick, COMPANY.CROWDED, True, sight2, traffic, commands)
+    roll_up(b, n, traffic, commands)
+
+
+@jit
+def drive(
+    b: int, n: int, tick: int, company: int, unrolled: bool, sight2: float, traffic: Traffic, commands: Floats
+) -> None:
+    """Write the command of a car; `company` says what is known of the cars around it.
+
+    Where its road is `unrolled` it does not begin to pass what stands.
+    """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
@@ -156,7 +173,11 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if who != -1:
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, near, traffic)
-    speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
+    offset = 0.0
+    if unrolled:
+        car.aside = 0.0
+    else:
+        speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0
@@ -178,7 +199,8 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         who if rides else -1,
         traffic,
     )
-    if speed != 0.0 and car.kind == KIND.ROUND and strays(b, n, speed, yaw_rate, way, traffic):
+    checked = car.kind == KIND.ROUND and not unrolled
+    if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed
     commands[b, n, 1] = yaw_rate
@@ -227,17 +249,6 @@ def dawdle(b: int, n: int, speed: float, near: int, traffic: Traffic) -> float:
         car.hold -= drivers.vehicle[b].period
         speed = 0.0
     return speed
-
-
-@jit_inline
-def strays(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a motion takes the centre off the road, or nearly."""
-    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
-    pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-    if keeps_to_road(b, n, pose.x, pose.y, way, roads, drivers):
-        return False
-    command = Command(speed, yaw_rate)
-    return leaves_road(pose, command, drivers.vehicle[b].period, roads, drivers.net[b])
 
 
 @jit_inline

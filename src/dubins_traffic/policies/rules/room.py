@@ -200,11 +200,12 @@ def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
     v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:
         return False
-    own, _ = lane_coordinates(roads, net, lane, state.x[b, n], state.y[b, n])
+    way = drivers.way[b, n]
+    own = (state.x[b, n] - way.x) * way.tx + (state.y[b, n] - way.y) * way.ty
     far = 2.0 * vehicle.reach + PRESSED
     j = scratch.head[lane >> 1]
     while j >= 0:
-        along, _ = lane_coordinates(roads, net, lane, float(state.x[b, j]), float(state.y[b, j]))
+        along = (state.x[b, j] - way.x) * way.tx + (state.y[b, j] - way.y) * way.ty
         if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
             far += 2.0 * vehicle.reach + QUEUE_GAP
         j = scratch.link[j]

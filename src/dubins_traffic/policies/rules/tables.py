@@ -219,7 +219,7 @@ class Drivers(Tables):
 class Scratch(Tables):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
     lanes that the ego will probably take; `apart` (N,): for who does not know how far cars are apart, 0; `listed` (1,):
-    who is in the lists.
+    who is in the lists; `real` (4, N): where cars are while a road is unrolled.
     """
 
     head: Ints
@@ -231,6 +231,7 @@ class Scratch(Tables):
     chain: Ints
     apart: Floats
     listed: Ints
+    real: Floats
 
 
 class Traffic(Tables):
@@ -256,6 +257,7 @@ def scratch(cars: int, segments: int) -> Scratch:
         chain=np.zeros(4, dtype=np.int64),
         apart=np.zeros(cars),
         listed=np.zeros(1, dtype=np.int64),
+        real=np.zeros((4, cars)),
     )
 
 

@@ -10,7 +10,7 @@ from math import sqrt
 from typing import Final, NamedTuple
 
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_direction, lane_end
+from dubins_traffic.roads.lookup import lane_direction, lane_end, lane_end_direction
 from dubins_traffic.roads.table import RoadTable
 
 STRAIGHT = 0.01
@@ -75,7 +75,7 @@ def way_between(roads: RoadTable, net: int, lane: int, out: int, middle: float, 
     row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
     x = roads.vertex[row].x
     y = roads.vertex[row].y
-    tx, ty = lane_direction(roads, net, lane)
+    tx, ty = lane_end_direction(roads, net, lane)
     ux, uy = lane_direction(roads, net, out)
     sine = tx * uy - ty * ux
     cosine = tx * ux + ty * uy

@@ -16,12 +16,16 @@ WIDTH: Final = 1.2
 MARKER: Final = 0.12
 """Width of the marker between the lanes, metres."""
 THICKNESS: Final = 0.002
+SAGITTA: Final = 0.02
+"""How far what is shown may be from a bend, metres."""
 SURFACE_COLOUR: Final = (0.25, 0.25, 0.27)
 MARKER_COLOUR: Final = (0.9, 0.8, 0.2)
 
 
 def roads(network: RoadNetwork, width: float = WIDTH) -> list[Element]:
-    """Return a model per segment; a road reaches half its width beyond both ends, so that corners are paved.
+    """Return a model per segment, and per chord of those that bend.
+
+    It reaches half its width beyond both ends, so that corners are paved.
 
     Parameters
     ----------
@@ -31,8 +35,7 @@ def roads(network: RoadNetwork, width: float = WIDTH) -> list[Element]:
         Of a road, metres.
     """
     made: list[Element] = []
-    first = network.points[network.ends[:, 0]]
-    last = network.points[network.ends[:, 1]]
+    _, first, last = network.surface.bars(SAGITTA)
     for k, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
         length = math.hypot(x1 - x0, y1 - y0)
         where = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0)
