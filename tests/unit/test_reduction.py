@@ -107,14 +107,10 @@ def test_a_bridge_is_not_held() -> None:
 
 
 def test_loops_and_twins_get_bends() -> None:
-    nodes = {"o": (0.0, 0.0), "a": (120.0, 0.0), "e": (-90.0, 0.0), "f": (210.0, 0.0)}
-    arch = "shape='0,0 20,50 60,60 100,50 120,0'"
-    network, losses = reduced(
-        [*both("o a 1", "e o 1", "a f 1"), f"o a 1 {arch}", "a o 1 shape='120,0 100,50 60,60 20,50 0,0'"][:6]
-        + [f"o x 1 {arch.replace(' 100,50 120,0', '')}", "x o 1 shape='60,60 20,50 0,0'"]
-        + ["x a 1 shape='60,60 100,50 120,0'", "a x 1 shape='120,0 100,50 60,60'"],
-        {**nodes, "x": (60.0, 60.0)},
-    )
+    nodes = {"o": (0.0, 0.0), "a": (120.0, 0.0), "e": (-90.0, 0.0), "f": (210.0, 0.0), "x": (60.0, 60.0)}
+    arch = ["o x 1 shape='0,0 20,50 60,60'", "x o 1 shape='60,60 20,50 0,0'"]
+    arch += ["x a 1 shape='60,60 100,50 120,0'", "a x 1 shape='120,0 100,50 60,60'"]
+    network, losses = reduced([*both("o a 1", "e o 1", "a f 1"), *arch], nodes)
     assert losses.kept_share > 0.8
     assert len(network.intersections) == 5
     assert not network.is_straight

@@ -10,6 +10,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.losses import Fate, Losses
+from dubins_traffic.roads.maps.polylines import simplified
 from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import figure_class
@@ -33,6 +34,8 @@ COLOURS: dict[str, str] = {
 """Of parts of roads that are held, and of dropped roads by their reason."""
 WIDTH = 9.0
 """Inches."""
+FINEST = 2e-4
+"""Lines are drawn within this share of the picture."""
 HELD, DROPPED = 1.8, 1.0
 """Points."""
 
@@ -53,13 +56,13 @@ def write_losses(path: str | os.PathLike[str], losses: Losses) -> None:
 def _draw(losses: Losses) -> Any:
     from matplotlib.collections import LineCollection
 
-    lines: dict[str, list[Floats]] = {name: [] for name in COLOURS}
-    for fate in losses.fates:
-        for name, line in _parts(fate):
-            lines[name].append(line)
     points = np.concatenate([fate.line for fate in losses.fates])
     low, high = points.min(axis=0), points.max(axis=0)
     span = np.maximum(high - low, 1.0)
+    lines: dict[str, list[Floats]] = {name: [] for name in COLOURS}
+    for fate in losses.fates:
+        for name, line in _parts(fate):
+            lines[name].append(simplified(line, FINEST * float(span.max())))
     height = min(max(WIDTH * float(span[1] / span[0]), 3.0), 2.0 * WIDTH)
     figure: Any = figure_class()(figsize=(WIDTH, height + 1.6), layout="constrained")
     axes: Any = figure.add_subplot()
