@@ -1,4 +1,4 @@
-"""Draws what was lost of maps of other programs (docs/maps.md): those of `examples/maps`, and towns that come with SUMO.
+"""Draws what was lost of maps of other programs (docs/maps.md): those of `examples/maps`, and towns of SUMO.
 
 python docs/pictures/maps.py [FOLDER OF SUMO'S tools/game]
 """

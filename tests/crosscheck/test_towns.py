@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.sumo import SumoNet
 from dubins_traffic.roads.network import RoadNetwork
@@ -46,6 +47,7 @@ def test_a_town_is_kept(town: str) -> None:
     assert losses.plain_length >= TOWNS[town]
     assert losses.kept_share >= LEAST
     assert not network.is_straight
+    assert clearance_faults(network, 1.0, 0.177, 0.3) == []
     assert lacking(network) == []
 
 

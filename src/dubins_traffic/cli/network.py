@@ -38,6 +38,9 @@ def network(
         tuple[int, int] | None,
         typer.Option("--grid", metavar="ROWS COLS", help="The complete grid.", show_default="3 4"),
     ] = None,
+    bent: Annotated[
+        float, typer.Option("--bent", metavar="SHARE", min=0.0, max=1.0, help="of which about a SHARE bend.")
+    ] = 0.0,
     source: Annotated[
         str | None,
         typer.Option("--from", metavar="FILE", help="The network that a map of another program holds."),
@@ -84,6 +87,6 @@ def network(
         missing = "--intersections" if intersections is None else "--segments"
         raise InputError("missing", file=missing, expected="both --intersections and --segments")
     else:
-        made = generate(intersections, segments, seed)
+        made = generate(intersections, segments, seed, bent=bent)
     options.write(made.to_json() if format is Format.JSON else made.to_text(), output)
     maps.report(made, losses)

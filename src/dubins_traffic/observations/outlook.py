@@ -14,6 +14,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.straight import require_straight
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.tours import lane_graph
 
@@ -146,6 +147,8 @@ def new_outlook(
     shown
         How many other cars are shown.
     """
+    for problem in problems:
+        require_straight(problem.network, "what environments show of lanes")
     state, labels, cars, obstacles = around
     trial = table(Outlook, len(problems))
     trial["net"] = nets

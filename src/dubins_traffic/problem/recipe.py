@@ -211,6 +211,7 @@ class Recipe:
                 reach=car.body.reach,
                 slack=slack,
                 rigid_motion=wanted.rigid_motion,
+                bent=wanted.bent,
             )
         except InputError as error:
             raise error.within(field="network.random") from None

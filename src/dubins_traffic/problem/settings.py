@@ -107,6 +107,9 @@ class RandomNetwork(Strict):
         description="smallest angle between two segments at an intersection, rad, or what the rules need if larger",
     )
     rigid_motion: bool = Field(default=False, description="whether the network is turned and moved at random")
+    bent: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="about which share of the segments bend, where there is room"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> RandomNetwork:

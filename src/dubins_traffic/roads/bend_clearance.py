@@ -63,15 +63,14 @@ def _overlaps(network: RoadNetwork, straight: float, least: float, w: float) -> 
         for k in np.flatnonzero(far < least - ROUNDING).tolist():
             pair = int(min(owner[first[k]], owner[second[k]])), int(max(owner[first[k]], owner[second[k]]))
             found[pair] = min(found.get(pair, np.inf), float(far[k]))
-    return [
-        _fault(
-            "comes too close to itself" if low == high else f"comes too close to segments[{low}]",
-            high,
-            found[low, high],
-            f"at least {least:.6g} m between the middles of roads",
+    faults: list[InputError] = []
+    for low, high in sorted(found, key=lambda pair: (pair[1], pair[0])):
+        s, other = (high, low) if network.bent[high] else (low, high)
+        problem = "comes too close to itself" if s == other else f"comes too close to segments[{other}]"
+        faults.append(
+            _fault(problem, s, found[low, high], f"at least {least:.6g} m between the middles of roads")
         )
-        for low, high in sorted(found, key=lambda pair: (pair[1], pair[0]))
-    ]
+    return faults
 
 
 def _samples(network: RoadNetwork, straight: float, apart: float) -> tuple[Ints, Floats, Floats]:

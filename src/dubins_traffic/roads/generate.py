@@ -7,6 +7,7 @@ from math import ceil, floor, isfinite, pi
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.roads.bending import ROOM, bend_some
 from dubins_traffic.roads.clearance import LEAST_RADIUS, ROUNDING, SEGMENT_SLACK, Clearances, clearances
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.from_grid import draw_from_grid, most_segments, spanning
@@ -39,6 +40,7 @@ def generate(
     reach: float = 0.177,
     slack: float = SEGMENT_SLACK,
     rigid_motion: bool = False,
+    bent: float = 0.0,
 ) -> RoadNetwork:
     """Return the random network of a seed and trial; see `random_network`."""
     return random_network(
@@ -51,6 +53,7 @@ def generate(
         reach=reach,
         slack=slack,
         rigid_motion=rigid_motion,
+        bent=bent,
     )
 
 
@@ -65,6 +68,7 @@ def random_network(
     reach: float = 0.177,
     slack: float = SEGMENT_SLACK,
     rigid_motion: bool = False,
+    bent: float = 0.0,
 ) -> RoadNetwork:
     """Return a random planar, connected network that keeps the clearances of docs/rules.md#room.
 
@@ -82,6 +86,8 @@ def random_network(
         segment must be longer than 2 (R + rho); metres.
     rigid_motion : bool
         Whether the network is turned and moved at random.
+    bent : float
+        About which share of the segments bend, if there is room; all are longer if that is not 0.
 
     Raises
     ------
@@ -91,7 +97,7 @@ def random_network(
     radius = w / 0.3 if radius is None else radius
     _check_counts(intersections, segments)
     _check_sizes(minimum_angle, w, radius, reach, slack)
-    metres = clearances(radius, reach, w, slack)
+    metres = clearances(radius, reach, w, slack + (ROOM * w / 0.3 if bent > 0.0 else 0.0))
     unit = float(f"{metres.length / UNITS:.2g}")
     wider = sincos(minimum_angle)[0] + 2.0 * ROUNDING
     least = metres.in_units(unit)._replace(cosine=min(metres.cosine, wider))
@@ -101,7 +107,10 @@ def random_network(
     rows = tuple(
         sorted((*moved[a], *moved[b]) if moved[a] < moved[b] else (*moved[b], *moved[a]) for a, b in roads)
     )
-    return RoadNetwork(rows, unit, _motion(draws, rigid_motion), extent(rows))
+    made = RoadNetwork(rows, unit, _motion(draws, rigid_motion), extent(rows))
+    if not bent > 0.0:
+        return made
+    return bend_some(made, draws, bent, w=w, radius=radius, reach=reach, slack=slack)
 
 
 def thinned_grid(

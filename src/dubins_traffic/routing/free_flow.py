@@ -98,7 +98,8 @@ def _start_lane(problem: Problem, pose: Pose, graph: LaneGraph) -> tuple[int, fl
     network = problem.network
     point = np.array((pose.x, pose.y))
     segment = int(network.nearest_segment(point)[0])
-    tx, ty = network.tangents[segment].tolist()
+    along, _ = network.lane_coordinates(2 * segment, point)
+    tx, ty = network.lane_places(2 * segment, along.reshape(1))[1][0].tolist()
     lane = 2 * segment + (0 if pose.c * tx + pose.s * ty >= 0.0 else 1)
     along = float(network.lane_coordinates(lane, point)[0])
     return lane, graph.length[lane] - min(max(along, 0.0), graph.length[lane])

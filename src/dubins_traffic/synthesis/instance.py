@@ -69,15 +69,15 @@ def cell_of(arena: Arena, problem: Problem, pose: Pose) -> int:
         nodes = arena.nodes_of(int(vertices.item()))
         return max(nodes, key=lambda n: max(_along(arena, lane, heading) for lane in arena.nodes[n].exits))
     segment = int(network.nearest_segment(place)[0].item())
-    return len(arena.nodes) + max(
-        (2 * segment, 2 * segment + 1), key=lambda lane: _along(arena, lane, heading)
-    )
+    lanes = (2 * segment, 2 * segment + 1)
+    gone = {lane: float(network.lane_coordinates(lane, place)[0].item()) for lane in lanes}
+    return len(arena.nodes) + max(lanes, key=lambda lane: _along(arena, lane, heading, gone[lane]))
 
 
-def _along(arena: Arena, lane: int, heading: Floats) -> float:
-    """Return how far one gets along a lane by a step of the heading."""
-    along = float(heading @ arena.network.tangents[lane >> 1])
-    return -along if lane & 1 else along
+def _along(arena: Arena, lane: int, heading: Floats, gone: float = 0.0) -> float:
+    """Return how far one gets along a lane by a step of the heading, `gone` metres from where it begins."""
+    _, way = arena.network.lane_places(lane, np.array([gone]))
+    return float(heading @ way[0])
 
 
 def _scenes(board: Board, node: int, cells: list[int]) -> Iterator[Scene]:
