@@ -15,8 +15,10 @@ from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.registry import MapFormat, ReducesMaps, WritesMaps
 from dubins_traffic.roads.generate import generate
+from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.sources import load
+from tests.room import lacking
 
 ROOT = Path(__file__).parents[2]
 OUTSIDE = f"{ROOT / 'examples' / 'extending' / 'my_format.py'}:GridMap"
@@ -202,3 +204,14 @@ def test_what_is_no_map_format_is_refused(code: str, words: str, tmp_path: Path)
     (tmp_path / "some.f").write_text("something")
     with pytest.raises(InputError, match=words):
         load(tmp_path / "some.f", map_format=f"{tmp_path / 'bad.py'}:F")
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples" / "maps").iterdir()), ids=lambda file: file.name)
+def test_the_maps_of_the_examples_are_held(file: Path) -> None:
+    network = load(file)
+    assert isinstance(network, RoadNetwork)
+    losses = network.known[registry.LOSSES]
+    assert isinstance(losses, Losses)
+    assert losses.kept_share > 0.95
+    assert network.degrees.max() >= 3
+    assert lacking(network) == []
