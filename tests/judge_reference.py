@@ -161,7 +161,7 @@ class Judge:
             if side is not None and self.reference.narrows(*side):
                 return False
         v = self.reference.toward(lane)
-        begins = self.reference.line(lane[0])[4] - self.problem.intersection_radius
+        begins = self.reference.length(lane[0]) - self.problem.intersection_radius
         if self.reference.crossing(v) or begins - facts["progress"] > reach:
             return True
         return self.may_enter(k, n, v, facts["lane"])

@@ -7,11 +7,14 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from multiprocessing import Pool
 
 from dubins_traffic.cars.body import Car, DiscObstacle, Obstacle, PolygonObstacle, Rectangle
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
+from tests.chain_reference import RING as BENT_RING
+from tests.chain_reference import SNAKE
 from tests.judge_reference import Judge
 from tests.judging import case, judged, said
 from tests.rules_scripts import KITE, TURNED_STAR, Frame, on_lane, wander
@@ -19,6 +22,7 @@ from tests.rules_scripts import KITE, TURNED_STAR, Frame, on_lane, wander
 GRID = RoadNetwork.grid(2, 3, 3.5)
 RING = RoadNetwork.grid(2, 2, 3.2)
 ROADS = (TURNED_STAR, KITE, GRID, RING)
+BENT = (BENT_RING, SNAKE)
 BODIES = (Car(), Car(body=Rectangle(0.5, 0.26)), Car(body=Rectangle(0.3, 0.3)))
 QUICK = {
     "left_time": 2.0, "enter_time": 4.0, "exit_time": 1.5, "rest_time": 1.0, "goal_time": 4.0, "linger_time": 2.0,
@@ -32,13 +36,13 @@ CLAUSES = {
 """What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""
 
 
-def random_trial(number: int) -> tuple[Instance, list[Frame]]:
-    """Return an instance and the script of its cars, which are odd, now and then with obstacles."""
+def random_trial(number: int, choice: Sequence[RoadNetwork] = ROADS) -> tuple[Instance, list[Frame]]:
+    """Return an instance and the script of its cars, which are odd; on straight roads now and then with obstacles."""
     dice = random.Random(number)
-    roads = ROADS[number % len(ROADS)]
+    roads = choice[number % len(choice)]
     cars = dice.choice((3, 4, 6, 7))
     found = case(roads, cars, dice.sample(roads.intersections, 2), **QUICK)
-    obstacles = [_obstacle(roads, dice) for _ in range(dice.choice((0, 0, 1, 2)))]
+    obstacles = [_obstacle(roads, dice) for _ in range(dice.choice((0, 0, 1, 2)) if roads.is_straight else 0)]
     problem = replace(found.problem, car=dice.choice(BODIES), obstacles=tuple(obstacles))
     return replace(found, problem=problem), wander(roads, cars, 300, number, odd=True)
 
@@ -52,9 +56,9 @@ def _obstacle(roads: RoadNetwork, dice: random.Random) -> Obstacle:
     return PolygonObstacle(tuple(on_lane(roads, lane, along + s, aside + d)[:2] for s, d in corners))
 
 
-def compare(number: int) -> Counter[str]:
+def compare(number: int, choice: Sequence[RoadNetwork] = ROADS) -> Counter[str]:
     """Compare the verdicts on one trial; return how often which rule was broken and which clause spoke."""
-    instance, script = random_trial(number)
+    instance, script = random_trial(number, choice)
     found = said(judged(instance, script))
     reference = Judge(instance, script)
     expected = reference.breaches()
@@ -65,11 +69,12 @@ def compare(number: int) -> Counter[str]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Compare as many trials as the first argument says."""
+    """Compare as many trials as the first argument says; on roads that bend if the second is ``bent``."""
     seen: Counter[str] = Counter()
     count = int(arguments[0])
+    choice = BENT if arguments[1:] == ["bent"] else ROADS
     with Pool() as pool:
-        for done, one in enumerate(pool.imap(compare, range(count)), 1):
+        for done, one in enumerate(pool.imap(partial(compare, choice=choice), range(count)), 1):
             seen += one
             if done % 50 == 0:
                 print(f"{done} trials alike", flush=True)

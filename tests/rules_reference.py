@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dubins_traffic.cars.body import Disc, DiscObstacle
+from tests.chain_reference import Track
 
 
 @dataclass
@@ -44,6 +45,7 @@ class Reference:
         self.net = problem.network
         self.points = [tuple(point) for point in self.net.points.tolist()]
         self.ends = [tuple(ends) for ends in self.net.ends.tolist()]
+        self.tracks = {s: Track(self.net, s) for s, bent in enumerate(self.net.bent) if bent}
         self.w2 = 2 * problem.car.w
         self.rules = {
             "crossing_degree": 3, "turn_back": 0.3, "left_set": 0.05, "left_release": 0.0,
@@ -66,19 +68,34 @@ class Reference:
         length = math.hypot(bx - ax, by - ay)
         return ax, ay, (bx - ax) / length, (by - ay) / length, length
 
+    def length(self, segment: int) -> float:
+        return self.tracks[segment].length if segment in self.tracks else self.line(segment)[4]
+
     def off(self, segment: int, x: float, y: float) -> float:
+        if segment in self.tracks:
+            return self.tracks[segment].foot(x, y).off
         ax, ay, tx, ty, length = self.line(segment)
         along = min(max((x - ax) * tx + (y - ay) * ty, 0.0), length)
         return math.hypot(x - ax - along * tx, y - ay - along * ty)
 
-    def direction(self, lane: tuple[int, int]) -> tuple[float, float]:
+    def direction(self, lane: tuple[int, int], x: float, y: float) -> tuple[float, float]:
         _, _, tx, ty, _ = self.line(lane[0])
+        if lane[0] in self.tracks:
+            way = self.tracks[lane[0]].foot(x, y).way
+            tx, ty = way.real, way.imag
         return (tx, ty) if lane[1] == 0 else (-tx, -ty)
+
+    def end_direction(self, lane: tuple[int, int]) -> tuple[float, float]:
+        return self.direction(lane, *self.points[self.toward(lane)])
 
     def toward(self, lane: tuple[int, int]) -> int:
         return self.ends[lane[0]][1 - lane[1]]
 
     def coordinates(self, lane: tuple[int, int], x: float, y: float) -> tuple[float, float]:
+        if lane[0] in self.tracks:
+            track = self.tracks[lane[0]]
+            foot = track.foot(x, y)
+            return (foot.along, foot.left) if lane[1] == 0 else (track.length - foot.along, -foot.left)
         ax, ay, tx, ty, length = self.line(lane[0])
         s, lateral = (x - ax) * tx + (y - ay) * ty, (y - ay) * tx - (x - ax) * ty
         return (s, lateral) if lane[1] == 0 else (length - s, -lateral)
@@ -94,7 +111,9 @@ class Reference:
         if isinstance(body, Disc):
             lateral = self.coordinates(lane, *car.pose[:2])[1]
             return lateral - body.radius, lateral + body.radius
-        values = [self.coordinates(lane, *corner)[1] for corner in self.corners(car)]
+        x, y = car.pose[:2]
+        lateral, (tx, ty) = self.coordinates(lane, x, y)[1], self.direction(lane, x, y)
+        values = [lateral + (q - y) * tx - (p - x) * ty for p, q in self.corners(car)]
         return min(values), max(values)
 
     def gap(self, car: Car, v: int) -> float:
@@ -134,7 +153,7 @@ class Reference:
             self.overtake(car)
 
     def by_heading(self, segment: int, car: Car) -> tuple[int, int]:
-        tx, ty = self.direction((segment, 0))
+        tx, ty = self.direction((segment, 0), *car.pose[:2])
         return (segment, 0 if car.pose[2] * tx + car.pose[3] * ty >= 0 else 1)
 
     def locate(self, car: Car, before: dict[str, Any]) -> None:
@@ -237,7 +256,7 @@ class Reference:
         return result
 
     def right(self, car: Car, other: Car) -> bool:
-        (ax, ay), (bx, by) = self.direction(car.lane), self.direction(other.lane)
+        (ax, ay), (bx, by) = self.end_direction(car.lane), self.end_direction(other.lane)
         angle = (math.atan2(-by, -bx) - math.atan2(-ay, -ax)) % (2 * math.pi)
         return 1e-6 < angle < math.pi - 1e-6
 
@@ -290,7 +309,7 @@ class Reference:
 
     def obstacle_range(self, lane: tuple[int, int], obstacle: Any, low: float, high: float) -> Any:
         """Lateral range of an obstacle where its progress is in [low, high] on the segment, by sampling."""
-        low, high = max(low, 0.0), min(high, self.line(lane[0])[4])
+        low, high = max(low, 0.0), min(high, self.length(lane[0]))
         if isinstance(obstacle, DiscObstacle):
             s, lateral = self.coordinates(lane, obstacle.x, obstacle.y)
             if s + obstacle.radius < low or s - obstacle.radius > high:

@@ -79,9 +79,15 @@ def on_lane(
 ) -> tuple[float, ...]:
     """Return the pose at (s, lateral) of a lane, headed along it, or against it."""
     segment, direction = divmod(lane, 2)
-    a, b = (network.points[v] for v in network.ends[segment])
-    start, (tx, ty) = (a, network.tangents[segment]) if direction == 0 else (b, -network.tangents[segment])
     sign = -1.0 if back else 1.0
+    if network.bent[segment]:
+        (start,), ((tx, ty),) = network.lane_places(lane, np.array([s]))
+        s = 0.0
+    else:
+        a, b = (network.points[v] for v in network.ends[segment])
+        start, (tx, ty) = (
+            (a, network.tangents[segment]) if direction == 0 else (b, -network.tangents[segment])
+        )
     x, y = start[0] + s * tx - lateral * ty, start[1] + s * ty + lateral * tx
     return float(x), float(y), float(sign * tx), float(sign * ty)
 
