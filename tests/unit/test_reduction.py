@@ -226,11 +226,18 @@ def test_convert_goes_from_format_to_format(town: Path, capsys: pytest.CaptureFi
     assert sorted(again.lengths.tolist()) == pytest.approx(sorted(network.lengths.tolist()), abs=1e-9)
 
 
-def test_a_configuration_may_name_a_map_of_another_program(tmp_path: Path) -> None:
-    file = tmp_path / "town.net.xml"
-    file.write_text(written("sumo"))
-    configuration = load_config("demo", rnd=file)
+def test_a_configuration_may_name_a_map_of_another_program(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "town.net.xml").write_text(written("sumo"))
+    configuration = load_config("demo", rnd=tmp_path / "town.net.xml")
     assert configuration.network == RoadNetwork.grid(2, 3)
+    document = json.loads(json.dumps(configuration.document)) | {"rnd": "town.net.xml"}
+    (tmp_path / "own.json").write_text(json.dumps(document))
+    assert main(["instance", str(tmp_path / "own.json")]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["rnd"]["segments"] == RoadNetwork.grid(2, 3).to_document()["segments"]
+    assert "7 segments of 7 roads" in told.err
 
 
 def test_a_line_that_was_changed_is_believed_and_the_hint_is_not() -> None:

@@ -44,13 +44,16 @@ def imported(file: str, scale: float | None, w: float, tolerance: float) -> Road
     return network
 
 
-def report(network: RoadNetwork, outputs: list[str] | None) -> None:
-    """Tell on standard error what was lost of the map from which a network comes, and write it to files."""
+def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> None:
+    """Tell on standard error what was lost of the map from which a network comes, and write it to files.
+
+    Nothing is told of networks that come from no map of another program, and where there is none (None).
+    """
     from dubins_traffic.files import write_text
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.maps.losses import Losses
 
-    losses = network.known.get(formats.LOSSES)
+    losses = None if network is None else network.known.get(formats.LOSSES)
     if not isinstance(losses, Losses):
         if outputs:
             raise InputError(
