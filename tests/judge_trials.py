@@ -34,6 +34,8 @@ CLAUSES = {
     "full bend", "stopped again", "E4 paused", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 }  # fmt: skip
 """What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""
+OF_OBSTACLES = {"narrow exit"}
+"""What does not happen without obstacles."""
 
 
 def random_trial(number: int, choice: Sequence[RoadNetwork] = ROADS) -> tuple[Instance, list[Frame]]:
@@ -79,7 +81,8 @@ def main(arguments: Sequence[str]) -> None:
             if done % 50 == 0:
                 print(f"{done} trials alike", flush=True)
     print(dict(seen.most_common()))
-    assert set(seen) >= CLAUSES, CLAUSES - set(seen)
+    due = CLAUSES if choice is ROADS else CLAUSES - OF_OBSTACLES
+    assert set(seen) >= due, due - set(seen)
 
 
 if __name__ == "__main__":

@@ -48,11 +48,12 @@ def bend_some(
     while any(corners):
         try:
             bent = replace(network, corners=tuple(corners))
-            faults = clearance_faults(bent, radius, reach, w, slack)
         except InputError as error:
             faults = [error]
-        if not faults:
-            return bent
+        else:
+            faults = clearance_faults(bent, radius, reach, w, slack)
+            if not faults:
+                return bent
         named = {int(fault.field[len("segments[") : -1]) for fault in faults if fault.field}
         if not any(corners[s] for s in named):
             break

@@ -34,7 +34,10 @@ def piece_distance2(own: Piece, x: float, y: float) -> float:
 
 @jit
 def nearest_piece(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tuple[int, float]:
-    """Return the row of the nearest piece of a segment that bends, the first of equally near ones; squared distance."""
+    """Return the row of the nearest piece of a segment that bends, the first of equally near ones; squared distance.
+
+    `own` (row) is the segment.
+    """
     best = own.piece
     least = INFINITE
     for k in range(own.piece, own.last + 1):
@@ -47,7 +50,7 @@ def nearest_piece(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tupl
 
 @jit
 def bent_distance2(pieces: Rows[Piece], own: Segment, x: float, y: float) -> float:
-    """Return the squared distance from a point to a segment that bends."""
+    """Return the squared distance from a point to a segment that bends, `own` (row)."""
     _, least = nearest_piece(pieces, own, x, y)
     return least
 
@@ -56,9 +59,10 @@ def bent_distance2(pieces: Rows[Piece], own: Segment, x: float, y: float) -> flo
 def bent_coordinates(
     pieces: Rows[Piece], own: Segment, back: bool, x: float, y: float
 ) -> tuple[float, float]:
-    """Return (s, l) of a point on a lane of a segment that bends, `back` for the one from its second to its first end.
+    """Return (s, l) of a point on a lane of a segment that bends, `own` (row).
 
-    Beyond the ends of the segment its first and last line go on.
+    The lane is that from its second to its first end if `back` (flag). Beyond the ends the first and the last
+    line go on.
     """
     k, _ = nearest_piece(pieces, own, x, y)
     at = pieces[k]
@@ -80,7 +84,7 @@ def bent_coordinates(
 
 @jit
 def bent_direction(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tuple[float, float]:
-    """Return the unit vector along a segment that bends, from its first end, where it is nearest to a point."""
+    """Return the unit vector along a segment that bends, `own` (row), where it is nearest to a point."""
     k, _ = nearest_piece(pieces, own, x, y)
     at = pieces[k]
     if at.side == 0.0:

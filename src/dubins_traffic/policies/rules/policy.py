@@ -101,10 +101,16 @@ def decide_trial(
         if parks(b, n, tick, labels, drivers):
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
-        elif bends and bends_ahead(b, n, traffic):
-            drive_round_bend(b, n, tick, sight2, traffic, commands)
-        elif company == COMPANY.CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
-            drive(b, n, tick, company, False, sight2, traffic, commands)
+            continue
+        unrolled = bends and bends_ahead(b, n, traffic)
+        if unrolled:
+            enlist(b, n, sight2, traffic)
+            unroll(b, n, traffic)
+            company = COMPANY.UNROLLED
+        if company >= COMPANY.CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
+            drive(b, n, tick, company, sight2, traffic, commands)
+        if unrolled:
+            roll_up(b, n, traffic, commands)
     if scratch.listed[0] != LISTED.NOBODY:
         unlist_cars(b, traffic)
 
@@ -118,22 +124,11 @@ def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
     return labels.crosses[b, n] < 0 and labels.lane[b, n] >= 0 and bits & (FLAG.APPROACH | FLAG.STOPPED) == 0
 
 
-@jit
-def drive_round_bend(b: int, n: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of a car whose road bends between it and the end of its lane."""
-    enlist(b, n, sight2, traffic)
-    unroll(b, n, traffic)
-    drive(b, n, tick, COMPANY.CROWDED, True, sight2, traffic, commands)
-    roll_up(b, n, traffic, commands)
-
-
-@jit
-def drive(
-    b: int, n: int, tick: int, company: int, unrolled: bool, sight2: float, traffic: Traffic, commands: Floats
-) -> None:
+@jit_inline
+def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
     """Write the command of a car; `company` says what is known of the cars around it.
 
-    Where its road is `unrolled` it does not begin to pass what stands.
+    Where its road is unrolled it does not begin to pass what stands.
     """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -149,7 +144,7 @@ def drive(
         part, key, left, px, py = on_lane(way, x, y)
     leaves = car.kind != KIND.ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
-    free = company != COMPANY.CROWDED and just_drives(car)
+    free = company < COMPANY.CROWDED and just_drives(car)
     if free and chooses:
         free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
     if free and company != COMPANY.ALONE:
@@ -174,7 +169,7 @@ def drive(
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, near, traffic)
     offset = 0.0
-    if unrolled:
+    if company == COMPANY.UNROLLED:
         car.aside = 0.0
     else:
         speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
@@ -199,7 +194,7 @@ def drive(
         who if rides else -1,
         traffic,
     )
-    checked = car.kind == KIND.ROUND and not unrolled
+    checked = car.kind == KIND.ROUND and company != COMPANY.UNROLLED
     if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed

@@ -70,6 +70,8 @@ class _Company(NamedTuple):
     """Nothing, but it can be found by looking at all of them."""
     CROWDED: int = 2
     """Nothing."""
+    UNROLLED: int = 3
+    """Nothing, and they stand as its road is unrolled."""
 
 
 COMPANY: Final = _Company()

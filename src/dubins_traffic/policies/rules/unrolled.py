@@ -129,7 +129,7 @@ def is_safe(b: int, n: int, pose: Pose, command: Command, traffic: Traffic) -> b
 
 @jit_inline
 def curvature(piece: Piece, back: bool) -> float:
-    """Return the curvature of a piece, to the left in the direction of the lane, 1/m."""
+    """Return the curvature of a piece, 1/m, to the left along the lane, against the piece if `back` (flag)."""
     if piece.side == 0.0:
         return 0.0
     return -piece.side / piece.radius if back else piece.side / piece.radius
@@ -139,7 +139,10 @@ def curvature(piece: Piece, back: bool) -> float:
 def place(
     pieces: Rows[Piece], own: Segment, back: bool, x: float, y: float
 ) -> tuple[int, float, float, float, float]:
-    """Return (piece, metres along it in the lane's direction, metres left of the lane's line, direction) of a point."""
+    """Return (piece, metres along it in the lane's direction, metres left of the lane's line, direction) of a point.
+
+    The lane is one of the segment `own` (row), from its second to its first end if `back` (flag).
+    """
     k, _ = nearest_piece(pieces, own, x, y)
     at = pieces[k]
     if at.side == 0.0:
@@ -160,7 +163,10 @@ def place(
 
 @jit
 def to_end(pieces: Rows[Piece], own: Segment, back: bool, k: int, gone: float, middle: float) -> float:
-    """Return metres to the end of a lane from `gone` (m) along its piece k, measured `middle` (m) right of its line."""
+    """Return metres to the end of a lane from `gone` (m) along piece `k` (row), measured `middle` (m) to the right.
+
+    The lane is one of the segment `own` (row), from its second to its first end if `back` (flag).
+    """
     at = pieces[k]
     far = (at.length - gone) * (1.0 + curvature(at, back) * middle)
     step = -1 if back else 1
