@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd; and Debian's spin and mona. What is there already is left alone.
+# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -30,6 +30,9 @@ environment rtamt rtamt 'rtamt==0.4.10' setuptools
 environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
+environment sumo sumo 'eclipse-sumo==1.28.0'
+environment commonroad commonroad.common.file_reader 'commonroad-io==2026.1'
+environment lanelet2 lanelet2.io 'lanelet2==1.2.3'
 
 missing=()
 for program in spin mona; do

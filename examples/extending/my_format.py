@@ -56,6 +56,8 @@ class GridMap:
 
     def write(self, document: Mapping[str, Any]) -> str:
         """Return the drawing of a network; InputError if it can't be drawn."""
+        if document["version"] != 0:
+            raise dt.InputError("can't be drawn", file=self.name, expected="straight roads on a lattice")
         segments: list[list[int]] = document["segments"]
         left, low = min(min(a, c) for a, _, c, _ in segments), min(min(b, d) for _, b, _, d in segments)
         if (

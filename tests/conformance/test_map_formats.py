@@ -6,20 +6,23 @@ import json
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.roads.formats import registry
-from dubins_traffic.roads.formats.registry import MapFormat, WritesMaps
+from dubins_traffic.roads.formats.registry import MapFormat, ReducesMaps, WritesMaps
 from dubins_traffic.roads.generate import generate
+from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.sources import load
+from tests.room import lacking
 
 ROOT = Path(__file__).parents[2]
 OUTSIDE = f"{ROOT / 'examples' / 'extending' / 'my_format.py'}:GridMap"
-FORMATS = [*registry.BUILT_IN, OUTSIDE]
+FORMATS = [*(name for name in registry.BUILT_IN if isinstance(registry.load(name), WritesMaps)), OUTSIDE]
 GRID = RoadNetwork.grid(2, 3)
 NETWORKS = [
     GRID,
@@ -29,6 +32,23 @@ NETWORKS = [
     RoadNetwork(((0, 0, 2, 1), (2, 1, 3, 0)), 3.0, (0.0, 0.0, 0.0), (2, 4), {"author": "somebody # else"}),
     generate(9, 12, 3),
 ]
+BENT = [
+    RoadNetwork.from_document({"version": 2, "length": 1, "segments": [[0, 0, 20, 0, 10, 6, 4.5]]}),
+    RoadNetwork.from_document(
+        {
+            "version": 2,
+            "length": 1.25,
+            "transform": [-3.5, 12.0, 2.1],
+            "segments": [
+                [0, 0, 20, 0],
+                [0, 0, 10.5, 15.25, 0, 15, 3.1],
+                [20, 0, 10.5, 15.25, 20.5, 7, 4.5, 17, 15.25, 1 / 3],
+                [10.5, 15.25, 10, 30.123456789],
+            ],
+        }
+    ),
+]
+"""Networks of segments that bend."""
 OTHERS = ["", " \n", "{}", "[1]", "\x00\ufffd", "<osm version='0.6'/>", "a,b\n1,2\n", "no map at all", "grid"]
 
 
@@ -71,8 +91,24 @@ def test_what_it_writes_it_reads_again(form: MapFormat) -> None:
             again = RoadNetwork.from_text(text, "town", form)
             assert sorted(again.segments) == sorted(network.segments)
             assert (again.length, again.transform) == (network.length, network.transform)
-            assert (again.shape, again.extra) == (network.shape, network.extra)
+            assert again.shape == network.shape
+            assert again.extra == ({} if isinstance(form, ReducesMaps) else network.extra)
             assert form.write(again.to_document()) == text  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.parametrize("network", BENT, ids=("one", "four"))
+def test_curves_come_back_to_a_nanometre(form: MapFormat, network: RoadNetwork) -> None:
+    text = written(form, network)
+    if text is None:
+        return
+    again = RoadNetwork.from_text(text, "town", form)
+    assert np.abs(again.points - network.points).max() < 1e-9
+    assert (again.ends == network.ends).all()
+    assert np.abs(again.lengths - network.lengths).max() < 1e-9
+    for lane in range(network.lanes):
+        there, back = (each.lane_curve(lane, -0.3) for each in (network, again))
+        assert there.shape == back.shape
+        assert np.abs(there - back).max() < 1e-9
 
 
 def test_it_knows_its_own_texts_and_no_others(form: MapFormat) -> None:
@@ -168,3 +204,14 @@ def test_what_is_no_map_format_is_refused(code: str, words: str, tmp_path: Path)
     (tmp_path / "some.f").write_text("something")
     with pytest.raises(InputError, match=words):
         load(tmp_path / "some.f", map_format=f"{tmp_path / 'bad.py'}:F")
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples" / "maps").iterdir()), ids=lambda file: file.name)
+def test_the_maps_of_the_examples_are_held(file: Path) -> None:
+    network = load(file)
+    assert isinstance(network, RoadNetwork)
+    losses = network.known[registry.LOSSES]
+    assert isinstance(losses, Losses)
+    assert losses.kept_share > 0.95
+    assert network.degrees.max() >= 3
+    assert lacking(network) == []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
-from dubins_traffic.cli import faults, options
+from dubins_traffic.cli import faults, maps, options
 from dubins_traffic.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def batch(
     from dubins_traffic.problem.configuration import load_config
 
     drawn = load_config(configuration)
+    maps.report(drawn.network)
     count = drawn.number_trials if trials is None else trials
     run = partial(
         run_batch,

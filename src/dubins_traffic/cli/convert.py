@@ -8,11 +8,13 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import maps, options
 from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "convert town.json -o town.rnd",
+    "convert town.json -o town.net.xml",
+    "convert town.net.xml -o town.json --losses losses.png",
     "convert town.json -o town.sdf --sdf 1.9",
     "convert corner.grid -o town.json --map-format my_format.py:GridMap",
     "convert out/trial-0000.mcap -o trial.csv",
@@ -55,8 +57,11 @@ def convert(
     output: OutputOption,
     sdf: SdfOption = Sdf.CLASSIC,
     map_format: MapFormatOption = None,
+    losses: maps.LossesOption = None,
 ) -> None:
-    """Convert a road network (`.json` to `.rnd` or `.txt`, and back) or a record (to `.csv`, `.parquet` or `.bag`).
+    """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or `.bag`).
+
+    Of the map of another program only what a network can hold is converted, and what was lost is told (docs/maps.md).
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
     A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
@@ -94,6 +99,7 @@ def convert(
                 "not a container of road networks", file=output, value=Path(output).suffix, expected=expected
             )
         found.write(output, form)
+        maps.report(found, losses)
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
     options.tell(output)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import maps, options
 
 EXAMPLES = options.examples(
     "instance demo --seed 4 --trial 2",
@@ -33,5 +33,7 @@ def instance(
     from dubins_traffic.problem.draw import draw
     from dubins_traffic.problem.files import dumps
 
-    drawn = draw(load_config(config), seed, trial)
+    configuration = load_config(config)
+    maps.report(configuration.network)
+    drawn = draw(configuration, seed, trial)
     options.write(dumps(instance_to_document(drawn, version=1 if full else 0)), output)

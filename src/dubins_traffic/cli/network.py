@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import maps, options
 from dubins_traffic.errors import InputError
 
 EXAMPLES = options.examples(
     "network --grid 3 4",
     "network --intersections 20 --segments 30 --seed 7 -o town.json",
     "network --intersections 9 --segments 11 --format text",
+    "network --from town.net.xml -o town.json --losses losses.png",
 )
 
 
@@ -40,15 +41,42 @@ def network(
     bent: Annotated[
         float, typer.Option("--bent", metavar="SHARE", min=0.0, max=1.0, help="of which about a SHARE bend.")
     ] = 0.0,
+    source: Annotated[
+        str | None,
+        typer.Option("--from", metavar="FILE", help="The network that a map of another program holds."),
+    ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            "--scale",
+            metavar="K",
+            help="Metres of it for a metre of the map.",
+            show_default="a lane is 2w wide",
+        ),
+    ] = None,
+    w: Annotated[float, typer.Option("--w", metavar="W", help="Half the width of its lanes, metres.")] = 0.3,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            "--tolerance", metavar="D", help="How far a road may be from the map's, metres of the map."
+        ),
+    ] = 0.1,
+    losses: maps.LossesOption = None,
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
     output: options.Output = None,
 ) -> None:
-    """Print a road network: a grid, or one drawn at random."""
+    """Print a road network: a grid, one drawn at random, or what can be held of a map (docs/maps.md)."""
     from dubins_traffic.roads.generate import generate
     from dubins_traffic.roads.network import RoadNetwork
 
-    if intersections is None and segments is None:
+    if source is not None:
+        if (intersections, segments, grid) != (None, None, None):
+            raise InputError(
+                "two networks at once", file="--from", value=source, expected="nothing else beside it"
+            )
+        made = maps.imported(source, scale, w, tolerance)
+    elif intersections is None and segments is None:
         rows, columns = grid or (3, 4)
         made = RoadNetwork.grid(rows, columns)
     elif grid is not None:
@@ -61,3 +89,4 @@ def network(
     else:
         made = generate(intersections, segments, seed, bent=bent)
     options.write(made.to_json() if format is Format.JSON else made.to_text(), output)
+    maps.report(made, losses)

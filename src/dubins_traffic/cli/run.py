@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dubins_traffic.cli import faults, options
+from dubins_traffic.cli import faults, maps, options
 from dubins_traffic.errors import WorkerLostError
 
 if TYPE_CHECKING:
@@ -118,6 +118,8 @@ def run(
         sandbox=options.boxes(sandbox, limits, trust),
         metrics=metric or (),
     )
+    if todo.configuration is not None:
+        maps.report(todo.configuration.network)
     if todo.before:
         faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
     results, lost = _run(todo, jobs, records, json=json, hidden=controller == "keyboard")

@@ -14,8 +14,8 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.crossings import first_crossing
 from dubins_traffic.roads.formats.rnd import Corners, Segment, extent
+from dubins_traffic.roads.room import LARGEST_DEGREE
 
-LARGEST_DEGREE = 4
 OFF_LATTICE = 0.37
 """Moves the borders of cells off the lattice, so that roads along it lie in few cells."""
 

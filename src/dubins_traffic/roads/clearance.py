@@ -13,34 +13,11 @@ from dubins_traffic.roads.bend_clearance import bend_faults
 from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.chains import Bars
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
 
-LEAST_RADIUS = 2.9
-"""R is at least this many w."""
-SEGMENT_SLACK = 0.5
 ROUNDING = 1e-9
 STRAIGHTENED = 1e-3
 """How far a bend may be from the bars that stand for it where its clearance is measured, metres."""
-
-
-class Clearances(NamedTuple):
-    """What a network must keep.
-
-    Attributes
-    ----------
-    length, apart, aside : float
-        Least metres: length of a segment, between intersections, from an intersection to a segment beside it.
-    cosine : float
-        Two segments that meet make an angle with a smaller cosine.
-    """
-
-    length: float
-    apart: float
-    aside: float
-    cosine: float
-
-    def in_units(self, unit: float) -> Clearances:
-        """Return the same for a lattice whose unit is `unit` metres."""
-        return Clearances(self.length / unit, self.apart / unit, self.aside / unit, self.cosine)
 
 
 class Tight(NamedTuple):
@@ -62,17 +39,6 @@ class Tight(NamedTuple):
     close: Ints
     beside: Ints
     sharp: Ints
-
-
-def clearances(radius: float, reach: float, w: float, slack: float = SEGMENT_SLACK) -> Clearances:
-    """Return what docs/rules.md#room demands for discs of `radius` R, bodies of `reach` rho and cars of width `w`.
-
-    The roads of two arms that are 2 asin(2w / (R + rho)) apart or less overlap beyond the disc: a car would get from
-    one to the other beside the all-way stop.
-    """
-    both = radius + reach
-    sine = 2.0 * w / both
-    return Clearances(2.0 * both + slack, 2.0 * both, both + 2.0 * w, 1.0 - 2.0 * sine * sine)
 
 
 def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:

@@ -133,9 +133,12 @@ class RoadNetwork(Embedding, Pictured):
     def from_text(
         cls, text: str, file: str | None = None, map_format: MapFormat | None = None
     ) -> RoadNetwork:
-        """Return the network in a text, RND or any registered format by its content; `map_format` is that to use."""
+        """Return the network in a text, of the format `map_format`, else by its content; `known` has the losses."""
         form = map_format or formats.of_text(text)
-        return cls.from_document(formats.document(form, text, file), file)
+        document, losses = formats.document(form, text, file)
+        network = cls.from_document(document, file)
+        network.known[formats.LOSSES] = losses
+        return network
 
     @classmethod
     def read(cls, path: str | Path, map_format: MapFormat | None = None) -> RoadNetwork:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -107,6 +107,11 @@ def write_plot(path: str | os.PathLike[str], subject: Subject | Run) -> None:
     MissingExtraError
         If matplotlib is not installed.
     """
+    write_figure(path, lambda: _draw(subject))
+
+
+def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any]) -> None:
+    """Write the figure that `draw` returns to `path`; errors as those of `write_plot`."""
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
@@ -117,7 +122,7 @@ def write_plot(path: str | os.PathLike[str], subject: Subject | Run) -> None:
             expected=f"a suffix of {', '.join(SUFFIXES)}",
         )
     with _matplotlib().rc_context(STYLE):
-        figure = _draw(subject)
+        figure = draw()
         look: dict[str, Any] = {"format": suffix[1:], "metadata": METADATA[suffix], "dpi": 160}
         replace_file(target, lambda draft: figure.savefig(draft, **look))
 

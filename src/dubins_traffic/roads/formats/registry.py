@@ -22,8 +22,15 @@ from dubins_traffic.roads.formats.rnd_text import may_be
 BUILT_IN = {
     "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
     "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
+    "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
+    "lanelet2": ("dubins_traffic.roads.formats.lanelet2", "Lanelet2"),
+    "osm": ("dubins_traffic.roads.formats.osm", "OpenStreetMap"),
+    "opendrive": ("dubins_traffic.roads.formats.opendrive", "OpenDrive"),
+    "sumo": ("dubins_traffic.roads.formats.sumo", "SumoNet"),
 }
 """The formats of this package by name: module and class, in the order in which they are asked."""
+LOSSES = "losses"
+"""The key under which a network keeps what was lost of the map from which it comes."""
 GROUP = "dubins_traffic.map_formats"
 """Entry points of other packages."""
 _SEAM = Seam(
@@ -61,6 +68,15 @@ class MapFormat(Protocol):
         InputError
             If the text is broken; names `file`. The fields are checked by the caller.
         """
+        ...
+
+
+@runtime_checkable
+class ReducesMaps(MapFormat, Protocol):
+    """A map format of another program, of which a network can't hold everything."""
+
+    def reduced(self, text: str, file: str | None = None) -> tuple[Mapping[str, Any], object]:
+        """Return the RND document of what can be held, and what was lost (`roads.maps.losses.Losses`)."""
         ...
 
 
@@ -135,10 +151,12 @@ def is_map(text: str) -> bool:
 
 
 def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps | None:
-    """Return the format that writes files called so, None if there is none."""
-    suffix = Path(path).suffix.lower()
+    """Return the format that writes files called so, that with the longest suffix; None if there is none."""
+    name = Path(path).name.lower()
     forms = chain([] if further is None else [further], registered())
-    return next((form for form in forms if suffix in form.suffixes and isinstance(form, WritesMaps)), None)
+    found = [(form, suffix) for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes]
+    fitting = [(form, suffix) for form, suffix in found if name.endswith(suffix)]
+    return max(fitting, key=lambda pair: len(pair[1]))[0] if fitting else None
 
 
 def suffixes(further: MapFormat | None = None) -> tuple[str, ...]:
@@ -147,8 +165,8 @@ def suffixes(further: MapFormat | None = None) -> tuple[str, ...]:
     return tuple(suffix for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes)
 
 
-def document(form: MapFormat, text: str, file: str | None) -> Mapping[str, Any]:
-    """Return the RND document that `form` reads in a text.
+def document(form: MapFormat, text: str, file: str | None) -> tuple[Mapping[str, Any], object | None]:
+    """Return the RND document that `form` reads in a text, and what was lost of it, if the format tells.
 
     Raises
     ------
@@ -158,7 +176,7 @@ def document(form: MapFormat, text: str, file: str | None) -> Mapping[str, Any]:
     if not text.strip():
         raise InputError("empty", file=file, expected="a road network (RND, JSON or text)")
     try:
-        return form.read(text, file)
+        return form.reduced(text, file) if isinstance(form, ReducesMaps) else (form.read(text, file), None)
     except DubinsTrafficError:
         raise
     except Exception as error:

@@ -1,0 +1,44 @@
+"""Draws what was lost of maps of other programs (docs/maps.md): those of `examples/maps`, and towns of SUMO.
+
+python docs/pictures/maps.py [FOLDER OF SUMO'S tools/game]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from dubins_traffic.roads.formats import registry
+from dubins_traffic.roads.formats.foreign import ForeignFormat
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.viewer.losses import write_losses
+from dubins_traffic.viewer.plot import write_plot
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "examples" / "maps"
+TOWNS = {"DRT/osm.net.xml": "maps-drt", "bs3d/bs.net.xml": "maps-bs3d"}
+
+
+def draw(source: Path, name: str) -> None:
+    """Draw what was lost of a map, and print the table."""
+    text = source.read_text()
+    form = registry.of_text(text)
+    if not isinstance(form, ForeignFormat):
+        raise SystemExit(f"{source}: not a map of another program")
+    document, losses = form.reduced(text, str(source))
+    write_losses(HERE / f"{name}.svg", losses)
+    if source.parent == EXAMPLES:
+        write_plot(HERE / f"{name}-network.svg", RoadNetwork.from_document(document))
+    print(name, *losses.lines(), sep="\n")
+
+
+def main() -> None:
+    """Draw all."""
+    draw(EXAMPLES / "crossing.osm", "maps-crossing")
+    for file, name in TOWNS.items():
+        if len(sys.argv) > 1:
+            draw(Path(sys.argv[1]) / file, name)
+
+
+if __name__ == "__main__":
+    main()

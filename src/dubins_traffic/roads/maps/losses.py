@@ -1,0 +1,163 @@
+"""What was lost of a map when it became a network: by road, as a table, and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.maps.model import Road
+from dubins_traffic.roads.maps.polylines import dense, to_segments
+from dubins_traffic.roads.maps.reasons import Reason
+
+
+class Outcome(NamedTuple):
+    """A road of the map, the lines of the network that stand for it, and why it is not as it was."""
+
+    road: Road
+    lines: tuple[Floats, ...]
+    reasons: tuple[Reason, ...]
+
+
+class Fate(NamedTuple):
+    """What became of a road.
+
+    Attributes
+    ----------
+    name : str
+        Of the road in the file.
+    fate : str
+        ``kept``, ``altered`` or ``dropped``.
+    reasons : tuple of Reason
+        Why, the first being the main one.
+    length, kept : float
+        Metres of the road, and those of them that lie within the tolerance of the network.
+    plain : bool
+        Whether it has one lane in each direction, and is for cars.
+    line : array (N, 2)
+        Points along it, metres of the map.
+    near : array (N,)
+        Whether each point is within the tolerance of the network.
+    """
+
+    name: str
+    fate: str
+    reasons: tuple[Reason, ...]
+    length: float
+    kept: float
+    plain: bool
+    line: Floats
+    near: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """What became of the roads of a map.
+
+    Parameters
+    ----------
+    fates : tuple of Fate
+        One for each road of the map, in its order.
+    tolerance : float
+        Within which a road counts as kept, metres of the map.
+    scale : float
+        Metres of the network in one of the map.
+    segments : int
+        Segments of the network.
+    """
+
+    fates: tuple[Fate, ...]
+    tolerance: float
+    scale: float
+    segments: int
+
+    @property
+    def plain_length(self) -> float:
+        """Metres of roads with one lane in each direction."""
+        return sum(fate.length for fate in self.fates if fate.plain)
+
+    @property
+    def kept_share(self) -> float:
+        """Share of that length which the network keeps within the tolerance; 1 where there is none."""
+        kept = sum(fate.kept for fate in self.fates if fate.plain)
+        return kept / self.plain_length if self.plain_length else 1.0
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing was dropped or altered."""
+        return all(fate.fate == "kept" for fate in self.fates)
+
+    def rows(self) -> list[tuple[str, str, int, float]]:
+        """Return the table: fate, reason, number of roads, metres of them; the largest first in each fate."""
+        sums: dict[tuple[str, str], tuple[int, float]] = {}
+        for fate in self.fates:
+            key = fate.fate, str(fate.reasons[0]) if fate.reasons else ""
+            number, metres = sums.get(key, (0, 0.0))
+            sums[key] = number + 1, metres + fate.length
+        rows = [(*key, *value) for key, value in sums.items()]
+        return sorted(rows, key=lambda row: (FATES.index(row[0]), -row[3], row[1]))
+
+    def document(self) -> dict[str, Any]:
+        """Return all of it as JSON holds it."""
+        return {
+            "scale": self.scale,
+            "tolerance": self.tolerance,
+            "segments": self.segments,
+            "one_plus_one": {"length": round(self.plain_length, 3), "kept_share": round(self.kept_share, 6)},
+            "table": [
+                {"fate": fate, "reason": reason, "roads": number, "length": round(metres, 3)}
+                for fate, reason, number, metres in self.rows()
+            ],
+            "roads": [
+                {
+                    "name": fate.name,
+                    "fate": fate.fate,
+                    "reasons": [str(reason) for reason in fate.reasons],
+                    "length": round(fate.length, 3),
+                    "kept": round(fate.kept, 3),
+                }
+                for fate in self.fates
+            ],
+        }
+
+    def lines(self) -> list[str]:
+        """Return the report as lines of text."""
+        head = (
+            f"{self.segments} segments of {len(self.fates)} roads, 1 m of the map is {self.scale:.6g} m; of "
+            f"{self.plain_length:.0f} m with one lane in each direction {100.0 * self.kept_share:.1f} % kept "
+            f"within {self.tolerance:g} m"
+        )
+        rows = [("", "roads", "metres", "why"), *((a, str(n), f"{m:.0f}", b) for a, b, n, m in self.rows())]
+        wide = [max(len(row[k]) for row in rows) for k in range(3)]
+        table = [
+            f"{row[0]:<{wide[0]}}  {row[1]:>{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}".rstrip()
+            for row in rows
+        ]
+        return [head, *table]
+
+
+FATES = ("kept", "altered", "dropped")
+
+
+def losses(outcomes: Sequence[Outcome], tolerance: float, scale: float, segments: int) -> Losses:
+    """Return what became of roads."""
+    return Losses(tuple(_fate(each, tolerance) for each in outcomes), tolerance, scale, segments)
+
+
+def _fate(outcome: Outcome, tolerance: float) -> Fate:
+    road = outcome.road
+    line = dense(road.line, max(5.0 * tolerance, road.length / 5000.0))
+    away = np.full(len(line), np.inf)
+    for other in outcome.lines:
+        away = np.minimum(away, to_segments(line, other))
+    near = away <= tolerance
+    reasons = outcome.reasons
+    if outcome.lines and not near.all() and Reason.CURVATURE not in reasons:
+        reasons = (*reasons, Reason.CURVATURE)
+    name = "dropped" if not outcome.lines else "altered" if reasons else "kept"
+    length = road.length
+    return Fate(road.name, name, reasons, length, length * float(near.mean()), road.is_plain, line, near)

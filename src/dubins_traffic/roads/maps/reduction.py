@@ -1,0 +1,131 @@
+"""A road map as a road network: what it can hold, on its scale, and what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.maps.choosing import chosen
+from dubins_traffic.roads.maps.drafting import Draft, Drafter
+from dubins_traffic.roads.maps.fitting import line_of
+from dubins_traffic.roads.maps.losses import Losses, Outcome, losses
+from dubins_traffic.roads.maps.model import Road, RoadMap
+from dubins_traffic.roads.maps.ours import network_document
+from dubins_traffic.roads.maps.reasons import Reason
+from dubins_traffic.roads.maps.settings import ImportSettings
+
+MOST_ROUNDS = 300
+WIDTH_PLAY = 0.01
+"""A lane is of another width if it differs by more than this share."""
+
+
+class Reduction(NamedTuple):
+    """What became of a map.
+
+    Attributes
+    ----------
+    document : dict
+        The RND document of the network.
+    losses : Losses
+        What was dropped or altered.
+    """
+
+    document: dict[str, Any]
+    losses: Losses
+
+
+def reduction(
+    road_map: RoadMap, settings: ImportSettings | None = None, file: str | None = None
+) -> Reduction:
+    """Return the road network that holds as much of a map as it can.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+        The map.
+    settings : ImportSettings, optional
+        Scale, tolerance and what the network must keep.
+    file : str, optional
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If nothing of the map can be held.
+    """
+    settings = settings or ImportSettings()
+    if settings.scale is None and (document := network_document(road_map)) is not None:
+        outcomes = [Outcome(road, (road.line,), ()) for road in road_map.roads]
+        return Reduction(document, losses(outcomes, settings.tolerance, 1.0, len(outcomes)))
+    width = usual_width(road_map.roads)
+    scale = settings.scale if settings.scale is not None else 2.0 * settings.w / width
+    drafter = Drafter(road_map, settings, scale)
+    dropped: dict[int, Reason] = {}
+    for _ in range(MOST_ROUNDS):
+        numbers = chosen(road_map.roads, dropped)
+        if not numbers:
+            break
+        draft = drafter.draft(numbers)
+        if not draft.gone:
+            return _made(road_map, draft, dropped, settings, scale, width)
+        dropped |= draft.gone
+    raise InputError("nothing of the map can be held", file=file, expected="roads that a network can hold")
+
+
+def usual_width(roads: Sequence[Road]) -> float:
+    """Return the width of lanes that most of the length has."""
+    lengths: dict[float, float] = {}
+    for road in roads:
+        if not road.closed:
+            lengths[road.lane_width] = lengths.get(road.lane_width, 0.0) + road.length
+    return max(lengths, key=lambda width: lengths[width]) if lengths else roads[0].lane_width
+
+
+def _made(
+    road_map: RoadMap,
+    draft: Draft,
+    dropped: Mapping[int, Reason],
+    settings: ImportSettings,
+    scale: float,
+    width: float,
+) -> Reduction:
+    limits = settings.limits(scale)
+    lines: dict[int, list[Floats]] = {}
+    for strand, fitted in zip(draft.strands, draft.fits, strict=True):
+        line = line_of(strand.line[0], fitted, strand.line[-1], limits)
+        for number in strand.roads:
+            lines.setdefault(number, []).append(line)
+    outcomes = [
+        Outcome(road, tuple(lines.get(number, ())), _reasons(road, number, dropped, width, number in lines))
+        for number, road in enumerate(road_map.roads)
+    ]
+    return Reduction(_document(draft, scale), losses(outcomes, settings.tolerance, scale, len(draft.strands)))
+
+
+def _reasons(
+    road: Road, number: int, dropped: Mapping[int, Reason], width: float, held: bool
+) -> tuple[Reason, ...]:
+    """Return why a road is altered, or dropped: what the file says of it, then what the network can't hold."""
+    found: list[Reason] = []
+    if road.closed:
+        found.append(Reason.CLOSED)
+    if not (road.forward and road.backward):
+        found.append(Reason.ONE_WAY)
+    if max(road.forward, road.backward) > 1:
+        found.append(Reason.LANES)
+    if held:
+        return (*found, Reason.WIDTH) if abs(road.lane_width - width) > WIDTH_PLAY * width else tuple(found)
+    if number in dropped:
+        return (dropped[number], *found)
+    return tuple(found) or (Reason.APART,)
+
+
+def _document(draft: Draft, scale: float) -> dict[str, Any]:
+    """Return the RND document, version 2, whose unit is a metre."""
+    rows: list[list[float]] = []
+    for strand, fitted in zip(draft.strands, draft.fits, strict=True):
+        ends = [scale * float(value) for value in (*strand.line[0], *strand.line[-1])]
+        rows.append(ends + [scale * value for corner in fitted.corners for value in corner])
+    return {"version": 2, "length": 1, "segments": rows}

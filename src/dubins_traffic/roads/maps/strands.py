@@ -1,0 +1,139 @@
+"""The graph of a map: strands, which are roads one after another, between junctions where others end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.maps.model import Junction, Road
+from dubins_traffic.roads.maps.polylines import along, at, cleaned, stretch, to_segments
+
+
+@dataclass(frozen=True, slots=True)
+class Strand:
+    """Roads of which each goes on where the one before ends: their numbers, both ends, the line."""
+
+    roads: tuple[int, ...]
+    first: str
+    last: str
+    line: Floats
+
+    @property
+    def length(self) -> float:
+        """Metres along the line."""
+        return float(along(self.line)[-1])
+
+    def backward(self) -> Strand:
+        """Return the same from the other end."""
+        return Strand(self.roads[::-1], self.last, self.first, self.line[::-1])
+
+    def end_at(self, name: str) -> Strand:
+        """Return the same, so that it ends at a junction."""
+        return self if self.last == name else self.backward()
+
+
+def strands_of(
+    roads: Sequence[Road], numbers: Iterable[int], junctions: Mapping[str, Junction]
+) -> list[Strand]:
+    """Return the strands of some roads: joined where only two meet, without loops and twins.
+
+    A strand that would end where it begins is cut in three, and the longer of two between the same junctions in two:
+    bends are put in where the road is straightest.
+    """
+    rows: dict[int, Strand] = {}
+    meet: dict[str, list[int]] = {}
+    for key, number in enumerate(numbers):
+        road = roads[number]
+        line = _anchored(road, junctions)
+        rows[key] = Strand((number,), road.first, road.last, line)
+        for end in (road.first, road.last):
+            meet.setdefault(end, []).append(key)
+    for name, keys in meet.items():
+        if len(keys) == 2 and keys[0] != keys[1]:
+            _join(rows, meet, name, *keys)
+    return list(rows.values())
+
+
+def _anchored(road: Road, junctions: Mapping[str, Junction]) -> Floats:
+    """Return the line of a road from junction to junction; it may end at their borders in the file."""
+    first, last = np.array(junctions[road.first][:2]), np.array(junctions[road.last][:2])
+    return cleaned(np.concatenate([first[None], road.line, last[None]]))
+
+
+def _join(rows: dict[int, Strand], meet: dict[str, list[int]], name: str, one: int, other: int) -> None:
+    """Replace two strands that meet at a junction by one."""
+    head, tail = rows[one].end_at(name), rows[other].end_at(name).backward()
+    line = np.concatenate([head.line, tail.line[1:]])
+    rows[one] = Strand(head.roads + tail.roads, head.first, tail.last, line)
+    del rows[other], meet_of(meet, name)[:]
+    keys = meet[tail.last]
+    keys[keys.index(other)] = one
+
+
+def meet_of(meet: dict[str, list[int]], name: str) -> list[int]:
+    """Return the strands that meet at a junction."""
+    return meet[name]
+
+
+def cut(strands: list[Strand], straight: float) -> tuple[list[Strand], dict[str, Junction]]:
+    """Return strands without loops and twins, and the junctions that were put in.
+
+    Parameters
+    ----------
+    strands : list of Strand
+        As `strands_of` returns them.
+    straight : float
+        How long a road is straight at both ends.
+    """
+    made: list[Strand] = []
+    added: dict[str, Junction] = {}
+    seen: set[tuple[str, str]] = set()
+    for strand in sorted(strands, key=lambda each: each.length):
+        ends = min(strand.first, strand.last), max(strand.first, strand.last)
+        parts = 3 if strand.first == strand.last else 2 if ends in seen else 1
+        seen.add(ends)
+        made += _split(strand, parts, straight, added)
+    return made, added
+
+
+def _split(strand: Strand, parts: int, straight: float, added: dict[str, Junction]) -> list[Strand]:
+    """Return a strand in parts of about equal length."""
+    length = strand.length
+    if parts == 1 or length < 2.0 * parts * straight:
+        return [] if parts > 1 else [strand]
+    cuts = [0.0]
+    names = [strand.first]
+    for k in range(1, parts):
+        where = _straightest(strand.line, length * k / parts, straight, 0.3 * length / parts)
+        name = f"{strand.first}..{strand.last}#{strand.roads[0]}.{k}"
+        x, y = at(strand.line, where).tolist()
+        added[name] = Junction(x, y)
+        cuts.append(where)
+        names.append(name)
+    cuts.append(length)
+    names.append(strand.last)
+    return [
+        Strand(strand.roads, names[k], names[k + 1], stretch(strand.line, cuts[k], cuts[k + 1]))
+        for k in range(parts)
+    ]
+
+
+def _straightest(line: Floats, where: float, straight: float, play: float) -> float:
+    """Return the place near `where` about which a line is straightest."""
+    best, least = where, np.inf
+    for step in np.linspace(-play, play, 21).tolist():
+        part = stretch(line, where + step - straight, where + step + straight)
+        off = float(to_segments(part, part[[0, -1]]).max()) + 1e-3 * abs(step) / max(play, 1e-9)
+        if off < least:
+            best, least = where + step, off
+    return best
+
+
+def moved(strand: Strand, name: str, new: str, place: tuple[float, float]) -> Strand:
+    """Return a strand that ends at another junction instead of `name`: its line goes on to there."""
+    whole = strand.end_at(name)
+    line = cleaned(np.concatenate([whole.line, np.array([place])]))
+    return replace(whole, last=new, line=line)

@@ -1,0 +1,154 @@
+"""Broken maps of other programs: each is refused with its file, what is wrong, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.formats import registry, xml_text
+from dubins_traffic.roads.network import RoadNetwork
+from tests.foreign_maps import FOREIGN, both, changed, opendrive, sumo, written
+
+Make = Callable[[], str]
+OSM_HEAD = "<osm version='0.6'>"
+NODES = "<node id='1' lat='49' lon='9'/><node id='2' lat='49.001' lon='9'/>"
+WAY = "<way id='5'><nd ref='1'/><nd ref='2'/><tag k='highway' v='residential'/></way>"
+LINE = '<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>'
+BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+OUTER = '<!DOCTYPE r SYSTEM "file:///etc/passwd">'
+ROOTS = {"commonroad": "commonRoad", "lanelet2": "osm", "opendrive": "OpenDRIVE", "sumo": "net", "osm": "osm"}
+
+
+def text(value: str) -> Make:
+    return lambda: value
+
+
+def inner(name: str, old: str, new: str) -> Make:
+    return changed(name, old, new)
+
+
+def general() -> list[tuple[str, str, Make, str]]:
+    """What is refused in every format."""
+    found: list[tuple[str, str, Make, str]] = []
+    for name in FOREIGN:
+        root = ROOTS[name]
+        found += [
+            (name, "truncated", lambda name=name: written(name)[: len(written(name)) // 2], "not XML"),
+            (name, "entity bomb", text(f"{BOMB}<{root}>&b;</{root}>"), "document type"),
+            (name, "outer entity", text(f"{OUTER}<{root}/>"), "document type"),
+            (name, "other root", text("<html><body/></html>"), "another root"),
+            (name, "nested", text("<a>" * 100 + "</a>" * 100), "nested too deep"),
+            (name, "without roads", text(f"<{root}/>"), "no roads"),
+            (name, "undefined entity", text(f"<{root}>&lol;</{root}>"), "not XML"),
+            (name, "attribute twice", text(f"<{root} a='1' a='2'/>"), "not XML"),
+        ]
+    return found
+
+
+SUMO: list[tuple[str, Make, str]] = [
+    ("NaN", inner("sumo", ' x="0"', ' x="nan"'), "not a number"),
+    ("infinite", inner("sumo", ' x="0"', ' x="1e999"'), "not a number"),
+    ("gigantic", inner("sumo", ' x="0"', ' x="1e12"'), "not a place"),
+    ("word", inner("sumo", 'y="0"', 'y="north"'), "not a number"),
+    ("digits without end", inner("sumo", 'y="0"', f'y="{"1" * 5000}"'), "not a number"),
+    ("no x", inner("sumo", ' x="0"', ' z="0"'), "missing"),
+    ("junction twice", inner("sumo", '<junction id="v1"', '<junction id="v0"'), "stands twice"),
+    ("no such junction", inner("sumo", 'from="v0"', 'from="nowhere"'), "no such junction"),
+    ("no id", inner("sumo", '<edge id="s0"', "<edge"), "missing"),
+    ("no lanes", text(sumo(["a b 0", "b a 0"], {"a": (0, 0), "b": (90, 0)})), "no lanes"),
+    ("half a point", text(sumo(["a b 1 shape='1,2 3'"], {"a": (0, 0), "b": (90, 0)})), "not a point"),
+    ("one point", text(sumo(["a b 1 shape='1,2'"], {"a": (0, 0), "b": (90, 0)})), "not a line"),
+    ("width", inner("sumo", 'width="0.6"', 'width="-1"'), "width of a lane"),
+    ("all too short", text(sumo(both("a b 1"), {"a": (0, 0), "b": (3, 0)})), "nothing of the map"),
+    ("frame", inner("sumo", "frame 3.0", "frame three"), "not numbers"),
+    ("other instruction", inner("sumo", "frame 3.0", "fame 3.0"), "unknown instruction"),
+]
+OPENDRIVE: list[tuple[str, Make, str]] = [
+    ("no geometry", text(opendrive("")), "has no line"),
+    ("no shape", text(opendrive(LINE.replace("<line/>", ""))), "not one shape"),
+    ("two shapes", text(opendrive(LINE.replace("<line/>", "<line/><arc curvature='1'/>"))), "not one shape"),
+    ("negative length", text(opendrive(LINE.replace('"100"', '"-1"'))), "not a length"),
+    ("endless", text(opendrive(LINE.replace('"100"', '"1e300"'))), "not a length"),
+    ("no length", text(opendrive(LINE.replace('"100"', '"0"'))), "no length"),
+    ("curvature", text(opendrive(LINE.replace("<line/>", '<arc curvature="1e9"/>'))), "too sharp"),
+    ("no curvature", text(opendrive(LINE.replace("<line/>", "<arc/>"))), "missing"),
+    (
+        "coefficients",
+        text(opendrive(LINE.replace("<line/>", '<poly3 a="0" b="1e99" c="0" d="0"/>'))),
+        "too large",
+    ),
+    ("no lanes", text(opendrive(LINE).replace("laneSection", "other")), "has no lanes"),
+    (
+        "no such road",
+        text(opendrive(LINE, link='<link><successor elementId="9"/></link>')),
+        "linked to no road",
+    ),
+    ("heading", text(opendrive(LINE.replace('hdg="0"', 'hdg="NaN"'))), "not a number"),
+]
+COMMONROAD: list[tuple[str, Make, str]] = [
+    ("no bound", inner("commonroad", "leftBound", "middleBound"), "not XML"),
+    (
+        "empty bound",
+        text("<commonRoad><lanelet id='1'><leftBound/><rightBound/></lanelet></commonRoad>"),
+        "no line",
+    ),
+    ("no bounds", text("<commonRoad><lanelet id='1'/></commonRoad>"), "missing"),
+    ("successor", inner("commonroad", '<successor ref="', '<successor ref="99'), "no lanelet"),
+    ("lanelet twice", inner("commonroad", '<lanelet id="2"', '<lanelet id="1"'), "stands twice"),
+    ("empty coordinate", inner("commonroad", "<x>0</x>", "<x/>"), "not a number"),
+    ("gigantic", inner("commonroad", "<x>0</x>", "<x>1e15</x>"), "not a"),
+]
+LANELET2: list[tuple[str, Make, str]] = [
+    ("no such node", inner("lanelet2", '<nd ref="', '<nd ref="x'), "no such node"),
+    ("no bound", inner("lanelet2", 'role="left"', 'role="middle"'), "no left bound"),
+    ("way of one node", text(f"{OSM_HEAD}{NODES}<way id='5'><nd ref='1'/></way><way id='6'/>"
+                             "<relation id='7'><member type='way' ref='5' role='left'/>"
+                             "<member type='way' ref='6' role='right'/><tag k='type' v='lanelet'/></relation></osm>"),
+     "no line"),
+    ("node twice", inner("lanelet2", '<node id="2"', '<node id="1"'), "stands twice"),
+    ("local metres", inner("lanelet2", 'k="local_x" v="0"', 'k="local_x" v="far"'), "not a number"),
+]  # fmt: skip
+OSM: list[tuple[str, Make, str]] = [
+    ("latitude", text(f"{OSM_HEAD}{NODES.replace('49.001', '149')}{WAY}</osm>"), "out of range"),
+    ("no longitude", text(f"{OSM_HEAD}{NODES.replace('lon', 'long')}{WAY}</osm>"), "missing"),
+    ("half the world", text(f"{OSM_HEAD}{NODES}"
+                            f"<node id='3' lat='1' lon='150'/>{WAY}</osm>"), "too wide"),
+    ("node", text(f"{OSM_HEAD}{WAY}</osm>"), "no such node"),
+    ("footway only", text(f"{OSM_HEAD}{NODES}{WAY.replace('residential', 'footway')}</osm>"), "no roads"),
+]  # fmt: skip
+CASES = general() + [
+    (name, what, make, words)
+    for name, cases in (
+        ("sumo", SUMO),
+        ("opendrive", OPENDRIVE),
+        ("commonroad", COMMONROAD),
+        ("lanelet2", LANELET2),
+        ("osm", OSM),
+    )
+    for what, make, words in cases
+]
+
+
+def test_there_are_enough_of_them() -> None:
+    assert len(CASES) >= 60
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "make", "words"), CASES, ids=[f"{case[0]}-{case[1]}" for case in CASES]
+)
+def test_a_broken_map_is_refused_with_its_file(name: str, what: str, make: Make, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        RoadNetwork.from_text(make(), "broken.map", registry.load(name))
+    assert caught.value.file == "broken.map", what
+
+
+def test_what_is_too_large_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xml_text, "MOST_SIGNS", 100)
+    with pytest.raises(InputError, match="too large"):
+        RoadNetwork.from_text(written("sumo"), "large.net.xml", registry.load("sumo"))
+    monkeypatch.undo()
+    monkeypatch.setattr(xml_text, "MOST_ELEMENTS", 10)
+    with pytest.raises(InputError, match="too many elements"):
+        RoadNetwork.from_text(written("sumo"), "large.net.xml", registry.load("sumo"))
