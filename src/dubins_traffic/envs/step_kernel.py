@@ -78,6 +78,8 @@ def step_trials(
         steps.one[0] = b
         status = STATUS.RUNNING
         pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
+        if ticks > 0 and steps.scale[0].waits != 0:
+            pause = own.left
         while own.left > max(pause, 0) and status == STATUS.RUNNING:
             status = _tick(b, envs[k], commands, world, outlook, steps)
         steps.status[envs[k]] = status
