@@ -28,6 +28,7 @@ from numba.core import codegen, config, targetconfig, types  # pyright: ignore[r
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
+from dubins_traffic.kernels import fetching
 from dubins_traffic.kernels.codes import take_as_numbers
 from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of, is_place
 from dubins_traffic.kernels.pointers import TablesType
@@ -38,7 +39,6 @@ RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""
 FOREIGN = ("numba", "NRT", "Py", "_Py")
 """How the names of functions begin that only a process with Numba or for Python has."""
-
 SELDOM = 200_000
 """New objects between two searches for rubbish: there is little among what the compiler makes."""
 
@@ -76,6 +76,7 @@ class Compiler:
         _index_plainly()
         _compare_quickly()
         take_as_numbers()
+        fetching.learn()
         gc.set_threshold(SELDOM)
 
     def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:

@@ -15,7 +15,9 @@ PACKAGE = Path(__file__).resolve().parents[1]
 LIBRARIES = ("numba", "llvmlite", "numpy")
 """What compiles kernels."""
 
-MAKERS = frozenset(PACKAGE / "kernels" / f"{name}.py" for name in ("codes", "compiler", "kinds", "pointers"))
+MAKERS = frozenset(
+    PACKAGE / "kernels" / f"{name}.py" for name in ("codes", "compiler", "fetching", "kinds", "pointers")
+)
 """The sources that say how kernels are compiled and called: they count for all kernels."""
 
 KEEPERS = frozenset(
