@@ -224,6 +224,19 @@ def test_pictures_of_an_episode_show_what_has_been_broken() -> None:
     env.close()
 
 
+@pytest.mark.parametrize("ego", ["rules", "lanes"])
+def test_an_egos_controller_is_disturbed_as_in_any_trial(ego: str) -> None:
+    own = {**config(seconds=2.0), "disturbances": {"command_delay": 5}}
+    late, prompt = parallel_env(own, ego=ego), parallel_env(config(seconds=2.0), ego=ego)
+    for env in (late, prompt):
+        env.reset(seed=1)
+        for _ in range(6):
+            env.step({})
+    assert not late.commands[:5, 0].any()
+    assert prompt.commands[0, 0].any()
+    assert np.array_equal(late.commands[5, 0], prompt.commands[0, 0])
+
+
 def test_what_makes_no_sense_is_named() -> None:
     with pytest.raises(
         InputError, match=r"roles: no such role: got 'friends'; expected adversaries or peers"
@@ -239,6 +252,8 @@ def test_what_makes_no_sense_is_named() -> None:
         InputError, match=r"e-agents: an e-agent beside learners: got 'wander'; expected lawful, nemesis"
     ):
         parallel_env(config(kind="wander"), learned=["a1"])
+    with pytest.raises(InputError, match=r"disturbances: no agent"):
+        parallel_env({**config(), "disturbances": {"command_delay": 1}})
     with pytest.raises(InputError, match=r"shield: no such agent: got 'car_9'"):
         Shielded(parallel_env(config()), ["car_9"])
     env = parallel_env(config(seconds=1.0))

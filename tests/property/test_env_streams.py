@@ -20,6 +20,8 @@ from dubins_traffic.runs.single import run_trial
 from tests.environments import SHORT, single, vector, weaving
 
 STEPS = 200
+NOISE = {"position_noise": 0.05, "heading_noise": 0.1}
+LATE = {"command_delay": 3, "command_loss": 0.2}
 
 
 def streams(envs: int, watched: list[int], mode: AutoresetMode, **given: Any) -> dict[int, list[Any]]:
@@ -56,8 +58,18 @@ def test_streams_do_not_depend_on_how_many_environments_there_are(mode: Autorese
     assert sum(own[3] or own[4] for k in few for own in few[k][1:] if len(own) > 2) >= 6
 
 
-def test_a_single_environment_is_the_first_of_many() -> None:
-    alone, told = single(), vector(3, autoreset_mode=AutoresetMode.SAME_STEP)
+def test_streams_of_disturbed_environments_do_not_depend_on_how_many_there_are() -> None:
+    config = {**SHORT, "disturbances": NOISE | LATE}
+    few = streams(1, [0], AutoresetMode.SAME_STEP, config=config, frame_skip=2)
+    many = streams(5, [0, 4], AutoresetMode.SAME_STEP, config=config, frame_skip=2)
+    assert few[0] == many[0] != many[4]
+    assert few[0] != streams(1, [0], AutoresetMode.SAME_STEP, frame_skip=2)[0]
+
+
+@pytest.mark.parametrize("disturbances", [{}, NOISE | LATE], ids=["", "disturbed"])
+def test_a_single_environment_is_the_first_of_many(disturbances: dict[str, Any]) -> None:
+    config = {**SHORT, "disturbances": disturbances}
+    alone, told = single(config), vector(3, config, autoreset_mode=AutoresetMode.SAME_STEP)
     first, info = alone.reset(seed=11)
     seen, infos = told.reset(seed=11)
     assert np.array_equal(first, seen[0])
@@ -102,11 +114,15 @@ class Watching(Scripted):
 
 @pytest.mark.parametrize("skip", [1, 4])
 @pytest.mark.parametrize("laser", [False, True])
-def test_an_episode_is_the_trial_that_it_cites(tmp_path: Path, skip: int, laser: bool) -> None:
+@pytest.mark.parametrize("disturbances", [{}, NOISE, LATE, NOISE | LATE], ids=["", "noise", "late", "both"])
+def test_an_episode_is_the_trial_that_it_cites(
+    tmp_path: Path, skip: int, laser: bool, disturbances: dict[str, Any]
+) -> None:
     """Frames, labels, commands, score and flat observations; two records made of it are equal byte for byte."""
     config = {
         **SHORT,
-        "duration": 20.0,
+        "disturbances": disturbances,
+        "duration": 8.0 if disturbances else 20.0,
         "end_on_collision": False,
         "laser": laser and {"rays": 16, "rate": 7.0},
     }

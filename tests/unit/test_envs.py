@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections import Counter
 from typing import Any
 
@@ -31,6 +33,16 @@ OTHERS: dict[str, Any] = {"observation": "dict", "action": "discrete", "frame_sk
 def test_gymnasiums_checker_finds_nothing(name: str, given: dict[str, Any]) -> None:
     own = {"config": SHORT} if name.endswith("Traffic-v0") else {}
     check_env(gymnasium.make(name, **own, **given).unwrapped)
+
+
+def test_the_names_are_known_without_an_import_of_ours() -> None:
+    made = [
+        "make('dubins_traffic.envs:dubins_traffic/Demo-v0')",
+        "make_vec('dubins_traffic.envs:dubins_traffic/Demo-v0', vectorization_mode='vector_entry_point')",
+    ]
+    code = f"import gymnasium; gymnasium.{made[0]}.reset(seed=1); gymnasium.{made[1]}.reset(seed=1); print('made')"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert ran.stdout.strip() == "made", ran.stderr
 
 
 def test_terms_and_costs_are_what_the_score_counts() -> None:
@@ -80,7 +92,6 @@ def test_weights_count_and_wrong_ones_are_refused() -> None:
     [
         {"observation": "pixels"}, {"action": "joystick"}, {"frame_skip": 0}, {"cars": -1}, {"levels": 0},
         {"levels": {"count": 2, "split": "all"}}, {"config": {**SHORT, "formulas": {"own": "[] !left_ego"}}},
-        {"config": {**SHORT, "disturbances": {"command_delay": 1}}},
     ],
 )  # fmt: skip
 def test_what_can_not_be_is_refused(given: dict[str, Any]) -> None:

@@ -37,7 +37,7 @@ from dubins_traffic.problem.kinds import KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
-from dubins_traffic.routing.rounds import stages
+from dubins_traffic.routing.rounds import find_all, stages
 from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeTables
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import kinds_of
@@ -117,6 +117,7 @@ class Group:
         breach_log = BreachLog.empty(trials, places, goals)
         most = MOST * places + int((terms["goals_end"] - terms["goals_begin"]).max())
         breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * most))
+        find_all(problems if keeps_rules else ())
         rounds = [stages(problem) for problem in problems] if keeps_rules else ()
         segments = int(np.diff(roads.seg_off).max())
         apart = spacing(trials, places, rows.far - cars.reach)
@@ -246,6 +247,7 @@ class Group:
         world, begin, name = self._world, begin or {}, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
         frames = np.array([ending.ticks + 1 for ending in endings])
+        find_all([own for b in trials if (own := self.instances[b].problem).rules])
         scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
         found: list[Outcome] = []
         pending = running(rows, world.terms, world.breach_log)

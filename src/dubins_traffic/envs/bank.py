@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.group import Group
+from dubins_traffic.envs.between import Between
 from dubins_traffic.envs.formulas import FormulaWatch
 from dubins_traffic.envs.step_kernel import begin_trials, observe_trials, step_trials
 from dubins_traffic.envs.tables import Scale, StepTables, Stride
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.shield.tables import Overtakes
 
 
 class Board:
@@ -38,7 +41,8 @@ class Board:
         weights, actions = settings.weights, settings.actions
         scale = table(Scale, 1)
         scale[0].period = 1.0 / settings.sample.problem.rate
-        scale[0].pause = 1 if settings.formulas else 0
+        scale[0].pause = 1 if settings.formulas or settings.disturbed else 0
+        scale[0].waits = 1 if settings.disturbed else 0
         scale[0].middle = float(actions.middle[0])
         scale[0].speed, scale[0].yaw_rate = actions.half.tolist()
         self.arrays: dict[str, Any] = {
@@ -72,9 +76,12 @@ class Bank:
         The trials.
     watches : dict
         Who judges formulas on the trials that are watched, by their rows.
+    between : dict
+        What stands between environments and their egos, of trials that are disturbed or under a shield, by their rows.
     """
 
     def __init__(self, instances: Sequence[Instance], board: Board, shown: int) -> None:
+        self._shown = shown
         self.group = Group(instances, keeps_rules=False)
         world = self.group.world
         problems = [instance.problem for instance in instances]
@@ -84,11 +91,13 @@ class Bank:
         self.steps = StepTables(stride=table(Stride, len(instances)), **board.arrays)
         self._step, self._observe = bound(step_trials), bound(observe_trials)
         self.watches: dict[int, FormulaWatch] = {}
+        self.between: dict[int, Between] = {}
         begin_trials(self.outlook, self.steps)
 
     def observe(self, rows: Ints, envs: Ints) -> None:
         """Write what the egos of some trials observe as that of the environments `envs`."""
         self._observe(rows, envs, self.outlook, self.steps)
+        self._look(rows, envs)
 
     def step(self, rows: Ints, envs: Ints, ticks: int) -> bool:
         """Take some trials up to `ticks` ticks farther, with the actions that stand on the board.
@@ -108,14 +117,36 @@ class Bank:
             if found < 0:
                 raise InputError("not an action", field="action", expected="finite numbers")
             self._settle(rows)
+            if self.between:
+                self._pass_on(rows, envs, begins=ticks > 0)
             ended, ticks = True, 0
-        if self.watches:
+        if self.watches or self.between:
             self._settle(rows)
+            self._look(rows, envs)
         return ended
+
+    def stand_between(self, row: int, shield: Overtakes | None) -> None:
+        """Put what disturbs a trial, and a shield, between its environment and its ego, from its first frame on."""
+        self.between[row] = Between(self.group, row, self._shown, shield)
 
     def watch(self, row: int, formulas: Mapping[str, str]) -> None:
         """Judge formulas on the frames of a trial, from its first one on."""
         self.watches[row] = FormulaWatch(self.group, row, formulas)
+
+    def _look(self, rows: Ints, envs: Ints) -> None:
+        """Let what stands between look at the present frames, and put down what it shows of them."""
+        for row, env in zip(rows.tolist(), envs.tolist(), strict=True) if self.between else ():
+            if row in self.between:
+                self.between[row].look(self.steps.flat[env])
+
+    def _pass_on(self, rows: Ints, envs: Ints, *, begins: bool) -> None:
+        """Let the egos do in the coming tick what comes of the actions on their way."""
+        self._look(rows, envs)
+        for row in rows.tolist():
+            own, stride = self.between.get(row), cast(Stride, self.steps.stride[row])
+            if own is not None and stride.left > 0:
+                command = self.group.commands[row, EGO]
+                command[:] = own.command(command if begins else None)
 
     def _settle(self, rows: Ints) -> None:
         self.group.settle(rows)

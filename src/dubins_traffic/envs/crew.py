@@ -98,7 +98,7 @@ class Crew:
 
     def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
         own = [with_learners(instance, cast.learned) for instance in instances]
-        controlled = cast.ego not in (None, COMPILED)
+        controlled = cast.ego is not None and (cast.ego != COMPILED or settings.disturbed)
         self._egos = Controlled(own, partial(registry.load, str(cast.ego))) if controlled else None
         self.group = self._egos.group if self._egos else Group(own, keeps_rules=cast.ego == COMPILED)
         self._cars = len(instances[0].starts)

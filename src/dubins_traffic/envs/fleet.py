@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dubins_traffic.engine.group import Outcome
+    from dubins_traffic.envs.between import Between
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.scoring.formulas import Status
+    from dubins_traffic.shield.tables import Overtakes
 
 AHEAD: Final = 4
 """So many trials wait for each environment, at most."""
@@ -56,6 +59,7 @@ class Fleet:
         self._ready: list[deque[tuple[Bank, int]]] = [deque() for _ in range(envs)]
         self._seats: list[tuple[Bank, int] | None] = [None] * envs
         self._parts: list[tuple[Bank, Ints, Ints]] | None = None
+        self._shield: Overtakes | None = None
 
     def __len__(self) -> int:
         return len(self._next)
@@ -72,6 +76,12 @@ class Fleet:
         self._who[env], self._next[env] = who, episode
         self._ready[env].clear()
 
+    def keep(self, shield: Overtakes) -> None:
+        """Keep all egos under shields from their next trials on, which may cross the centre line when `shield` says."""
+        self._shield = shield
+        scale = self.board.arrays["scale"][0]
+        scale.pause = scale.waits = 1
+
     def begin(self, envs: Iterable[int]) -> None:
         """Put environments into their next trials, and observe the first frames of these."""
         some = list(envs)
@@ -81,6 +91,8 @@ class Fleet:
             bank, row = self._seats[env] = self._ready[env].popleft()
             if self.settings.formulas:
                 bank.watch(row, self.settings.formulas)
+            if self.settings.disturbed or self._shield is not None:
+                bank.stand_between(row, self._shield)
             self.ended[env] = False
             self.board.arrays["status"][env] = STATUS.RUNNING
         self.waiting = bool(self.ended.any())
@@ -140,6 +152,11 @@ class Fleet:
         bank, row = self.seat(env)
         return int(bank.group.ticks[row])
 
+    def between(self, env: int) -> Between:
+        """Return what stands between an environment and its ego, where it is disturbed or under a shield."""
+        bank, row = self.seat(env)
+        return bank.between[row]
+
     def ending(self, env: int) -> Ending | None:
         """Return how an environment's trial has ended, None while it runs."""
         bank, row = self.seat(env)
@@ -155,6 +172,9 @@ class Fleet:
         found: dict[int, Outcome] = {}
         for bank, rows, places in self._grouped(envs):
             found.update(zip(places.tolist(), bank.group.outcomes(rows.tolist(), "env"), strict=True))
+            for row, env in zip(rows.tolist(), places.tolist(), strict=True) if bank.between else ():
+                score = replace(found[env].score, interventions=bank.between[row].interventions)
+                found[env] = replace(found[env], score=score)
         return [found[env] for env in envs]
 
     def _grouped(self, envs: Sequence[int]) -> list[tuple[Bank, Ints, Ints]]:

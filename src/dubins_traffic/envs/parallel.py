@@ -95,6 +95,11 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         height: int = SIDE,
     ) -> None:
         self.settings = Settings(config, "flat", action, frame_skip, None, cars, levels)
+        if self.settings.disturbed and ego is None:
+            value = self.settings.sample.disturbances
+            raise InputError(
+                "no agent", field="disturbances", value=value, expected="none, or an ego's controller"
+            )
         self.render_mode = render_mode
         self._pay = Pay(roles, reward)
         self._renderer = Renderer(render_mode, width, height)

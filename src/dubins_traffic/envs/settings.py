@@ -49,7 +49,7 @@ class Settings:
     ------
     InputError
         If anything of this is wrong, or the configuration asks for what environments do not have: another simulator,
-        formulas, remote cars, disturbances.
+        formulas, remote cars.
     """
 
     config: Configuration | str | os.PathLike[str] | Mapping[str, Any]
@@ -81,8 +81,6 @@ class Settings:
             raise InputError(
                 "can't be an environment", file=own.file, value=sample.simulator, expected=expected
             )
-        if not undisturbed(sample):
-            raise _wrong("disturbances", sample.disturbances, "none")
         if self.formulas:
             with_formulas(sample, self.formulas)
         found = {
@@ -94,6 +92,11 @@ class Settings:
         }
         for name, value in found.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether something disturbs what the egos see, or what they are asked to do."""
+        return not undisturbed(self.sample)
 
 
 def _wrong(name: str, value: object, expected: str) -> InputError:

@@ -17,6 +17,8 @@ from dubins_traffic.envs.spaces import observed, space_of
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.observations.flat import SHOWN
 from dubins_traffic.observations.senses import Senses
+from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     import os
@@ -73,6 +75,8 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         self._renderer = Renderer(render_mode, width, height)
         self.fleet = Fleet(self.settings, 1)
         self._seeded = False
+        self._is_shielded = False
+        self._interventions: int | None = None
         self._senses: Senses | None = None
 
     def reset(
@@ -88,6 +92,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             self.fleet.seed(0, (own, 0), (options or {}).get("episode", 0))
             self._seeded = True
         self.fleet.begin([0])
+        self._interventions = 0 if self._is_shielded else None
         instance = self.fleet.instance(0)
         if self.settings.observation == "object":
             self._senses = Senses(instance)
@@ -99,7 +104,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
         self.fleet.step(np.asarray(action)[None])
         board = self.fleet.board.arrays
-        told = info.of_one(board["terms"][0], board["weighted"][0]) | self._states()
+        told = info.of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
         ended, terminated = bool(self.fleet.ended[0]), False
         if ended:
             terminated = self.fleet.is_terminal(0)
@@ -111,6 +116,36 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of steps with these actions."""
         return np.repeat(self.settings.actions.commands(actions), self.settings.frame_skip, axis=0)
 
+    def shield(self, overtakes: Overtakes = "sure") -> None:
+        """Keep the ego within rules 1 to 3 from the next episode on (`envs.shielded_ego` is the wrapper).
+
+        Parameters
+        ----------
+        overtakes : {"sure", "law", "never"}
+            When it may cross the centre line, see docs/shield.md.
+
+        Raises
+        ------
+        InputError
+            If `overtakes` is something else, or the car can't keep the rules.
+        """
+        check_fit(self.settings.sample.problem, owes=False)
+        self.fleet.keep(check_overtakes(overtakes))
+        self._is_shielded = True
+
+    @property
+    def given(self) -> Floats:
+        """What the shield has let through in each tick of this episode so far, (K, 2), m/s and rad/s.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If the episode is not under a shield.
+        """
+        if self._interventions is None:
+            raise DubinsTrafficError("the episode is not under a shield: see `commands`")
+        return np.array(self.fleet.between(0).given).reshape(-1, 2)
+
     def render(self) -> Any:
         """Return the present frame as (H, W, 3) uint8, or show it, as `render_mode` says."""
         return self._renderer.render_all(self.fleet)[0]
@@ -118,6 +153,13 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     def close(self) -> None:
         """Close the page that shows the environment, if there is one."""
         self._renderer.close()
+
+    def _stepped_in(self) -> dict[str, int]:
+        """Return in how many ticks of this step the shield has changed the command, if there is one."""
+        if self._interventions is None:
+            return {}
+        before, self._interventions = self._interventions, self.fleet.between(0).interventions
+        return {"interventions": self._interventions - before}
 
     def _states(self) -> dict[str, Any]:
         return {"formulas": self.fleet.states(0)} if self.settings.formulas else {}

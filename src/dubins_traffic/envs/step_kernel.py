@@ -10,6 +10,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
 from dubins_traffic.envs.tables import StepTables
 from dubins_traffic.envs.terms import AT_FAULT, TERM
+from dubins_traffic.kernels.ahead import fetch
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
@@ -17,6 +18,7 @@ from dubins_traffic.observations.outlook import OutlookTables
 from dubins_traffic.observations.seeking import metres_to_goal, seek
 from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
+from dubins_traffic.rules.label_cache import growth_row
 
 _blamed = jit_inline(blamed)
 _in_breach = jit_inline(in_breach)
@@ -76,8 +78,12 @@ def step_trials(
         if own.left == 0:
             continue
         steps.one[0] = b
+        if k + 1 < rows.shape[0]:
+            _fetch(rows[k + 1], world)
         status = STATUS.RUNNING
         pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
+        if ticks > 0 and steps.scale[0].waits != 0:
+            pause = own.left
         while own.left > max(pause, 0) and status == STATUS.RUNNING:
             status = _tick(b, envs[k], commands, world, outlook, steps)
         steps.status[envs[k]] = status
@@ -86,6 +92,35 @@ def step_trials(
         special += 0 if status == STATUS.RUNNING and own.left == 0 else 1
         _close(b, envs[k], outlook, steps)
     return special
+
+
+@jit_inline
+def _fetch(b: int, world: World) -> None:
+    """Have the processor bring what a tick of trial b reads, while it works at another one."""
+    memory, drivers, state, labels = world.memory, world.drivers, world.state, world.labels
+    tick, own = world.progress.trial[b].tick + 1, world.rules[b]
+    fetch(state.x, (b,))
+    fetch(state.y, (b,))
+    fetch(state.c, (b,))
+    fetch(state.s, (b,))
+    fetch(memory.kept, (b,))
+    fetch(memory.growth, (b, growth_row(tick, own)))
+    fetch(memory.trail_x, (b, tick % memory.trail_x.shape[1]))
+    fetch(memory.trail_y, (b, tick % memory.trail_x.shape[1]))
+    then = (tick + memory.trail_x.shape[1] - own.stand_ticks) % memory.trail_x.shape[1]
+    fetch(memory.trail_x, (b, then))
+    fetch(memory.trail_y, (b, then))
+    fetch(memory.car, (b,))
+    fetch(labels.bits, (b,))
+    fetch(labels.lane, (b,))
+    fetch(labels.crosses, (b,))
+    fetch(drivers.command, (b,))
+    fetch(drivers.way, (b,))
+    fetch(drivers.car, (b,))
+    fetch(world.breach_log.car, (b,))
+    fetch(world.tally.trial, (b,))
+    fetch(world.rules, (b,))
+    fetch(drivers.vehicle, (b,))
 
 
 @jit_inline

@@ -35,6 +35,8 @@ class Scale:
     """Seconds of a tick."""
     pause: int
     """Ticks after which a step pauses for somebody who looks at every frame; 0: it does not."""
+    waits: int
+    """1 if a step waits before its first tick, too, for somebody who says what the egos do in each."""
     speed: float
     """Half of the range of speeds, m/s."""
     middle: float

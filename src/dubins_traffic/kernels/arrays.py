@@ -14,7 +14,7 @@ Bits: TypeAlias = npt.NDArray[np.uint32]
 
 INFINITE = float("inf")
 """So far, so long: where there is none."""
-BLOCK = 32
+BLOCK = 8
 """Cars whose columns stand together where a kernel takes several at once; the columns are so many numbers apart."""
 WIDE = 8
 """How many of these are taken at once: loops run to a multiple of it."""

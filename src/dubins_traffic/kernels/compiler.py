@@ -28,6 +28,7 @@ from numba.core import codegen, config, types  # pyright: ignore[reportMissingTy
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
+from dubins_traffic.kernels import fetching
 from dubins_traffic.kernels.codes import take_as_numbers
 from dubins_traffic.kernels.elements import index_plainly
 from dubins_traffic.kernels.frontend import shorten
@@ -39,7 +40,6 @@ RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""
 FOREIGN = ("numba", "NRT", "Py", "_Py")
 """How the names of functions begin that only a process with Numba or for Python has."""
-
 SELDOM = 200_000
 """New objects between two searches for rubbish: there is little among what the compiler makes."""
 
@@ -85,6 +85,7 @@ class Compiler:
         index_plainly()
         shorten()
         take_as_numbers()
+        fetching.learn()
         gc.set_threshold(SELDOM)
 
     def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:

@@ -17,7 +17,7 @@ LIBRARIES = ("numba", "llvmlite", "numpy")
 
 MAKERS = frozenset(
     PACKAGE / "kernels" / f"{name}.py"
-    for name in ("codes", "compiler", "elements", "frontend", "kinds", "pipeline", "pointers")
+    for name in ("codes", "compiler", "elements", "fetching", "frontend", "kinds", "pipeline", "pointers")
 )
 """The sources that say how kernels are compiled and called: they count for all kernels."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -170,34 +170,37 @@ def new_outlook(
 
 def _goals(problems: Sequence[Problem], trial: Rows[Outlook]) -> tuple[Rows[SoughtGoal], Floats]:
     """Return the goals of the trials, and the ways to them; note in `trial` which are whose."""
-    ways: list[Floats] = []
-    known: dict[tuple[int, int], int] = {}
+    known: dict[int, tuple[RoadNetwork, dict[int, int]]] = {}
     rows: list[tuple[int, int]] = []
+    count = 0
     for b, problem in enumerate(problems):
         trial[b].first_goal = len(rows)
+        _, ways = known.setdefault(id(problem.network), (problem.network, {}))
         for vertex in dict.fromkeys(problem.goal_vertices):
-            key = id(problem.network), vertex
-            if key not in known:
-                known[key] = len(ways)
-                ways.append(metres_to_vertex(problem.network, vertex))
-            rows.append((vertex, known[key]))
+            if vertex not in ways:
+                ways[vertex] = count
+                count += 1
+            rows.append((vertex, ways[vertex]))
         trial[b].last_goal = len(rows)
     goal = table(SoughtGoal, len(rows))
     goal["vertex"], goal["route"] = [vertex for vertex, _ in rows], [way for _, way in rows]
-    metres = np.full((len(ways), max((len(way) for way in ways), default=1)), np.inf)
-    for k, way in enumerate(ways):
-        metres[k, : len(way)] = way
+    metres = np.full((count, max(network.lanes for network, _ in known.values())), np.inf)
+    for network, ways in known.values():
+        metres[list(ways.values()), : network.lanes] = metres_to_vertices(network, ways)
     return goal, metres
 
 
-def metres_to_vertex(network: RoadNetwork, vertex: int) -> Floats:
-    """Return the metres from the start of each lane to an intersection along lanes, (L,); inf where there is no way."""
-    found = cast("Floats | None", network.known.get((Outlook, vertex)))
-    if found is None:
+def metres_to_vertices(network: RoadNetwork, vertices: Iterable[int]) -> list[Floats]:
+    """Return the metres from the start of each lane to each intersection along lanes, (L,); inf: there is no way."""
+    known = cast("dict[int, Floats]", network.known.setdefault(Outlook, {}))
+    wanted = list(vertices)
+    missing = [vertex for vertex in wanted if vertex not in known]
+    if missing:
         graph = lane_graph(network)
-        ways = [graph.metres_to(target) for target in graph.into[vertex]]
-        found = network.known[Outlook, vertex] = np.min(ways, axis=0) + np.array(graph.length)
-    return found
+        length = np.array(graph.length)
+        for vertex, way in zip(missing, graph.metres_into(missing), strict=True):
+            known[vertex] = way + length
+    return [known[vertex] for vertex in wanted]
 
 
 def _laser(problem: Problem) -> tuple[Rows[Sweeps], Rows[Ray]]:

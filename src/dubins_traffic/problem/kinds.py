@@ -195,7 +195,7 @@ class Chosen(Strict):
     goes: Literal["wander", "loop", "places"] = Field(
         default="wander", description="where nothing is chosen: at random, round a cycle, or between places"
     )
-    cycle: list[LatticePoint] | None = Field(
+    cycle: list[NetworkPoint] | None = Field(
         default=None,
         min_length=2,
         max_length=limits.GOALS,

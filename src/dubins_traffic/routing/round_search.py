@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.tables import Tables
 
 ARMS = 4
 """Most lanes that end in one intersection."""
 
 
-class LaneTables(NamedTuple):
+class LaneTables(Tables):
     """The graph of lanes as arrays.
 
     What may follow lane a are ``after[after_off[a]]`` to ``after[after_off[a + 1] - 1]``, each with the metres
@@ -31,7 +32,7 @@ class LaneTables(NamedTuple):
     into: Ints
 
 
-class Search(NamedTuple):
+class Search(Tables):
     """Room for the search through n goals on L lanes.
 
     `far` (n, 4, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
@@ -99,6 +100,20 @@ def metres_to(target: Any, g: LaneTables, far: Floats, queue: Ints, waits: Ints)
                     place = first + count
                     queue[place if place < lanes else place - lanes] = other
                     count += 1
+
+
+@jit
+def metres_into(v: int, g: LaneTables, least: Floats, far: Floats, queue: Ints, waits: Ints) -> None:
+    """Write the metres from the end of each lane to the intersection `v` (index) into `least` (L,); inf: no way.
+
+    `far` (L,), `queue` (L,) and `waits` (L,) are scratch.
+    """
+    for lane in range(least.shape[0]):
+        least[lane] = INFINITE
+    for k in range(g.into_off[v], g.into_off[v + 1]):
+        metres_to(g.into[k], g, far, queue, waits)
+        for lane in range(least.shape[0]):
+            least[lane] = min(least[lane], far[lane])
 
 
 @jit

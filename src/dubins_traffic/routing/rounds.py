@@ -8,10 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.routing.tours import find_round, free_round, lane_graph
+from dubins_traffic.routing.tours import LaneGraph, find_round, find_rounds, free_round, lane_graph
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dubins_traffic.problem.instance import Problem
+
+
+def find_all(problems: Iterable[Problem]) -> None:
+    """Find the rounds of many problems, in less time than `round_time` and `stages` take one after another."""
+    graphs: dict[int, tuple[LaneGraph, list[tuple[int, ...]]]] = {}
+    for problem in problems:
+        network = problem.network
+        _, lists = graphs.setdefault(id(network), (lane_graph(network), []))
+        lists.append(problem.goal_vertices)
+    for graph, lists in graphs.values():
+        find_rounds(graph, lists)
 
 
 def round_time(problem: Problem) -> float:

@@ -7,7 +7,7 @@ a dead end). It is as long as its lanes together, plus what its turns cost.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.routing.round_search import LaneTables, metres_to, room, shortest_round
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.routing.round_search import LaneTables, metres_into, metres_to, room, shortest_round
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -83,6 +84,16 @@ class LaneGraph:
         work = np.empty((2, self.count), dtype=np.int64)
         metres_to(target, self.tables, far, work[0], work[1])
         return far
+
+    def metres_into(self, intersections: Iterable[int]) -> list[Floats]:
+        """Return the metres from the end of each lane to each of some intersections, (L,); inf: there is no way."""
+        far, work = np.empty(self.count), np.empty((2, self.count), dtype=np.int64)
+        queue, waits = work
+        find, found = bound(metres_into), list[Floats]()
+        for v in intersections:
+            found.append(np.empty(self.count))
+            find(v, self.tables, found[-1], far, queue, waits)
+        return found
 
     def distances(self, target: int, penalty: TurnCost | None = None) -> list[float]:
         """Return metres from the end of each lane to the end of the lane `target`, driving on from there."""
@@ -155,12 +166,25 @@ def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     if not distinct:
         return None
     if distinct not in graph.rounds:
-        if len(graph.rounds) >= max(FEWEST_KEPT, MOST_KEPT // graph.count):
-            graph.rounds.clear()
-            graph.stages.clear()
-        shortest = len(distinct) <= EXACT
-        graph.rounds[distinct] = _shortest(graph, distinct) if shortest else _nearest_first(graph, distinct)
+        find_rounds(graph, [distinct])
     return graph.rounds[distinct]
+
+
+def find_rounds(graph: LaneGraph, many: Iterable[Sequence[int]]) -> None:
+    """Find the rounds through each of many lists of goals, in less time than one after another, for `find_round`."""
+    wanted: dict[int, list[tuple[int, ...]]] = {}
+    for distinct in dict.fromkeys([tuple(dict.fromkeys(goals)) for goals in many]):
+        if distinct and distinct not in graph.rounds:
+            wanted.setdefault(len(distinct), []).append(distinct)
+    count = sum(map(len, wanted.values()))
+    if len(graph.rounds) + count > max(FEWEST_KEPT, MOST_KEPT // graph.count):
+        graph.rounds.clear()
+        graph.stages.clear()
+    for number, lists in wanted.items():
+        if number <= EXACT:
+            graph.rounds.update(zip(lists, _shortest(graph, number, lists), strict=True))
+        else:
+            graph.rounds.update([(goals, _nearest_first(graph, goals)) for goals in lists])
 
 
 def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
@@ -176,12 +200,14 @@ def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     return None if back < 0 else Round((back ^ 1, back), (1,), 2.0 * graph.length[back])
 
 
-def _shortest(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
-    own = room(len(goals), graph.count)
-    lanes, length = shortest_round(np.array(goals, dtype=np.int64), graph.tables, own)
-    if not lanes:
-        return None
-    return Round(tuple(own.lane[:lanes].tolist()), tuple(own.arrival.tolist()), length)
+def _shortest(graph: LaneGraph, number: int, lists: Iterable[tuple[int, ...]]) -> Iterator[Round | None]:
+    """Yield the shortest round through each of some lists of so many goals."""
+    own, places, search = room(number, graph.count), np.zeros(number, dtype=np.int64), bound(shortest_round)
+    for goals in lists:
+        places[:] = goals
+        lanes, length = search(places, graph.tables, own)
+        found = tuple(own.lane[:lanes].tolist()), tuple(own.arrival.tolist())
+        yield Round(*found, length) if lanes else None
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
