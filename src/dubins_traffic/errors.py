@@ -27,7 +27,8 @@ _ARGUMENTS: Final = {
         f"--{name}": name
         for name in (
             "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep", "master", "memory", "method", "poses", "ray",
-            "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
+            "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials",
+            "url", "workers",
         )
     },
 }  # fmt: skip
