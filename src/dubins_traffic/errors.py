@@ -26,7 +26,8 @@ _ARGUMENTS: Final = {
     **{
         f"--{name}": name
         for name in (
-            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep", "master", "memory", "method", "poses", "ray",
+            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep", "master", "memory", "method",
+            "poses", "ray",
             "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials",
             "url", "workers",
         )
