@@ -27,9 +27,7 @@ _ARGUMENTS: Final = {
         f"--{name}": name
         for name in (
             "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep", "master", "memory", "method",
-            "poses", "ray",
-            "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials",
-            "url", "workers",
+            "poses", "ray", "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
         )
     },
 }  # fmt: skip
