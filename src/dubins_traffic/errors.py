@@ -26,8 +26,9 @@ _ARGUMENTS: Final = {
     **{
         f"--{name}": name
         for name in (
-            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep", "master", "memory", "method",
-            "poses", "ray", "records", "remote", "repeat", "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
+            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep",
+            "master", "memory", "method", "poses", "ray", "records", "remote", "repeat",
+            "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
         )
     },
 }  # fmt: skip
