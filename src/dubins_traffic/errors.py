@@ -18,6 +18,7 @@ _ARGUMENTS: Final = {
     "--overwrite": "overwrite=True",
     "--overwrite-trial-data": "overwrite_data=True",
     "--resume": "resume=True",
+    "--rule": "rules",
     "--trial-data": "data",
     "--overwrite-trial-data (-F)": "overwrite_data=True",
     "-F": "overwrite_data=True",
@@ -25,8 +26,9 @@ _ARGUMENTS: Final = {
     **{
         f"--{name}": name
         for name in (
-            "assume", "cars", "clock", "controller", "deadline", "factor", "keep", "master", "memory", "poses", "ray",
-            "records", "remote", "repeat", "rnd", "seed", "simulator", "trials", "url", "workers",
+            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep",
+            "master", "memory", "method", "poses", "ray", "records", "remote", "repeat",
+            "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
         )
     },
 }  # fmt: skip
