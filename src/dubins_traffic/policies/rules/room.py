@@ -140,7 +140,7 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     j = scratch.head[out >> 1]
     while j >= 0:
         along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-        heading = state.c[b, j] * tx + state.s[b, j] * ty
+        heading = float(state.c[b, j] * tx + state.s[b, j] * ty)
         near = along < mouth + pitch and is_slow(b, j, heading, state)
         if j != n and near and takes_room(b, j, out, start, along, aside, labels, vehicle):
             return False
