@@ -249,7 +249,8 @@ def test_what_makes_no_sense_is_named() -> None:
     with pytest.raises(InputError, match=r"learned: nobody learns"):
         parallel_env(config(), ego="rules", learned=[])
     with pytest.raises(
-        InputError, match=r"e-agents: an e-agent beside learners: got 'wander'; expected chosen, lawful, nemesis"
+        InputError,
+        match=r"e-agents: an e-agent beside learners: got 'wander'; expected chosen, lawful, nemesis",
     ):
         parallel_env(config(kind="wander"), learned=["a1"])
     with pytest.raises(InputError, match=r"disturbances: no agent"):

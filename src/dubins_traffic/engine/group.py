@@ -337,9 +337,8 @@ class Group:
             pair = ((contact.car, note.sensed), (contact.other, note.other_sensed))
             self._seen[b].update((car, note.tick) for car, is_seen in pair if is_seen)
         for k, breached in enumerate(world.breach_log.found()):
-            place = world.progress.place[k]
-            b, breach = int(breached.trial), breach_of(breached, place.x, place.y)
-            self.breaches[b].append(breach)
+            place, b = world.progress.place[k], int(breached.trial)
+            self.breaches[b].append(breach := breach_of(breached, place.x, place.y))
             if self._is_seen(b, breach):
                 self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.breach_log.filled[0] = 0

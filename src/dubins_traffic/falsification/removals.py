@@ -13,6 +13,7 @@ from dubins_traffic.falsification.sampling import CHOSEN
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.problem.instance import Disturbances, EAgent, Instance
 from dubins_traffic.problem.kinds import KINDS, parameters_of
+from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
 
 if TYPE_CHECKING:
@@ -123,11 +124,9 @@ def _smaller(network: RoadNetwork, k: int) -> RoadNetwork | None:
     rest = (*network.segments[:k], *network.segments[k + 1 :])
     if not rest:
         return None
-    x = [end for road in rest for end in road[::2]]
-    y = [end for road in rest for end in road[1::2]]
-    shape = max(y) - min(y) + 1, max(x) - min(x) + 1
+    corners = (*network.corners[:k], *network.corners[k + 1 :])
     try:
-        return RoadNetwork(rest, network.length, network.transform, shape)
+        return RoadNetwork(rest, network.length, network.transform, extent(rest), corners=corners)
     except DubinsTrafficError:
         return None
 

@@ -137,10 +137,9 @@ def plan(
         If anything of this is wrong; then nothing has been written.
     """
     found = load_runnable(source, rnd=rnd, seed=seed or 0)
-    own = (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
-    controller = controllers.dressed(
-        own if controller is None else controller, shield=shield, sandbox=sandbox
-    )
+    own = found.controller if isinstance(found, Record) else None
+    named = own or DEFAULT_CONTROLLER if controller is None else controller
+    controller = controllers.dressed(named, shield=shield, sandbox=sandbox)
     controllers.load(controller)
     scores.columns(metrics)
     _check_deadline(deadline)
@@ -153,8 +152,8 @@ def plan(
     else:
         _check_count(1, repeat)
         configuration = None
-        instance = found.instance if isinstance(found, Record) else found
-        instance = replace(instance, simulator=simulator or instance.simulator)
+        given = found.instance if isinstance(found, Record) else found
+        instance = replace(given, simulator=simulator or given.simulator)
         other_seed = None if seed == instance.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]

@@ -186,14 +186,7 @@ def drive_on(
     row = drivers.way[b, n]
     x, y = state.x[b, n], state.y[b, n]
     bits = np.int64(labels.bits[b, n])
-    special = bits & (FLAG.BLOCKED | FLAG.LEFT) != 0 or car.violations & VIOLATION.LEFT_SIDE != 0
-    if (
-        special
-        or drivers.car[b, n].hold > 0.0
-        or car.pause > 0.0
-        or vehicle.tightest > 0.0
-        or part == PART.AFTER
-    ):
+    if part == PART.AFTER or vehicle.tightest > 0.0 or has_more_to_mind(bits, car):
         return False
     if car.kind == KIND.ROUND and not keeps_to_road(b, n, x, y, way, roads, drivers):
         return False
@@ -221,6 +214,13 @@ def drive_on(
     car.within += 1 if chooses else 0
     follow_line(b, n, speed, left, px, py, bend, traffic, commands)
     return True
+
+
+@jit_inline
+def has_more_to_mind(bits: np.int64, car: Driver) -> bool:
+    """Tell whether a car passes something, drives on the left, or stands on purpose."""
+    passes = bits & (FLAG.BLOCKED | FLAG.LEFT) != 0 or car.violations & VIOLATION.LEFT_SIDE != 0
+    return passes or car.hold > 0.0 or car.pause > 0.0
 
 
 @jit_inline

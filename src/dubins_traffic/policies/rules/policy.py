@@ -31,7 +31,7 @@ from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
 from dubins_traffic.policies.rules.path_cache import way_of
 from dubins_traffic.policies.rules.returning import keep_passing
-from dubins_traffic.policies.rules.right_of_way import TRAIL, yield_at_line
+from dubins_traffic.policies.rules.right_of_way import before_ego, yield_at_line
 from dubins_traffic.policies.rules.room import is_pressed
 from dubins_traffic.policies.rules.seeing import (
     QUEUE_GAP,
@@ -48,7 +48,7 @@ from dubins_traffic.policies.rules.straying import strays
 from dubins_traffic.policies.rules.tables import COMPANY, KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.rules.unrolled import bends_ahead, roll_up, unroll
-from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
+from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.routing.lane_graph import lane_at
 from dubins_traffic.rules.propositions import FLAG
 
@@ -323,31 +323,3 @@ def keep_place(
             take_lane(b, n, tick, car.next_lane, traffic)
             way = way_of(b, n, roads, drivers)
     return way
-
-
-@jit_inline
-def before_ego(b: int, n: int, near: int, traffic: Traffic) -> bool:
-    """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
-    state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
-    net = drivers.net[b]
-    lane = labels.lane[b, n]
-    if lane < 0 or labels.crosses[b, n] >= 0:
-        return False
-    dx = state.x[b, 0] - state.x[b, n]
-    dy = state.y[b, 0] - state.y[b, n]
-    if dx * dx + dy * dy > TRAIL * TRAIL:
-        return False
-    v = lane_start(roads, net, lane)
-    for k in range(near):
-        if scratch.near[k] != 0 and labels.crosses[b, scratch.near[k]] == v:
-            return False
-    its = labels.lane[b, 0]
-    behind = dx * state.c[b, n] + dy * state.s[b, n] < 0.0
-    comes = its >= 0 and lane_end(roads, net, its) == v
-    return behind and (its == lane or comes or labels.crosses[b, 0] == v)

@@ -17,7 +17,7 @@ from dubins_traffic.policies.rules.room import MARGIN, has_room, is_free
 from dubins_traffic.policies.rules.seeing import SIDE, way_to_go
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way
-from dubins_traffic.roads.lookup import INFINITE, lane_end
+from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.rules.propositions import FLAG
 
 CHOOSY = 1.0
@@ -253,3 +253,31 @@ def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
     forfeit = ticks_of(vehicle.forfeit, vehicle)
     since = turn - forfeit if turn >= forfeit else turn
     return since > ticks_of(DUTY * vehicle.forfeit, vehicle)
+
+
+@jit_inline
+def before_ego(b: int, n: int, near: int, traffic: Traffic) -> bool:
+    """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
+    net = drivers.net[b]
+    lane = labels.lane[b, n]
+    if lane < 0 or labels.crosses[b, n] >= 0:
+        return False
+    dx = state.x[b, 0] - state.x[b, n]
+    dy = state.y[b, 0] - state.y[b, n]
+    if dx * dx + dy * dy > TRAIL * TRAIL:
+        return False
+    v = lane_start(roads, net, lane)
+    for k in range(near):
+        if scratch.near[k] != 0 and labels.crosses[b, scratch.near[k]] == v:
+            return False
+    its = labels.lane[b, 0]
+    behind = dx * state.c[b, n] + dy * state.s[b, n] < 0.0
+    comes = its >= 0 and lane_end(roads, net, its) == v
+    return behind and (its == lane or comes or labels.crosses[b, 0] == v)
