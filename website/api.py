@@ -23,6 +23,7 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "batches": ("Batches", ("run_batch", "Batch")),
     "campaigns": ("Campaigns", ("run_campaign", "CampaignResults", "load_results")),
+    "falsification": ("The worst case", ("falsify", "shrink", "regress", "estimate")),
     "records": (
         "Records",
         ("load", "load_record", "Record", "RecordWriter", "Frames", "verify", "Verification", "Difference"),
