@@ -15,6 +15,8 @@ from tests.integration.test_readme import BLOCK, FILE_NAME, ROOT
 DOCS = ROOT / "docs"
 HERE = {
     "package.md": "",
+    "falsify.md": "",
+    "maps.md": "dt.RoadNetwork.grid(3, 3, length=6.0).write('town.net.xml')",
     "records.md": "dt.run_trial(dt.draw(config, seed=1, trial=0), record='out/trial-0000.mcap')",
     "campaigns.md": "Path('gaps.toml').write_text(GAPS)",
     "sandbox.md": "Path('theirs.py').write_text(THEIRS); instance = dt.draw(config, seed=1, trial=0)",
