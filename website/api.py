@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+from importlib import import_module
 from pathlib import Path
 
 import dubins_traffic
+from dubins_traffic import sandbox
 
 GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
     "networks": ("Road networks", ("RoadNetwork", "generate_network")),
@@ -33,6 +35,20 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
         ("score", "Score", "ScoreSheet", "Scorer", "Verdict", "Judging", "Metric", "Column"),
     ),
     "pictures": ("Pictures and replays", ("plot", "write_plot", "write_replay")),
+    "learning": (
+        "Learning",
+        (
+            "envs.single.TrafficEnv", "envs.vector.TrafficVectorEnv", "envs.shielded_ego.ShieldedEgo",
+            "envs.parallel.parallel_env", "envs.parallel.TrafficParallelEnv", "envs.shielded.Shielded",
+            "observations.flat.Layout", "observations.flat.FlatObserver", "controllers.learned.Policy",
+            "viewer.raster.Raster",
+        ),
+    ),
+    "sandbox": ("Boxes", tuple(f"sandbox.{name}" for name in sandbox.__all__)),
+    "choices": (
+        "Choices of e-agents",
+        tuple(f"agents.choices.{name}" for name in ("drawn", "mutated", "reductions", "with_choices", "table_of")),
+    ),
     "seams": ("Seams", ("Simulator", "Sink")),
     "errors": ("Errors", ("DubinsTrafficError", "InputError", "ControllerError", "RecordError")),
 }  # fmt: skip
@@ -58,12 +74,14 @@ def write_api(folder: Path) -> None:
 
 
 def _entry(name: str) -> str:
-    value = getattr(dubins_traffic, name)
+    """Return the section of a name of the package, or of a module in it: ``module.Name``."""
+    place, _, own = f"dubins_traffic.{name}".rpartition(".")
+    value = getattr(import_module(place), own)
     kind = "autofunction" if inspect.isroutine(value) else "autoclass"
     if inspect.isclass(value) and issubclass(value, BaseException):
         kind = "autoexception"
     options = "" if kind == "autofunction" else "   :members:\n"
-    return f"## {name}\n\n```{{eval-rst}}\n.. currentmodule:: dubins_traffic\n\n.. {kind}:: {name}\n{options}```\n"
+    return f"## {own}\n\n```{{eval-rst}}\n.. currentmodule:: {place}\n\n.. {kind}:: {own}\n{options}```\n"
 
 
 def _index() -> str:
@@ -72,5 +90,5 @@ def _index() -> str:
         for page, (heading, names) in GROUPS.items()
     ]
     contents = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-    head = "# API\n\nThe public names of `dubins_traffic`; each is loaded when it is first used."
+    head = "# API\n\nThe public names of `dubins_traffic`, each loaded when it is first used, and those of some rooms in it."
     return "\n".join([head, "", "| page | names |", "|---|---|", *rows, "", contents, ""])

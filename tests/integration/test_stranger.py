@@ -1,0 +1,60 @@
+"""The path of a stranger, by the site alone: install, a controller, its verdict, a campaign, a foreign strategy."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tests.integration.test_readme import ROOT
+from tests.integration.test_tutorials import follow
+from tests.tools import interpreter_with
+
+PATIENCE_S = 1800.0
+
+
+def done(words: Sequence[object], folder: Path, around: Mapping[str, str]) -> str:
+    ran = subprocess.run(
+        [str(word) for word in words],
+        cwd=folder,
+        env=dict(around),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE_S,
+    )
+    assert ran.returncode == 0, f"{words}\n{ran.stdout}{ran.stderr}"
+    return ran.stdout
+
+
+def installed(folder: Path) -> dict[str, str]:
+    """Install the package, as the site's first page says, into an environment of its own; return what is set there."""
+    around = {name: own for name, own in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
+    done([sys.executable, "-m", "build", "--wheel", "--outdir", folder / "dist", ROOT], folder, around)
+    (wheel,) = (folder / "dist").iterdir()
+    done([sys.executable, "-m", "venv", folder / "environment"], folder, around)
+    programs = folder / "environment" / "bin"
+    pip = [programs / "python", "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt"]
+    done([*pip, f"{wheel}[campaign,pandas]"], folder, around)
+    return around | {"PATH": f"{programs}{os.pathsep}{around['PATH']}"}
+
+
+def test_the_path_of_a_stranger(tmp_path: Path) -> None:
+    around = installed(tmp_path)
+    for name in ("first-controller", "reading-a-verdict", "campaign"):
+        (tmp_path / name).mkdir()
+        follow(name, tmp_path / name, around)
+    where = [
+        tmp_path / "environment" / "bin" / "python",
+        "-c",
+        "import dubins_traffic as dt; print(dt.__file__)",
+    ]
+    assert done(where, tmp_path, around).startswith(str(tmp_path))
+    example = ROOT / "examples" / "foreign_synthesis.py"
+    told = done([where[0], example, "--tulip", interpreter_with("tulip")], tmp_path, around)
+    game, found, road = told.splitlines()
+    assert game.startswith("1 e-agent, 16 cells")
+    assert found.startswith("TuLiP finds a strategy of ")
+    assert road.startswith("on the road: satisfied, ")
