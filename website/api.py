@@ -90,5 +90,5 @@ def _index() -> str:
         for page, (heading, names) in GROUPS.items()
     ]
     contents = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-    head = "# API\n\nThe public names of `dubins_traffic`, each loaded when it is first used, and those of some rooms in it."
+    head = "# API\n\nThe public names of `dubins_traffic`, each loaded when it is first used, and those of some rooms."
     return "\n".join([head, "", "| page | names |", "|---|---|", *rows, "", contents, ""])

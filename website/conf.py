@@ -25,7 +25,10 @@ nitpick_ignore_regex = [
         r"py:.*",
         r"(Path|Any|Callable|Iterable|Iterator|Sequence|Mapping|Generator|Literal|Self|ArrayLike|NDArray)",
     ),
-    (r"py:class", r"AutoresetMode|Body|Bools|Event|Floats|Image|Levels|Link|MetricSpec|Propositions|Run|Subject"),
+    (
+        r"py:class",
+        r"AutoresetMode|Body|Bools|Event|Floats|Image|Levels|Link|MetricSpec|Propositions|Run|Subject",
+    ),
     (r"py:.*", r"dubins_traffic\.(?!envs)[a-z_]+\..*"),
 ]
 """Standard and foreign libraries, whose inventories this page would have to fetch, and types that are not public."""

@@ -27,6 +27,7 @@ from dubins_traffic.suites.writing import TABLE, results, write_results
 from tests.suites import cases, document, games
 
 FROZEN = {
+    "adversary-2026": "1b19b8849c5d23367a9f223d53d923f7f763f097b253c85beb9e704c6fa099f6",
     "icra2016": "779b298b49a05cdbb1f444621be1f8253f8cb9d5ad46f2c60f965a9ecbcc9057",
     "rules-2026": "281e97774dbc6600b46f986a2c0657ee96aa11dffbe25b67a129dd57d8e70593",
     "synthesis-2026": "4b812b568a64dc977afc50517fe8f944e7142e62ed60e93efa8e3623975e8c60",
@@ -291,6 +292,13 @@ def test_cases_that_are_there_are_not_run_again(tmp_path: Path) -> None:
     kept.write_text(lines[0].replace(suite.hash, "0" * 64))
     with pytest.raises(InputError, match="results of another suite"):
         run_cases(suite, tmp_path, ["simple"], resume=True)
+
+
+def test_a_case_that_stands_twice_is_refused(tmp_path: Path) -> None:
+    entries = cases()["cases"]
+    twice = [*entries, {**entries[0], "name": "again"}]
+    with pytest.raises(InputError, match="the same case twice"):
+        run_cases(Suite.from_document(cases(cases=twice)), tmp_path, ["simple"])
 
 
 def test_cases_that_leave_something_to_be_drawn_are_refused(tmp_path: Path) -> None:

@@ -39,6 +39,24 @@ def case_instance(entry: CaseEntry) -> Instance:
     return instance_from_document(entry.document, entry.name)
 
 
+def case_instances(entries: Sequence[CaseEntry]) -> dict[str, Instance]:
+    """Return the instances of cases by their names.
+
+    Raises
+    ------
+    InputError
+        If one is none, leaves something to be drawn, or is another one once more.
+    """
+    instances = {entry.name: case_instance(entry) for entry in entries}
+    names: dict[str, str] = {}
+    for name, instance in instances.items():
+        if (other := names.setdefault(_key(instance), name)) != name:
+            raise InputError(
+                "the same case twice", field="cases", value=name, expected=f"one other than {other}"
+            )
+    return instances
+
+
 def run_cases(
     suite: Suite,
     folder: Path,
@@ -61,7 +79,7 @@ def run_cases(
     entries = suite.model.cases
     if entries is None:
         raise InputError("a suite without cases", file=suite.file or suite.name)
-    instances = {entry.name: case_instance(entry) for entry in entries}
+    instances = case_instances(entries)
     for spec in specs:
         controllers.load(spec)
     make_folder(folder, "results")

@@ -15,7 +15,7 @@ from typing import Any
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
 from dubins_traffic.problem.files import parse_json
-from dubins_traffic.suites.cases import case_instance
+from dubins_traffic.suites.cases import case_instances
 from dubins_traffic.suites.suite import Suite
 
 
@@ -34,8 +34,7 @@ def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
         {"name": _name(path, folder), "document": parse_json(read_text(path), str(path))} for path in files
     ]
     document = {"version": 0, "name": name, "title": title, "cases": entries}
-    for entry in Suite.from_document(document, str(folder)).model.cases or ():
-        case_instance(entry)
+    case_instances(Suite.from_document(document, str(folder)).model.cases or ())
     return document
 
 
