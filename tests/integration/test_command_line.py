@@ -357,7 +357,7 @@ def test_completion_offers_commands_configurations_and_controllers():
         ran = subprocess.run([COMMAND], env=environment, capture_output=True, text=True, check=False)
         return ran.stdout.split()
 
-    assert complete("dubins-traffic re") == ["replay"]
+    assert complete("dubins-traffic rep") == ["replay"]
     assert complete("dubins-traffic run mc") == [CONFIG]
     assert complete("dubins-traffic run demo --controller l") == ["lanes"]
     assert options.shipped("de") == ["demo"]

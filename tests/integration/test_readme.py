@@ -34,7 +34,7 @@ def runnable(page: str) -> list[tuple[str, str]]:
 def run_block(language: str, text: str, folder: Path) -> None:
     """Run a block of shell or Python in `folder`, or save it if its first line names a file.
 
-    On standard error stand the files that were written, and nothing else.
+    On standard error stand the files that were written, and what a search has not met, and nothing else.
     """
     named = FILE_NAME.match(text)
     if named:
@@ -50,7 +50,8 @@ def run_block(language: str, text: str, folder: Path) -> None:
         text=True,
         check=False,
     )
-    told = [line for line in ran.stderr.splitlines() if not (folder / line).exists()]
+    said = [line for line in ran.stderr.splitlines() if not line.endswith("cells were never put to the test")]
+    told = [line for line in said if not (folder / line).exists()]
     assert (ran.returncode, told) == (0, []), text
 
 

@@ -16,6 +16,7 @@ from tests.rules_scripts import Frame, flags, instance, label
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "task.md"
 PICTURES = ROOT / "docs" / "pictures"
+ANY = re.compile(r"!\[[^\]]+\]\(pictures/([^)/]+)\)")
 SHOWN = re.findall(r"!\[[^\]]+\]\(pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8"))
 
 
@@ -29,7 +30,9 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_shows_each_picture_once_and_the_command_draws_them_all(drawn: Path) -> None:
     assert len(SHOWN) == len(set(SHOWN)) > 10
     assert sorted(SHOWN) == sorted(file.name for file in drawn.iterdir())
-    assert sorted(SHOWN) == sorted(file.name for file in PICTURES.glob("*.svg"))
+    pages = [path for path in PAGE.parent.glob("*.md") if path != PAGE]
+    elsewhere = {name for path in pages for name in ANY.findall(path.read_text(encoding="utf-8"))}
+    assert sorted({*SHOWN} | elsewhere) == sorted(file.name for file in PICTURES.glob("*.svg"))
 
 
 def test_pictures_are_small() -> None:

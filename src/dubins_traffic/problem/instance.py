@@ -10,10 +10,12 @@ from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
 from dubins_traffic.problem.bend_preconditions import check_bends
-from dubins_traffic.problem.kinds import NUDGED
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
+
+NUDGED = "nudged"
+"""The kind of e-agent that does what another kind does, late and with noise."""
 
 
 @dataclass(frozen=True, slots=True)

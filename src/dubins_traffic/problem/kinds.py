@@ -24,6 +24,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault, parse
+from dubins_traffic.problem.instance import NUDGED
 
 Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
@@ -269,7 +270,6 @@ class Remote(Strict):
 
 COUNTER = "counter"
 REMOTE = "remote"
-NUDGED = "nudged"
 NUDGEABLE: frozenset[str] = frozenset(
     {"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"}
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.rules.breach_log import RULES
+from dubins_traffic.rules import breach_log
 from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 EGO_NAME = "ego"
 """Name of the ego among the cars."""
-EGO_RULES = tuple(rule for rule in RULES if not rule.startswith("E"))
+EGO_RULES = tuple(rule for rule in breach_log.RULES if not rule.startswith("E"))
 """The rules of the ego that a finite run can break."""
 HELD: Final[Status] = "presumably true"
 PENDING: Final[Status] = "presumably false"
