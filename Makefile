@@ -5,10 +5,10 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 
 BIN := .venv/bin
-WORKERS ?= 3
+WORKERS ?= 4
 SETUP := pyproject.toml constraints.txt scripts/setup.sh
 
-.PHONY: help setup demo test test-all golden docs release check format bench clean
+.PHONY: help setup demo test kernels tools test-all golden docs results release check format bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
@@ -19,26 +19,44 @@ demo: .venv/.installed-plot ## three trials with two controllers, scored, drawn 
 	@$(BIN)/python examples/compare.py demo demo-output --controllers lanes simple --trials 3
 
 test: .venv/.installed-dev ## all checks, then all tests
+	@$(MAKE) --no-print-directory --jobs=3 check tools kernels
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+
+kernels: .venv/.installed-dev
+	-@$(BIN)/dubins-traffic warm --all
+
+tools: .venv/.installed-dev
 	@scripts/system-packages.sh
 	@scripts/crosscheck-tools.sh
 	@scripts/gazebo.sh
-	@$(MAKE) --no-print-directory check
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 test-all: test ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
+	DUBINS_TRAFFIC_MUTANTS=full $(BIN)/python -m pytest tests/integration/test_search_of_mutants.py -k mutant_stands
+	DUBINS_TRAFFIC_SPECIFICATIONS=full $(BIN)/python -m pytest tests/crosscheck/test_game_specifications.py
+	@scripts/crosscheck-tools.sh acacia
+	$(BIN)/python -m pytest tests/crosscheck/acacia_winners.py
 	$(BIN)/python -m tests.judge_trials 500
+	$(BIN)/python -m tests.judge_trials 2000 bent
+	DUBINS_TRAFFIC_SUITE_TRIALS=4 $(BIN)/python -m pytest tests/integration/test_suite.py
 	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py \
 		tests/integration/test_service_full_disks.py tests/integration/test_service_ray.py
 	DUBINS_TRAFFIC_SERVED_TRIALS=1000 $(BIN)/python -m pytest tests/integration/test_served_frames.py
 	DUBINS_TRAFFIC_ATTACKS=all $(BIN)/python -m pytest tests/sandbox/test_second_version.py
-	$(BIN)/python -m benchmarks verify odd_egos rules
+	DUBINS_TRAFFIC_PAGES=all $(BIN)/python -m pytest tests/integration/test_docs_code.py \
+		tests/integration/test_readme.py -k runs
+	DUBINS_TRAFFIC_ESTIMATES=full $(BIN)/python -m pytest tests/integration/test_falsify.py \
+		tests/integration/test_falsify_targets.py -k "splitting or million or guides"
+	$(BIN)/python -m benchmarks verify odd_egos rules towns
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json
 	$(BIN)/python -m tests.golden.hashes
 
 docs: .venv/.installed-dev ## the site of the documentation, in build/site; warnings are errors
 	$(BIN)/python website/build.py
+
+results: .venv/.installed-dev ## run the shipped suites with the built-in controllers; the site shows what is in website/results: an hour
+	$(BIN)/python website/results.py
 
 release: .venv/.installed-dev ## wheel and source distribution in dist/, each tried in an environment of its own for every Python here
 	@scripts/release.sh

@@ -7,11 +7,12 @@ two minutes more. Its parts `queries`, `generation` and `peers` are run by thems
 `motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `rendering`, `monitors`, `lcm`, `sandbox`: about a
 minute; `envs`, which compiles an earlier commit, two and more; `first_use`, with empty caches of kernels, some;
 `service`, `ros1`: three; `first_submission`, which installs the package: one; `verify` runs 500 short trials and
-verifies their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so does
-`odd_egos` for its 2,000; `synthesis` solves its games in about two minutes; `campaign` runs 300,000 short trials in as
-many; `competition` judges 1,000 trials of strangers twice and `shield` runs 22,000 of a minute each, a quarter of an
-hour both; `adversaries` 10,000 episodes of a minute, in half an hour, and so does `synthesized` for its 2,000 of 300 s;
-`falsify` searches some million trials, in hours.
+verifies their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so do
+`odd_egos` for its 2,000 and `towns` for its 200, which installs SUMO first where that is missing; `synthesis` solves
+its games in about two minutes; `campaign` runs 300,000 short trials in as many; `competition` judges 1,000 trials of
+strangers twice and `shield` runs 24,200 of a minute each, a quarter of an hour both; `adversaries` 10,000 episodes of a
+minute, in half an hour, and so does `synthesized` for its 2,000 of 300 s; `estimate` splits some 500,000 trials in a
+quarter of an hour; `shrinking` shrinks 40 cases in some minutes; `falsify` searches some million trials, in hours.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ NAMES = (
     "rules",
     "verify",
     "odd_egos",
+    "towns",
     "shield",
     "lcm",
     "ros1",
@@ -45,6 +47,8 @@ NAMES = (
     "synthesized",
     "counter",
     "falsify",
+    "shrinking",
+    "estimate",
     "adversaries",
     "gazebo",
     "campaign",

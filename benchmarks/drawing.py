@@ -12,15 +12,23 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 
 
-def random_roads(draws: Draws, largest: int, density: float) -> dict[str, Any]:
+def random_roads(draws: Draws, largest: int, density: float, bent: float = 0.0) -> dict[str, Any]:
     """Return the network of a configuration: random, with 6 to `largest` intersections.
 
-    It has anything from a tree to, of the segments that a grid has more than a tree, the share `density`.
+    It has anything from a tree to, of the segments that a grid has more than a tree, the share `density`;
+    about a share `bent` of them bend.
     """
     intersections = draws.between(6, largest)
     most = math.floor(2 * intersections - 2 * math.sqrt(intersections))
     segments = draws.between(intersections - 1, int(intersections + density * (most - intersections)))
-    return {"random": {"intersections": intersections, "segments": segments, "rigid_motion": True}}
+    return {
+        "random": {
+            "intersections": intersections,
+            "segments": segments,
+            "rigid_motion": True,
+            **({"bent": bent} if bent else {}),
+        }
+    }
 
 
 def random_trial(

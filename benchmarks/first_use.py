@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from benchmarks.table import Row
+from dubins_traffic.kernels.sources import PACKAGE
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 FIRST = (
@@ -25,7 +27,13 @@ FIRST = (
     "run town --controller rules --trials 1",
     "run town --controller rules --shield --trials 1",
 )
-COMPILED = (*FIRST, "run demo --trials 1", "batch town --trials 4")
+COMPILED = (
+    *FIRST,
+    "run demo --trials 1",
+    "run demo --controller lanes --trials 1",
+    "batch town --trials 4",
+)
+MANY = "run town --controller rules --trials 40"
 WARM = ("run demo --trials 1", "run town --controller rules --trials 1")
 BEFORE = "DUBINS_TRAFFIC_BEFORE"
 ROUNDS = 3
@@ -33,9 +41,11 @@ HELD = """
 import subprocess, sys
 from dubins_traffic.kernels.asking import locked
 with locked():
-    sys.exit(subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode)
+    count = int(sys.argv[1])
+    running = [subprocess.Popen(sys.argv[2:], stdout=subprocess.DEVNULL) for _ in range(count)]
+    sys.exit(max(process.wait() for process in running))
 """
-"""Runs a command while no companion can begin."""
+"""Runs a command so many times at once, while no companion can begin."""
 
 
 def measure() -> list[Row]:
@@ -45,6 +55,7 @@ def measure() -> list[Row]:
         rows += _first(command)
     for command in COMPILED:
         rows.append(_compiling(command))
+    rows += [_many(), _workers(COMPILED[0]), _elsewhere(COMPILED[0])]
     for command in WARM:
         rows.append(_warm(command))
     return rows
@@ -87,10 +98,8 @@ def _drop(folder: Path) -> None:
 
 def _compiling(command: str) -> Row:
     with TemporaryDirectory() as folder:
-        variables = {"NUMBA_CACHE_DIR": folder}
-        _run(command, variables, [sys.executable, "-c", HELD, *COMMAND])
-        used = _run("", variables, [sys.executable, "-m", "dubins_traffic.kernels.companion"])[1]
-        count = len(list(Path(folder).rglob("*.kernel")))
+        used = _compile(command, folder)
+        count = len(_kernels(folder))
     figure = f"{used:.1f} s of processor time, {count} kernels"
     if BEFORE not in os.environ:
         return Row(f"{command}, compiling", figure, "-", count > 0)
@@ -101,6 +110,51 @@ def _compiling(command: str) -> Row:
     return Row(
         f"{command}, compiling", f"{figure}, {part:.2f} of {before:.1f} s before", "<= 0.3", part <= 0.3
     )
+
+
+def _compile(command: str, folder: str, count: int = 1) -> float:
+    """Compile what `count` processes at once ask for; return the processor time of that, seconds."""
+    variables = {"NUMBA_CACHE_DIR": folder}
+    _run(command, variables, [sys.executable, "-c", HELD, str(count), *COMMAND])
+    return _run("", variables, [sys.executable, "-m", "dubins_traffic.kernels.companion"])[1]
+
+
+def _kernels(folder: str) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in Path(folder).rglob("*.kernel")}
+
+
+def _many() -> Row:
+    """Return whether work that goes over on its way is done as soon as work that waits for its kernels."""
+    with TemporaryDirectory() as folder:
+        over = _run(MANY, {"NUMBA_CACHE_DIR": folder})[0]
+        _drop(Path(folder))
+    with TemporaryDirectory() as folder:
+        waiting = _run(MANY, {"NUMBA_CACHE_DIR": folder, "DUBINS_TRAFFIC_KERNELS": "compiled"})[0]
+    part = over / waiting
+    return Row(f"{MANY}, empty cache", f"{over:.1f} s, {part:.2f} of compiling first", "<= 1.1", part <= 1.1)
+
+
+def _workers(command: str) -> Row:
+    """Return what two workers take to compile, against one."""
+    with TemporaryDirectory() as folder:
+        one = _compile(command, folder)
+    with TemporaryDirectory() as folder:
+        two = _compile(command, folder, 2)
+    figure = f"{two:.1f} s of processor time, {two / one:.2f} of one"
+    return Row(f"{command}, two at once, compiling", figure, "<= 1.2", two <= 1.2 * one)
+
+
+def _elsewhere(command: str) -> Row:
+    """Return what the same version in another place compiles, with the cache of the first."""
+    with TemporaryDirectory() as folder, TemporaryDirectory() as place:
+        _compile(command, folder)
+        before = _kernels(folder)
+        copy = Path(place) / PACKAGE.name
+        shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        _run(command, {"NUMBA_CACHE_DIR": folder, "PYTHONPATH": place})
+        asked = len(list(Path(folder).glob("*/asked-*/*.json")))
+        fresh = len(_kernels(folder).items() - before.items()) + asked
+    return Row(f"{command}, installed again elsewhere", f"{fresh} kernels compiled", "0", fresh == 0)
 
 
 def _warm(command: str) -> Row:

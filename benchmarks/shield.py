@@ -1,12 +1,13 @@
 """Random, hostile and broken controllers under the shield among `lawful` e-agents: does the ego keep rules 1 to 3?
 
     python -m benchmarks shield
-    python -m benchmarks.shield [TRIALS] [JOBS] [FIRST]
+    python -m benchmarks.shield [TRIALS] [JOBS] [FIRST] [BENT]
 
 Each trial is 60 s on a random network of 6 to 40 intersections with 1 to 6 e-agents. One in four has obstacles in and
 beside the lanes, in one in four the ego starts in any direction but backward, in one in eight cars have other bodies
 or bounds, one in sixteen has 8 to 12 e-agents on 6 to 8 intersections. The kinds of `benchmarks.shield_hostile` take
 turns. A tenth as many trials are driven by the controller `rules` itself: in how many does the shield step in?
+Then the same on networks of which seven in ten segments bend, BENT = 0.7, in a tenth as many trials.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,11 +40,14 @@ from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.shield.nearest_command import shield
-from dubins_traffic.shield.tables import REASONS, egos, guards
+from dubins_traffic.shield.tables import REASONS, egos, shield_tables
 
 DURATION = 60.0
 SEED = 2016
 TOGETHER = 240
+TRIALS, TRIALS_ON_BENDS = 20000, 2000
+BENT = 0.7
+"""About this share of the segments bends in the trials on roads that bend."""
 BODIES: tuple[dict[str, Any], ...] = (
     {"body": {"rectangle": {"length": 0.4, "width": 0.25}}},
     {"bounds": {"turning_radius": 0.26}},
@@ -74,11 +79,11 @@ class Shielded:
     distance: float
 
 
-def instance(number: int, seconds: float = DURATION) -> Instance:
-    """Return the random instance of a number."""
+def instance(number: int, seconds: float = DURATION, bent: float = 0.0) -> Instance:
+    """Return the random instance of a number; about a share `bent` of its segments bend."""
     draws = Draws(SEED, number, 907)
     crowded, blocked, turned, other = (draws.below(n) == 0 for n in (16, 4, 4, 8))
-    network = random_roads(draws, 8 if crowded else 40, 0.5)
+    network = random_roads(draws, 8 if crowded else 40, 0.5, bent)
     agents = e_agents("lawful", draws.between(8, 12) if crowded else draws.between(1, 6), draws)
     more: dict[str, Any] = {"car": BODIES[draws.below(len(BODIES))]} if other else {}
     if blocked:
@@ -98,17 +103,22 @@ def _obstacles(bare: Instance, draws: Draws) -> list[dict[str, Any]]:
     network = bare.problem.network
     found: list[dict[str, Any]] = []
     for _ in range(max(2, network.lanes // 4)):
-        (x0, y0), (x1, y1) = network.lane_line(draws.below(network.lanes), draws.uniform(-0.7, 0.1))
-        share = draws.uniform(0.3, 0.7)
+        lane, left, share = draws.below(network.lanes), draws.uniform(-0.7, 0.1), draws.uniform(0.3, 0.7)
+        (x0, y0), (x1, y1) = network.lane_line(lane, left)
         x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+        if network.bent[lane >> 1]:
+            (place,), (way,) = network.lane_places(lane, np.array([share * network.lengths[lane >> 1]]))
+            x, y = float(place[0] - left * way[1]), float(place[1] + left * way[0])
         found.append({"disc": {"x": x, "y": y, "radius": draws.uniform(0.05, 0.2)}})
     return found
 
 
-def trials(numbers: Sequence[int], seconds: float = DURATION, kinds: Sequence[str] = KINDS) -> list[Shielded]:
-    """Run trials together, the `kinds` taking turns."""
+def trials(
+    numbers: Sequence[int], seconds: float = DURATION, kinds: Sequence[str] = KINDS, bent: float = 0.0
+) -> list[Shielded]:
+    """Run trials together, the `kinds` taking turns; about a share `bent` of the segments bend."""
     found: list[Shielded] = []
-    for own in grouped([instance(number, seconds) for number in numbers]):
+    for own in grouped([instance(number, seconds, bent) for number in numbers]):
         found += _run(own, [kinds[(one.trial + one.trial // len(kinds)) % len(kinds)] for one in own])
     return found
 
@@ -123,10 +133,10 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
     )
     bodies = pack_obstacles([problem.obstacles for problem in problems])
     law, drivers = egos(problems, places, net), egos(problems, places, net)
-    room = scratch(places, int(np.diff(roads.seg_off).max()))
+    room = scratch(places, int(np.diff(roads.seg_off).max()), bodies)
     traffic = Traffic(group.state, group.labels, roads, bodies, drivers, room)
     by_law = traffic.replace(drivers=law)
-    watch = guards(problems, traffic)
+    watch = shield_tables(problems, traffic)
     hostile = Hostile(kinds, law.vehicle, net, roads, SEED + own[0].trial)
     reasons = np.zeros((count, len(REASONS)), dtype=np.int64)
     passed, aside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
@@ -166,9 +176,9 @@ def _shielded(
     )
 
 
-def ruled(number: int, seconds: float = DURATION) -> Shielded:
+def ruled(number: int, seconds: float = DURATION, bent: float = 0.0) -> Shielded:
     """Run a trial of the controller `rules` under the shield."""
-    driver, own = Shield("rules"), instance(number, seconds)
+    driver, own = Shield("rules"), instance(number, seconds, bent)
     score = run_trial(own, driver).score
     return _shielded(
         own, "rules", score, {"": driver.shield_filter.count} if driver.shield_filter.count else {}
@@ -204,27 +214,31 @@ def _breaches(kind: str, found: Sequence[Shielded]) -> Row:
     return Row(f"{kind}, {len(found)} trials: with a breach of rules 1 to 3", str(broke), "0", broke == 0)
 
 
-def measured(count: int = 20000, jobs: int = 2, first: int = 0) -> list[Shielded]:
-    """Run `count` trials of the hostile kinds and a tenth as many of `rules`, in `jobs` processes."""
+def measured(count: int = TRIALS, jobs: int = 2, first: int = 0, bent: float = 0.0) -> list[Shielded]:
+    """Run `count` trials of the hostile kinds and a tenth as many of `rules`, in `jobs` processes.
+
+    About a share `bent` of the segments bends.
+    """
     numbers = range(first, first + count)
     parts = [numbers[k : k + TOGETHER] for k in range(0, count, TOGETHER)]
     found: list[Shielded] = []
     with ProcessPoolExecutor(jobs) as pool:
-        for part in pool.map(trials, parts):
+        for part in pool.map(partial(trials, bent=bent), parts):
             found += part
             print(f"{len(found)} of {count}", file=sys.stderr, end="\r", flush=True)
-        found += pool.map(ruled, range(first, first + max(count // 10, 1)), chunksize=8)
+        found += pool.map(partial(ruled, bent=bent), range(first, first + max(count // 10, 1)), chunksize=8)
     return found
 
 
 def measure() -> list[Row]:
     """Run all trials and return the table of the bars."""
-    return bars(measured())
+    on_bends = bars(measured(TRIALS_ON_BENDS, bent=BENT))
+    return bars(measured()) + [replace(row, name=f"on roads that bend: {row.name}") for row in on_bends]
 
 
 def main() -> None:
     """Print what is remarkable, and the table."""
-    found = measured(*(int(argument) for argument in sys.argv[1:4]))
+    found = measured(*(int(argument) for argument in sys.argv[1:4]), bent=float((sys.argv[4:] or ["0"])[0]))
     for one in found:
         if one.own or one.at_fault or (one.kind == "rules" and one.reasons):
             print(one)

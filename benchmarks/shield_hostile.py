@@ -13,6 +13,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.routing.lane_graph import foot
 from dubins_traffic.rules.propositions import FLAG
 
 LAG = 15
@@ -230,6 +231,11 @@ class Hostile:
         sign = np.where(forth, 1.0, -1.0)
         tx, ty = sign * row["tx"], sign * row["ty"]
         across = tx * (y - row["y"]) - ty * (x - row["x"])
+        for b in np.flatnonzero(row["piece"] >= 0).tolist():
+            own = 2 * int(segment[b]) if lane[b] < 0 else int(lane[b])
+            _, left, ux, uy, _ = foot(self._roads, int(self._net[b]), own, float(x[b]), float(y[b]))
+            away = lane[b] < 0 and ux * c[b] + uy * s[b] < 0.0
+            tx[b], ty[b], across[b] = (-ux, -uy, -left) if away else (ux, uy, left)
         return np.stack([tx, ty, across, self._vehicles["middle"]], axis=1)
 
 

@@ -78,8 +78,10 @@ class Events:
         pass
 
 
-def instance(number: int, seconds: float = DURATION, seed: int = 2016) -> Instance:
-    """Return the instance of a number: on the grid if it is even, else on a random network."""
+def instance(
+    number: int, seconds: float = DURATION, seed: int = 2016, network: dict[str, Any] | None = None
+) -> Instance:
+    """Return the instance of a number: on the grid if it is even, else on a random network; on another if given."""
     draws = Draws(seed, number, 902)
     agents: list[dict[str, Any]] = [
         {
@@ -91,6 +93,8 @@ def instance(number: int, seconds: float = DURATION, seed: int = 2016) -> Instan
     ]
     if draws.below(2):
         agents[0] = {"type": "nemesis", "name": "nemesis"}
+    if network is not None:
+        return random_trial(network, agents, seconds, seed, number, rules=True)
     network = GRID if number % 2 == 0 else random_roads(draws, 9, 1.0)
     drawn = random_trial(network, agents, seconds, seed, number, rules=True)
     return replace(drawn, problem=replace(drawn.problem, goals=CORNERS)) if number % 2 == 0 else drawn

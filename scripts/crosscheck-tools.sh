@@ -1,21 +1,29 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona. What is there already is left alone.
+# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona.
+# With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
+# Two are installed at a time, by the pip of .venv: to put one into each environment takes longer than most of the tools.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=build/crosscheck
 # Old source packages are built with a setuptools that still has pkg_resources, also where pip builds apart.
 export PIP_CONSTRAINT="$PWD/scripts/crosscheck-constraints.txt"
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+logs=$(mktemp -d)
+trap 'rm -rf "$logs"' EXIT
+log=$logs/apt
+
+own=.venv/bin/python
+base=$own
 
 environment() { # name, module, packages...
-  local name=$1 module=$2 python=$folder/$1/bin/python
+  local name=$1 module=$2 python=$folder/$1/bin/python log=$logs/$1
+  local pip=("$own" -m pip --python "$python") without=(--without-pip)
+  [ "$base" = "$own" ] || { pip=("$python" -m pip) without=(); }
   shift 2
   if [ -x "$python" ] && "$python" -c "import $module" >/dev/null 2>&1; then return; fi
-  if .venv/bin/python -m venv --clear "$folder/$name" >"$log" 2>&1 &&
-    "$python" -m pip install --quiet --disable-pip-version-check "$@" >>"$log" 2>&1 &&
+  if "$base" -m venv --clear "${without[@]}" "$folder/$name" >"$log" 2>&1 &&
+    "${pip[@]}" install --quiet --disable-pip-version-check --no-compile "$@" >>"$log" 2>&1 &&
     "$python" -c "import $module" >>"$log" 2>&1; then
     echo "crosscheck-tools: installed $name"
   else
@@ -25,14 +33,27 @@ environment() { # name, module, packages...
 }
 
 mkdir -p "$folder"
-environment stormpy stormpy 'stormpy==2.0.0'
+{
+  environment stormpy stormpy 'stormpy==2.0.0'
+  environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
+  environment sumo sumo 'eclipse-sumo==1.28.0'
+  environment lanelet2 lanelet2.io 'lanelet2==1.2.3'
+} &
 environment rtamt rtamt 'rtamt==0.4.10' setuptools
-environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
-environment sumo sumo 'eclipse-sumo==1.28.0'
 environment commonroad commonroad.common.file_reader 'commonroad-io==2026.1'
-environment lanelet2 lanelet2.io 'lanelet2==1.2.3'
+wait
+
+if [ "${1:-}" = acacia ]; then
+  newer=$(compgen -G "${PYENV_ROOT:-$HOME/.pyenv}/versions/3.13*/bin/python3.13" | head -n 1 || true)
+  newer=${newer:-$(command -v python3.13 || true)}
+  if [ -n "$newer" ] && "$newer" -c 'import ensurepip, venv' 2>/dev/null; then
+    base=$newer environment acacia acacia_boomslang 'acacia-boomslang==2.7.2'
+  else
+    echo "crosscheck-tools: Acacia-Bonsai wants Python 3.13, which is not here"
+  fi
+fi
 
 missing=()
 for program in spin mona; do

@@ -3,6 +3,7 @@
 # to 3.14 that is found. The same trial must give the same score everywhere.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+unset PYTHONPATH # what is tried is what is installed
 root=$PWD
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

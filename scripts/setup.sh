@@ -38,6 +38,9 @@ if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
   "$python" -m venv --clear .venv
 fi
 echo "setup: installing dubins-traffic[$extra] into .venv"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[$extra]"
+.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[$extra]"
+# On all processors, as pip doesn't; but for what nobody here imports, a third of it, which would be compiled when it is.
+# Some packages hold files that are no Python, at which this ends with another status.
+.venv/bin/python -m compileall -qq -j 0 -x "/(tests|rllib|tune|serve|train|dashboard|devtools)/|/faker/providers/" .venv/lib || true
 touch ".venv/.installed-$extra"
 if [ "$extra" = dev ]; then touch .venv/.installed-plot; fi

@@ -26,15 +26,18 @@ def need_browser() -> None:
 
 
 @contextmanager
-def browsing(profile: Path, width: int = 1280, height: int = 800) -> Iterator[webdriver.Chrome]:
-    """Run a browser with a window of so many pixels; its profile is kept in a folder."""
+def browsing(
+    profile: Path, width: int = 1280, height: int = 800, *, traffic: bool = False
+) -> Iterator[webdriver.Chrome]:
+    """Run a browser with a window of so many pixels; its profile is kept in a folder. `traffic`: logs requests, too."""
     if CHROMIUM is None or DRIVER is None:
         pytest.fail(REASON)
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in (*FLAGS.split(), f"--window-size={width},{height}", f"--user-data-dir={profile}"):
         options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    logs = {"browser": "ALL", **({"performance": "ALL"} if traffic else {})}
+    options.set_capability("goog:loggingPrefs", logs)
     driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
     try:
         yield driver

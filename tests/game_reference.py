@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, permutations, product
 from typing import Any
 
@@ -34,21 +35,40 @@ class Reference:
     frees: bool = True
     order_degree: int = 1
 
-    def neighbours(self, point: Point) -> list[Point]:
-        return sorted({b for a, b in self.roads if a == point} | {a for a, b in self.roads if b == point})
+    @cached_property
+    def _neighbours(self) -> dict[Point, list[Point]]:
+        ends = [end for road in self.roads for end in (road, road[::-1])]
+        return {point: sorted({b for a, b in ends if a == point}) for point, _ in ends}
+
+    @cached_property
+    def _nodes(self) -> dict[State, State]:
+        """The cell into which each lane leads."""
+        found: dict[State, State] = {}
+        for before, point in [end for road in self.roads for end in (road, road[::-1])]:
+            bend = not self.crossing(point) and len(self._neighbours[point]) == 2
+            found["lane", before, point] = ("node", point, before) if bend else ("node", point)
+        return found
+
+    @cached_property
+    def _exits(self) -> dict[State, list[State]]:
+        return {
+            node: [
+                ("lane", node[1], point)
+                for point in self._neighbours[node[1]]
+                if len(node) == 2 or point != node[2]
+            ]
+            for node in self._nodes.values()
+        }
 
     def crossing(self, point: Point) -> bool:
-        return len(self.neighbours(point)) >= self.order_degree
+        return len(self._neighbours[point]) >= self.order_degree
 
     def node(self, lane: State) -> State:
         """Return the cell into which a lane leads."""
-        _, before, point = lane
-        bend = not self.crossing(point) and len(self.neighbours(point)) == 2
-        return ("node", point, before) if bend else ("node", point)
+        return self._nodes[lane]
 
     def exits(self, node: State) -> list[State]:
-        others = [point for point in self.neighbours(node[1]) if len(node) == 2 or point != node[2]]
-        return [("lane", node[1], point) for point in others]
+        return self._exits[node]
 
     def cells(self) -> list[State]:
         lanes = [("lane", a, b) for a, b in self.roads] + [("lane", b, a) for a, b in self.roads]

@@ -45,26 +45,34 @@ class Grammar:
         return self.place == len(self.tokens)
 
 
+TLSF = ("inputs", "outputs", "initially", "preset", "require", "assert", "assume", "guarantee")
+
+
 def tlsf_sections(text: str) -> dict[str, list[str]]:
-    """Return the items of a document in TLSF, which must keep its grammar: inputs, outputs, assume, guarantee."""
+    """Return the items of a document in TLSF, which must keep its grammar, by section."""
     item = r"(?:    [^;{}]+;\n)*"
+    own = "".join(rf"(?:  {name.upper()} \{{\n(?P<{name}>{item})  \}}\n)?" for name in TLSF)
     main = re.fullmatch(
-        r"INFO \{\n  TITLE: \"[^\"]*\"\n  DESCRIPTION: \"[^\"]*\"\n  SEMANTICS: Mealy\n  TARGET: Mealy\n\}\n\n"
-        rf"MAIN \{{\n  INPUTS \{{\n(?P<inputs>{item})  \}}\n  OUTPUTS \{{\n(?P<outputs>{item})  \}}\n"
-        rf"  ASSUME \{{\n(?P<assume>{item})  \}}\n  GUARANTEE \{{\n(?P<guarantee>{item})  \}}\n\}}\n",
+        r"INFO \{\n  TITLE: \"[^\"]*\"\n  DESCRIPTION: \"[^\"]*\"\n  SEMANTICS: Mealy,Strict\n  TARGET: Mealy\n\}\n\n"
+        rf"MAIN \{{\n{own}\}}\n",
         text,
     )
     assert main is not None
     sections = {
-        name: [line.strip().removesuffix(";") for line in body.splitlines()]
+        name: [line.strip().removesuffix(";") for line in (body or "").splitlines()]
         for name, body in main.groupdict().items()
     }
     signals = sections["inputs"] + sections["outputs"]
     assert len(set(signals)) == len(signals)
     assert all(re.fullmatch(r"[a-z]\w*", name) for name in signals)
-    for line in sections["assume"] + sections["guarantee"]:
-        assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), line
-        assert set(re.findall(r"[a-z]\w*", line)) <= set(signals), line
+    for name in TLSF[2:]:
+        for line in sections[name]:
+            assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), (
+                line
+            )
+            assert set(re.findall(r"[a-z]\w*", line)) <= set(signals), line
+            temporal = set(re.findall(r"\b[XFGUR]\b", line))
+            assert name in TLSF[6:] or temporal <= ({"X"} if name in TLSF[4:6] else set()), line
     return sections
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from dubins_traffic.agents.choices import drawn, with_choices
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.engine.controlled import BatchView
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.problem.configuration import load_config
@@ -37,7 +36,7 @@ class Ticketed(Mutant):
         stopped, known = view.has(FLAG.STOPPED), view.block.tickets[view.rows]
         known = np.where(stopped, np.where(known < 0, view.tick[:, None], known), -1)
         view.block.tickets[view.rows] = known
-        ticks = np.array([self.group * view.block.problems[row].rate for row in view.rows.tolist()])[:, None]
+        ticks = (self.group * view.block.rates[view.rows])[:, None]
         there = view.at_ego()
         tied = there & (np.abs(known - known[:, :1]) <= ticks)
         before = there & ~tied & (known < known[:, :1])
@@ -96,9 +95,13 @@ class StopsLate(Mutant):
 
 
 class BlindSector(Mutant):
-    """It does not see who is in a sector of 50 degrees on its right."""
+    """It does not see who is in a sector of 58 degrees on its right.
 
-    low, high = -1.75, -0.87
+    From the line nobody is farther right than 45 degrees who is still in the disc: a sector that begins behind that
+    hides nothing.
+    """
+
+    low, high = -1.75, -0.74
 
     def see(self, view: Seen) -> None:
         _, bearing = view.bearings()
@@ -118,11 +121,10 @@ class ClearEarly(Mutant):
     def see(self, view: Seen) -> None:
         inside = (view.labels.crosses == view.end[:, :1]) & view.seen & (view.end[:, :1] >= 0)
         inside[:, EGO] = False
-        vertex = np.maximum(view.end[:, EGO], 0)
-        problems = [view.block.problems[row] for row in view.rows.tolist()]
-        points = np.array([own.network.points[v] for own, v in zip(problems, vertex.tolist(), strict=True)])
-        edge = np.array([own.intersection_radius + own.car.body.reach for own in problems])
-        far = view.state.speed * np.array([own.period for own in problems])[:, None]
+        block, rows = view.block, view.rows
+        points = block.points[rows, np.maximum(view.end[:, EGO], 0)]
+        edge = block.radius[rows] + block.reach[rows]
+        far = view.state.speed / block.rates[rows, None]
         x = view.state.x + far * view.state.c - points[:, :1]
         y = view.state.y + far * view.state.s - points[:, 1:]
         leaves = np.hypot(x, y) >= edge[:, None]
@@ -136,17 +138,14 @@ class LeftLong(Mutant):
         left = view.has(FLAG.LEFT)[:, EGO]
         since = view.block.since
         since[view.rows] = np.where(left, np.where(since[view.rows] < 0, view.tick, since[view.rows]), -1)
-        rates = np.array([view.block.problems[row].rate for row in view.rows.tolist()])
+        rates = view.block.rates[view.rows]
         waits = left & (view.tick - since[view.rows] < 12.0 * rates)
         view.block.latched[view.rows] = waits
 
-    def act_batch(self, view: BatchView) -> Floats:
-        answer = super().act_batch(view)
-        for k, trial in enumerate(view.trial.tolist()):
-            block, row = self._places[trial]
-            near = block.latched[row] and view.tick[k] - block.since[row] > block.problems[row].rate
-            answer[k] = 0.0 if near else answer[k]
-        return answer
+    def driven(self, view: Seen, answer: Floats) -> Floats:
+        block, rows = view.block, view.rows
+        waits = block.latched[rows] & (view.tick - block.since[rows] > block.rates[rows])
+        return np.where(waits[:, None], 0.0, answer)
 
 
 class ReturnsEarly(Mutant):
@@ -157,8 +156,7 @@ class ReturnsEarly(Mutant):
         beside = (bearing < -0.2) & (bearing > -2.9) & (away < 1.2) & view.has(FLAG.LEFT)[:, :1]
         beside[:, EGO] = False
         view.seen[beside] = False
-        for row in view.rows[view.has(FLAG.LEFT)[:, EGO]].tolist():
-            view.block.drivers.car[row, EGO].aside = 0.0
+        view.block.drivers.car["aside"][view.rows[view.has(FLAG.LEFT)[:, EGO]], EGO] = 0.0
 
 
 class StopsShort(Mutant):
@@ -168,7 +166,7 @@ class StopsShort(Mutant):
         still = view.has(FLAG.APPROACH)[:, EGO] & (np.abs(view.state.speed[:, EGO]) < 1e-3)
         since = view.block.since
         since[view.rows] = np.where(still, np.where(since[view.rows] < 0, view.tick, since[view.rows]), -1)
-        rates = np.array([view.block.problems[row].rate for row in view.rows.tolist()])
+        rates = view.block.rates[view.rows]
         others = (view.end == view.end[:, :1]) & view.has(FLAG.APPROACH) & (view.end >= 0)
         soon = still & (view.tick - since[view.rows] >= 0.3 * rates) & (others.sum(axis=1) > 1)
         soon &= ~view.at_ego().any(axis=1)
@@ -178,8 +176,7 @@ class StopsShort(Mutant):
 class Swerves(Mutant):
     """It swerves to the left of who drives close ahead of it."""
 
-    def act_batch(self, view: BatchView) -> Floats:
-        answer = super().act_batch(view)
+    def driven(self, view: Seen, answer: Floats) -> Floats:
         x, y, c, s = view.state.x, view.state.y, view.state.c, view.state.s
         dx, dy = x - x[:, :1], y - y[:, :1]
         along = dx * c[:, :1] + dy * s[:, :1]

@@ -73,13 +73,14 @@ class Block:
         networks = [problem.network for problem in problems]
         roads, net = pack_distinct(networks, [problem.car.lane_width for problem in problems])
         self.drivers: Drivers = egos(problems, cars, net)
+        bodies = pack_obstacles([problem.obstacles for problem in problems])
         self.traffic = Traffic(
             State.zeros(len(problems), cars),
             Labels.zeros(len(problems), cars),
             roads,
-            pack_obstacles([problem.obstacles for problem in problems]),
+            bodies,
             self.drivers,
-            scratch(cars, int(np.diff(roads.seg_off).max())),
+            scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
         )
         self.commands = np.zeros((len(problems), cars, 2))
         lanes = max(network.lanes for network in networks)
@@ -90,23 +91,32 @@ class Block:
         self.since = np.full(len(problems), -1)
         self.latched = np.zeros(len(problems), dtype=np.bool_)
         self.vehicle = np.array(self.drivers.vehicle)
+        self.rates = np.array([problem.rate for problem in problems])
+        self.reach = np.array([problem.car.body.reach for problem in problems])
+        self.radius = np.array([problem.intersection_radius for problem in problems])
+        most = max(len(network.points) for network in networks)
+        self.points = np.zeros((len(problems), most, 2))
+        for row, network in zip(self.points, networks, strict=True):
+            row[: len(network.points)] = network.points
 
     def drive(self, tick: int, rows: Ints, view: Seen) -> Floats:
         """Return what the law does in those of the trials that go on, (K, 2)."""
-        order = np.argsort(~view.seen, axis=1, kind="stable")
-        state, labels, width = self.traffic.state, self.traffic.labels, order.shape[1]
-        for own, given in zip((*state[:6], *labels), (*view.state[:6], *view.labels), strict=True):
-            own[rows, :width] = np.take_along_axis(given, order, axis=1)
+        state, labels, width = self.traffic.state, self.traffic.labels, view.seen.shape[1]
+        given: list[npt.NDArray[np.generic]] = [*view.state[:6], *view.labels]
+        if not view.seen.all():
+            order = np.argsort(~view.seen, axis=1, kind="stable")
+            given = [np.take_along_axis(array, order, axis=1) for array in given]
+        for own, array in zip((*state[:6], *labels), given, strict=True):
+            own[rows, :width] = array
         state.count[rows] = view.seen.sum(axis=1)
+        driver = self.drivers.car
+        nowhere = driver["last"][rows, EGO] == driver["first"][rows, EGO]
         self.drivers.active[:] = 0
-        self.drivers.active[rows] = 1
-        for k in rows.tolist():
-            own = self.drivers.car[k, EGO]
-            if own.last == own.first:
-                self.drivers.active[k] = 0
-            elif own.place < 0:
-                lane, segment = int(labels.lane[k, EGO]), int(labels.segment[k, EGO])
-                own.place = nearest_stage(self.drivers.distance, own.first, own.last, lane, segment)
+        self.drivers.active[rows] = ~nowhere
+        for k in rows[~nowhere & (driver["place"][rows, EGO] < 0)].tolist():
+            own = driver[k, EGO]
+            lane, segment = int(labels.lane[k, EGO]), int(labels.segment[k, EGO])
+            own.place = nearest_stage(self.drivers.distance, own.first, own.last, lane, segment)
         self.commands[:, EGO] = 0.0
         decide(tick, self.commands, self.traffic)
         return self.commands[rows, EGO]
@@ -139,6 +149,8 @@ class Mutant:
         """Begin some trials together."""
         if not hasattr(self, "_places"):
             self._places: dict[int, tuple[Block, int]] = {}
+            self._parts: list[tuple[Block, Ints, Ints]] = []
+        self._running = np.zeros(0, dtype=np.int64)
         block = Block(problems)
         self.prepare(block)
         for row, trial in enumerate(trials):
@@ -146,26 +158,41 @@ class Mutant:
 
     def act_batch(self, view: BatchView) -> Floats:
         """Drive on in all trials that run."""
-        blocks: dict[int, list[int]] = {}
-        for k, trial in enumerate(view.trial.tolist()):
-            blocks.setdefault(id(self._places[trial][0]), []).append(k)
+        if not np.array_equal(view.trial, self._running):
+            self._sort(view.trial)
         answer = np.zeros((len(view.trial), 2))
-        for own in blocks.values():
-            block = self._places[int(view.trial[own[0]])][0]
-            rows = np.array([self._places[int(view.trial[k])][1] for k in own])
+        for block, own, rows in self._parts:
             cars = block.commands.shape[1]
-            arrays = [array[own][:, :cars].copy() for array in (*view.state[:6], *view.labels)]
-            lane = np.where(view.seen[own][:, :cars], arrays[9], -1)
+            arrays = [array[own, :cars] for array in (*view.state[:6], *view.labels, view.seen)]
+            lane = np.where(arrays[11], arrays[9], -1)
             seen = Seen(
-                view.tick[own], State(*arrays[:6], count=view.state.count[own]), Labels(*arrays[6:]),
-                view.seen[own][:, :cars].copy(), block.ends[rows[:, None], lane], rows, block,
+                view.tick[own], State(*arrays[:6], count=view.state.count[own]), Labels(*arrays[6:11]), arrays[11],
+                block.ends[rows[:, None], lane], rows, block,
             )  # fmt: skip
             self.see(seen)
-            answer[own] = block.drive(int(seen.tick[0]), rows, seen)
+            answer[own] = self.driven(seen, block.drive(int(seen.tick[0]), rows, seen))
         return answer
+
+    def _sort(self, trials: Ints) -> None:
+        """Note which of the trials that run belong to which block, and forget those that have ended."""
+        self._running = trials.copy()
+        running = trials.tolist()
+        self._places = {trial: self._places[trial] for trial in running}
+        parts: dict[int, list[int]] = {}
+        for k, trial in enumerate(running):
+            parts.setdefault(id(self._places[trial][0]), []).append(k)
+        self._parts = []
+        for own in parts.values():
+            places = [self._places[running[k]] for k in own]
+            self._parts.append((places[0][0], np.array(own), np.array([row for _, row in places])))
 
     def prepare(self, block: Block) -> None:
         """Change what the law is given of the cars; by default nothing."""
 
     def see(self, view: Seen) -> None:
         """Change what is seen; by default nothing."""
+
+    def driven(self, view: Seen, answer: Floats) -> Floats:
+        """Return what is done in place of what the law does, (K, 2); by default the same."""
+        del view
+        return answer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -320,8 +321,7 @@ class Reference:
                 return None
             return lateral - obstacle.radius, lateral + obstacle.radius
         found = []
-        corners = [self.coordinates(lane, *corner) for corner in obstacle.vertices]
-        for (s0, l0), (s1, l1) in zip(corners, corners[1:] + corners[:1], strict=True):
+        for (s0, l0), (s1, l1) in self.outline(lane, obstacle.vertices):
             cuts = [0.0, 1.0]
             if s0 != s1:
                 cuts += [(low - s0) / (s1 - s0), (high - s0) / (s1 - s0)]
@@ -330,6 +330,27 @@ class Reference:
                 if 0 <= u <= 1 and low - 1e-9 <= s <= high + 1e-9:
                     found.append(l0 + u * (l1 - l0))
         return (min(found), max(found)) if found else None
+
+    def outline(self, lane: tuple[int, int], vertices: Any) -> Any:
+        """The outline of an obstacle in coordinates of a lane; on bends by points, cut at the edges of the road."""
+        corners = list(zip(vertices, [*vertices[1:], vertices[0]], strict=True))
+        if lane[0] not in self.tracks:
+            return [tuple(self.coordinates(lane, *corner) for corner in pair) for pair in corners]
+        found = []
+        for one, other in corners:
+            count = max(1, math.ceil(math.dist(one, other) / 0.05 - 1e-9))
+            spots = []
+            for k in range(count + 1):
+                u = k / count
+                at = tuple(a + u * (b - a) for a, b in zip(one, other, strict=True))
+                s, lateral = self.coordinates(lane, *at)
+                spots.append((s, min(max(lateral, -self.w2), self.w2)))
+            found += [
+                (a, b)
+                for a, b in itertools.pairwise(spots)
+                if abs(a[0] - b[0]) <= 0.5 or min(abs(a[1]), abs(b[1])) < self.w2
+            ]
+        return found
 
     def overtake(self, car: Car) -> None:
         facts = car.facts

@@ -45,10 +45,10 @@ def games(**changes: Any) -> dict[str, Any]:
     return {"version": 0, "name": "small-games", "title": "Small", "games": entries, **changes}
 
 
-def cases(**changes: Any) -> dict[str, Any]:
-    """Return the document of a suite of three cases, with `changes`."""
+def cases(number: int = 3, **changes: Any) -> dict[str, Any]:
+    """Return the document of a suite of cases, with `changes`."""
     town = document()["campaign"]["configurations"][0]["document"]
-    instances = [draw(load_config(town), 3, trial) for trial in range(3)]
+    instances = [draw(load_config(town), 3, trial) for trial in range(number)]
     entries = [
         {"name": f"case-{k}", "document": instance_to_document(one)} for k, one in enumerate(instances)
     ]

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Timer
+from typing import Any
 
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "crosscheck"
+PATIENCE_S = 600.0
 
 
 def interpreter_with(tool: str) -> str:
@@ -16,9 +24,85 @@ def interpreter_with(tool: str) -> str:
     return _found(str(FOLDER / tool / "bin" / "python"), tool)
 
 
+def sumo_program(name: str) -> str:
+    """Return the path of one of SUMO's own programs, in its package: it runs wherever the environment stands."""
+    environment = Path(interpreter_with("sumo")).parents[1]
+    return str(next(environment.glob("lib/python*/site-packages/sumo/bin")) / name)
+
+
 def program(name: str) -> str:
     """Return the path of a program; skip the test, or fail it under CI, where there is none."""
     return _found(shutil.which(name) or "", name)
+
+
+class Solver:
+    """A program that other people's Python runs: it reads requests and writes answers, each a line of JSON.
+
+    One that has begun answers many requests, since to import the tools takes longer than most answers.
+    """
+
+    def __init__(self, tool: str, script: Path, errors: Path) -> None:
+        self._errors = errors
+        with errors.open("w") as stderr:
+            self._process = subprocess.Popen(
+                [interpreter_with(tool), str(script)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=stderr,
+                text=True,
+                bufsize=1,
+            )
+
+    def ask(self, request: object) -> Any:
+        """Return the answer to a request."""
+        given, told = self._process.stdin, self._process.stdout
+        assert given is not None
+        assert told is not None
+        late = Timer(PATIENCE_S, self._process.kill)
+        late.start()
+        try:
+            given.write(f"{json.dumps(request)}\n")
+            for line in told:
+                if line.startswith(("[", "{")):
+                    return json.loads(line)
+        except BrokenPipeError:
+            pass
+        finally:
+            late.cancel()
+        raise AssertionError(self._errors.read_text()[-2000:])
+
+    def close(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.communicate()
+
+
+class Solvers:
+    """Programs of other people's tools, each begun when it is asked for the first time."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._begun: dict[Path, Solver] = {}
+
+    def ask(self, tool: str, script: Path, request: object) -> Any:
+        """Return what a script answers that the Python of a tool runs."""
+        if script not in self._begun:
+            self._begun[script] = Solver(tool, script, self._folder / f"{script.stem}.txt")
+        return self._begun[script].ask(request)
+
+    def close(self) -> None:
+        """End all of them."""
+        for solver in self._begun.values():
+            solver.close()
+
+
+@contextmanager
+def solvers() -> Iterator[Solvers]:
+    """Yield programs of other people's tools, which end afterwards."""
+    with ExitStack() as stack:
+        made = Solvers(Path(stack.enter_context(tempfile.TemporaryDirectory())))
+        stack.callback(made.close)
+        yield made
 
 
 def _found(path: str, name: str) -> str:

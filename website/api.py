@@ -55,6 +55,15 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Page: its heading and names."""
 
 
+HEAD = """# API
+
+What each public function and class takes, returns and raises. If you are looking for a way to begin, read [from
+Python](../../python.md) first. Every name is imported from `dubins_traffic`, which loads it when it is first used;
+a name with a dot, such as `envs.single.TrafficEnv`, is imported from its module, `dubins_traffic.envs.single`.
+Lengths are in metres, times in seconds, angles in radians, unless something else is said.
+"""
+
+
 def write_api(folder: Path) -> None:
     """Write a page for each group of names, and the page above them.
 
@@ -86,9 +95,8 @@ def _entry(name: str) -> str:
 
 def _index() -> str:
     rows = [
-        f"| [{heading}]({page}.md) | {', '.join(f'`{name}`' for name in names)} |"
+        f"| [{heading}]({page}.md) | {', '.join(f'{{py:obj}}`{name} <dubins_traffic.{name}>`' for name in names)} |"
         for page, (heading, names) in GROUPS.items()
     ]
     contents = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-    head = "# API\n\nThe public names of `dubins_traffic`, each loaded when it is first used, and those of some rooms."
-    return "\n".join([head, "", "| page | names |", "|---|---|", *rows, "", contents, ""])
+    return "\n".join([HEAD, "| page | names |", "|---|---|", *rows, "", contents, ""])

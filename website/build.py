@@ -15,6 +15,7 @@ from api import write_api
 from command_line import write_command_line
 from gallery import write_gallery
 from pages import ROOT, gather
+from results import write_results
 
 
 def main() -> int:
@@ -32,6 +33,7 @@ def main() -> int:
         write_api(source / "reference" / "api")
         write_command_line(source / "reference" / "command-line.md")
         write_gallery(source / "gallery.md", extra / "gallery")
+        write_results(source / "results.md", extra / "results")
         return _build(source, extra, folder, Path(given) / "doctrees")
 
 

@@ -10,14 +10,16 @@ from typing import Any
 
 import typer
 
-from dubins_traffic.cli.main import app
+from dubins_traffic.cli.commands import app
 
 HEAD = """# The command line
 
-Every command with all that it takes, as `dubins-traffic COMMAND --help` says it. The exit status is 0 if all went
-well, 2 if the input is wrong, and 1 if a trial was ended by a fault of its controller, by Ctrl-C or by something
-unexpected.
+Every command with all that it takes, as `dubins-traffic COMMAND --help` says it. [A tour of the commands](../tour.md)
+shows what they are for. The exit status is 0 if all went well, 2 if the input is wrong, and 1 if a fault of a
+controller ended a trial, Ctrl-C was pressed or something unexpected happened.
 """
+PAGE = re.compile(r"\bdocs/([\w/-]+)\.md(?!#)")
+"""A page that a command names, which the site has."""
 
 
 def write_command_line(path: Path) -> None:
@@ -49,7 +51,7 @@ def _section(name: str, command: Any) -> str:
         f"## {name}",
         "",
         *_block(usage),
-        _plain(command.help),
+        _linked(_plain(command.help)),
         "",
         "| takes | |",
         "|---|---|",
@@ -64,11 +66,12 @@ def _plain(text: str | None) -> str:
 
 
 def _cell(text: str) -> str:
-    return (
-        re.sub(r"([|<>*_\[\]])", r"\\\1", " ".join(text.split()))
-        if "`" not in text
-        else " ".join(text.split())
-    )
+    plain = " ".join(text.split())
+    return _linked(plain if "`" in text else re.sub(r"([|<>*_\[\]])", r"\\\1", plain))
+
+
+def _linked(text: str) -> str:
+    return PAGE.sub(r"[\1](../\1.md)", text)
 
 
 def _block(text: str) -> list[str]:

@@ -1,5 +1,6 @@
 """What Sphinx is told; `website/build.py` gathers the sources and calls it."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ nitpick_ignore_regex = [
 ]
 """Standard and foreign libraries, whose inventories this page would have to fetch, and types that are not public."""
 suppress_warnings = ["myst.header"]
+smartquotes = False  # what stands in quotes in the tables of parameters is to be copied
+highlight_language = "none"  # blocks that name no language are commands and what they print
 
 myst_enable_extensions = ["attrs_inline", "attrs_block", "colon_fence", "dollarmath"]
 myst_heading_anchors = 4
@@ -47,7 +50,27 @@ numpydoc_xref_param_type = False
 numpydoc_class_members_toctree = False
 
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_title = f"dubins-traffic {release}"
 html_show_sphinx = False
 html_copy_source = False
+html_show_search_summary = False  # a page opened from a file may not read others
 html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
+
+
+def without_aliases(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Take away what Python itself says of the fields of a named tuple: "Alias for field number 0"."""
+    if any(line.startswith("Alias for field number") for line in lines):
+        lines.clear()
+
+
+def with_pages(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Make links of the pages that docstrings name: ``docs/scores.md``."""
+    lines[:] = [re.sub(r"`?\bdocs/([\w/-]+)\.md`?(?!#)", r":doc:`\1 </\1>`", line) for line in lines]
+
+
+def setup(app: Any) -> None:
+    """Tell Sphinx what is done with docstrings."""
+    app.connect("autodoc-process-docstring", without_aliases)
+    app.connect("autodoc-process-docstring", with_pages)

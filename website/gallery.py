@@ -10,16 +10,18 @@ from typing import Any
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
+from dubins_traffic.scoring.verdict import assumption_of
 
 DEADLINE = 0.5
 """Seconds that an answer may take where the case is about that."""
 CASES = Path(__file__).with_name("gallery.json")
 HEAD = """# Gallery
 
-A trial for each rule that can be broken and each way a trial can end early. Every page stands alone: it asks
-nothing of any host, and opens from a file. In it, `.` and `,` go from event to event, `x` to what excused the ego,
-and `?` shows all keys.
-
+A trial that you can play, for each [rule of the road](rules.md) that can be broken, each part of the
+[assumption](task.md#the-assumption-phi_env) on the other cars (E1 to E6), and each way in which a controller can
+end a trial early. In a replay, space plays and pauses, `.` and `,` go from event to event, `x` goes to what excused
+the ego, and `?` shows all keys. Each page stands alone: it asks nothing of any host, and opens from a file.
+`dubins-traffic replay` makes such a page of any record of yours.
 """
 
 
@@ -40,7 +42,7 @@ def write_gallery(page: Path, folder: Path) -> None:
             f'| <a href="gallery/{name}">{case["name"]}</a> | {case["says"]} | `{case["controller"]}` |'
         )
     table = ["| trial | what happens | controller |", "|---|---|---|", *rows, ""]
-    page.write_text(HEAD + "\n".join(table), encoding="utf-8")
+    page.write_text("\n".join([HEAD, *table]), encoding="utf-8")
 
 
 def _replay(case: dict[str, Any], page: Path) -> None:
@@ -64,9 +66,11 @@ def _configuration(given: dict[str, Any]) -> dt.Configuration:
 
 
 def _shown(result: dt.Result, own: bool) -> set[str]:
-    """Return how a trial ended, its verdict, and the rules that the ego broke or the others did."""
+    """Return how a trial ended, its verdict, and the rules that the ego broke, or the parts of the assumption."""
     verdict = result.score.verdict
     if verdict is None:
         return {result.ending.end.value}
     broken = {found.rule for found in verdict.violations if (found.car == "ego") is own}
+    if not own:
+        broken = {name for rule in broken for name in (assumption_of(rule), rule) if name.startswith("E")}
     return {result.ending.end.value, verdict.verdict.value} | broken

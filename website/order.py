@@ -14,6 +14,7 @@ TUTORIALS = (
 SECTIONS: dict[str, tuple[str, ...]] = {
     "Tutorials": TUTORIALS,
     "How to": (
+        "tour",
         "attach",
         "python",
         "batches",
@@ -57,7 +58,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "contributing",
         "benchmarks",
     ),
-    "Gallery": ("gallery",),
+    "Gallery and results": ("gallery", "results"),
 }
 """Heading of the site: its pages."""
 BELOW: dict[str, str] = {

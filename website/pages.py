@@ -11,6 +11,9 @@ from order import BELOW, ELSEWHERE, SECTIONS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+MARKUP = (".xml", ".osm", ".xodr")
+TITLES = {"readme.md": "README"}
+"""Pages that are called otherwise here: the first page has the name of the package."""
 OTHERS = {
     "README.md": "readme.md",
     "CONTRIBUTING.md": "contributing.md",
@@ -22,6 +25,8 @@ OTHERS = {
 LINK = re.compile(r"(?<!!)\]\((?!https?:|#|mailto:)([^)\s#]+)(#[^)\s]*)?\)")
 ANCHOR = re.compile(r'<a id="([^"]+)"></a>')
 FENCE = re.compile(r"^(```.*?^```|~~~.*?^~~~)", re.MULTILINE | re.DOTALL)
+MARK = re.compile(r"^<!-- test: [^\n]* -->\n", re.MULTILINE)
+"""What a page says to the tests, which is not for the site (`tests/shown.py`)."""
 LANGUAGES = {".py": "python", ".toml": "toml", ".json": "json", ".cpp": "cpp", ".c": "c"}
 
 
@@ -45,11 +50,13 @@ def gather(source: Path) -> None:
 
 
 def _write(source: Path, path: Path, name: str, listings: set[Path]) -> None:
-    text = path.read_text(encoding="utf-8")
+    text = MARK.sub("", path.read_text(encoding="utf-8"))
     parts = FENCE.split(text)
     made = "".join(
         part if n % 2 else _linked(_anchored(part), path, name, listings) for n, part in enumerate(parts)
     )
+    if name in TITLES:
+        made = re.sub(r"\A# .*", f"# {TITLES[name]}", made)
     made += _below(name.removesuffix(".md"))
     place = source / name
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -116,7 +123,7 @@ def _write_listing(source: Path, path: Path) -> None:
     inside = path.relative_to(ROOT).as_posix()
     place = source / "files" / f"{inside}.md"
     place.parent.mkdir(parents=True, exist_ok=True)
-    language = LANGUAGES.get(path.suffix, "text")
+    language = "xml" if path.suffix in MARKUP else LANGUAGES.get(path.suffix, "text")
     text = path.read_text(encoding="utf-8")
     place.write_text(
         f"---\norphan: true\n---\n\n# `{inside}`\n\n````{language}\n{text.rstrip()}\n````\n", encoding="utf-8"
@@ -125,7 +132,7 @@ def _write_listing(source: Path, path: Path) -> None:
 
 def _write_index(source: Path) -> None:
     """Write the first page: what the package is, how to begin, and the contents of the site."""
-    text = Path(__file__).with_name("index.md").read_text(encoding="utf-8")
+    text = MARK.sub("", Path(__file__).with_name("index.md").read_text(encoding="utf-8"))
     contents = "\n".join(_contents(list(names), heading) for heading, names in SECTIONS.items())
     (source / "index.md").write_text(f"{text}\n{_contents(['readme'])}\n{contents}", encoding="utf-8")
 

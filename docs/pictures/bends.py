@@ -28,7 +28,7 @@ def free_bend() -> Figure:
     front = pose(W, 0.2, 80)
     right.cars(late, front, names=False)
     right.note(-3.45, 1.6, "the ego came into the disc\nafter A: A's seconds\ndo not count", ha="left")
-    for panel, own, aside, down, other in ((left, ego, 0.5, 0.0, inside), (right, late, 0.0, -0.4, front)):
+    for panel, own, aside, down, other in ((left, ego, 0.5, 0.0, inside), (right, late, -0.45, 0.0, front)):
         panel.note(own.x + aside, own.y + down, "ego", bold=True)
         panel.note(other.x + 0.3, other.y - 0.2, "A", bold=True)
     left.title("E4: A may stay")

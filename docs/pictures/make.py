@@ -59,8 +59,8 @@ def ground() -> Figure:
     panel.note(1.05, -2.0, "approach: body outside the\ndisc and at most 0.5 m from it", ha="left")
     panel.line([(1.02, -1.85), (0.4, -1.3)], INK, width=0.9)
     panel.line([(0.3, -2.85), (0.3, -1.55)], FAINT, width=1.2, style=":")
-    panel.note(-0.75, -2.45, "middle of the lane: l = \u2212w", ha="right")
-    panel.line([(-0.72, -2.45), (0.27, -2.45)], FAINT, width=0.8)
+    panel.note(-0.75, -2.0, "middle of the lane: l = \u2212w", ha="right")
+    panel.line([(-0.72, -2.0), (0.27, -2.0)], FAINT, width=0.8)
     panel.title("A crossing v: three or more segments meet")
     return figure
 
@@ -87,7 +87,7 @@ def collision() -> Figure:
     right.cross(ego.x, ego.y + RHO)
     right.note(ego.x + 0.25, ego.y - 0.22, "ego", ha="left", bold=True)
     right.note(other.x + 0.25, other.y + 0.3, "A", ha="left", bold=True)
-    right.note(0.72, -1.4, "the ego moves past,\nA moves toward it:\nA is at fault", ha="left")
+    right.note(0.72, -1.4, "the ego passes,\nA drives into it:\nA is at fault", ha="left")
     right.title("1, collision, and E2: A runs into the ego", "bad")
     return figure
 
@@ -137,7 +137,7 @@ def overtaking() -> Figure:
     ego = pose(-3.6, LOW, 0)
     for panel in (upper, lower):
         panel.cars(ego, pose(block, LOW, 0), names=False)
-        panel.note(block, 0.0, "A stands")
+        panel.note(block + 0.25, LOW, "A stands", ha="left")
     way = [(-3.4, LOW), (-0.75, LOW)]
     out = bend((-0.75, LOW), (-0.35, LOW), (-0.45, 0.32), (0.1, 0.32))
     upper.line(way, EGO_COLOUR, width=1.8)
@@ -146,7 +146,7 @@ def overtaking() -> Figure:
     upper.arrow([(2.4, LOW), (3.8, LOW)], EGO_COLOUR)
     upper.note(-2.2, -0.85, "blocked: overtaking begins")
     upper.line([(-1.25, -0.75), (-0.95, -0.35)], INK, width=0.8)
-    upper.note(2.9, 0.85, "nothing blocks, !left: it ends")
+    upper.note(2.75, 0.85, "back, nothing blocks: it ends")
     upper.line([(2.3, 0.72), (2.2, -0.2)], INK, width=0.8)
     upper.title("left, but overtaking, and back within 10 s", "good")
     lower.line(way, EGO_COLOUR, width=1.8)
@@ -169,7 +169,7 @@ def stop() -> Figure:
     left.cars(ego, names=False)
     left.arrow([(-2.7, LOW), (ego.x - RHO, LOW)], EGO_COLOUR)
     left.arrow([(ego.x + RHO, LOW), (0.4, LOW)], EGO_COLOUR, style=":")
-    left.note(-2.65, -1.15, "stands 0.5 s in the\napproach: stopped, a ticket", ha="left")
+    left.note(-2.65, -1.1, "stands 0.5 s in the\napproach: stopped,\nand has a ticket", ha="left")
     left.title("enters after a stop", "good")
     right.cars(pose(-0.75, LOW, 0), names=False)
     right.arrow([(-2.7, LOW), (-0.75 - RHO, LOW)], EGO_COLOUR)
@@ -254,9 +254,9 @@ def first_enters() -> Figure:
         panel.note(other.x - 0.25, other.y, "A", ha="right", bold=True)
         panel.place(ego, places[0])
         panel.place(other, places[1])
-    left.note(0.75, -1.7, "first, and the crossing\nclear: A is to enter\nwithin 10 s", ha="left")
+    left.note(0.75, -1.7, "first, and nobody is\nin the crossing: A has\nto enter within 10 s", ha="left")
     left.title("E3: it is A's turn")
-    right.note(0.75, -1.7, "not gone in 3 s: new\nticket, now behind.\nThe second breaks E3", ha="left")
+    right.note(0.75, -1.7, "not gone in 3 s: a\nnew ticket, now last;\nanother breaks E3", ha="left")
     right.title("E3: A has lost its turn")
     return figure
 
@@ -326,9 +326,9 @@ def free_goal() -> Figure:
         panel.cars(ego, other, names=False)
         panel.note(ego.x - 0.25, ego.y, "ego", ha="right", bold=True)
         panel.note(other.x, other.y + 0.3, "A", bold=True)
-    left.note(-2.6, -1.25, "A's centre is in the disc:\nat most 60 s on end", ha="left")
+    left.note(-2.6, -1.1, "A's centre is in\nthe disc: at most\n60 s on end", ha="left")
     left.title("E6: the goal is taken")
-    right.note(-2.6, -1.25, "no e-agent is at the goal", ha="left")
+    right.note(-2.6, -1.1, "no e-agent\nis at the goal", ha="left")
     right.title("free again", "good")
     return figure
 
@@ -340,20 +340,24 @@ def verdicts() -> Figure:
     rows = (
         ("satisfied", None, None, (1.2, 3.0, 5.1, 7.2, 9.0)),
         ("unfinished", None, None, (1.2, 3.0)),
-        ("violated", 6.0, 8.0, (1.2, 3.0, 5.1, 7.2)),
+        ("violated", 6.0, 8.0, (1.2, 3.0, 5.1)),
         ("excused", 6.0, 4.0, (1.2, 3.0, 5.1)),
     )
     for n, (name, fall, others, visits) in enumerate(rows):
         y = -1.3 * n
         for lift, end, colour in ((0.2, fall, EGO_COLOUR), (-0.2, others, AGENT_COLOURS[0])):
-            axes.add_patch(Rectangle((0, y + lift - 0.14), end or 10.0, 0.28, facecolor=colour, alpha=0.75))
+            for width, strength in ((10.0, 0.25), (end or 10.0, 0.75)):
+                bar = Rectangle((0, y + lift - 0.14), width, 0.28, facecolor=colour, alpha=strength)
+                bar.set_linewidth(0)
+                axes.add_patch(bar)
             if end is not None:
                 axes.plot([end], [y + lift], marker="X", markersize=10, color=BAD, markeredgecolor="white")
         axes.plot(visits, [y + 0.2] * len(visits), "o", color="white", markersize=4.5)
         axes.text(-0.2, y, name, ha="right", va="center", fontsize=9.5, fontweight="bold", color=INK)
         axes.text(10.15, y + 0.2, "ego", va="center", fontsize=8.5, color=INK)
         axes.text(10.15, y - 0.2, "environment", va="center", fontsize=8.5, color=INK)
-    axes.plot([2.2], [-4.75], "o", color="white", markeredgecolor=EGO_COLOUR, markersize=5.5)
+    axes.add_patch(Rectangle((1.7, -4.89), 0.5, 0.28, facecolor=EGO_COLOUR, alpha=0.75, linewidth=0))
+    axes.plot([1.95], [-4.75], "o", color="white", markersize=4.5)
     axes.text(2.4, -4.75, "visit of a goal", va="center", fontsize=8.5, color=INK)
     axes.plot([5.5], [-4.75], marker="X", markersize=10, color=BAD, markeredgecolor="white")
     axes.text(5.75, -4.75, "first breach", va="center", fontsize=8.5, color=INK)

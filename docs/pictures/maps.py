@@ -1,4 +1,4 @@
-"""Draws what was lost of maps of other programs (docs/maps.md): those of `examples/maps`, and towns of SUMO.
+"""Draws the gallery of docs/maps.md: what was lost of `examples/maps` and of towns of SUMO, and a drawn network.
 
 python docs/pictures/maps.py [FOLDER OF SUMO'S tools/game]
 """
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.foreign import ForeignFormat
+from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.losses import write_losses
 from dubins_traffic.viewer.plot import write_plot
@@ -17,6 +18,8 @@ from dubins_traffic.viewer.plot import write_plot
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples" / "maps"
 TOWNS = {"DRT/osm.net.xml": "maps-drt", "bs3d/bs.net.xml": "maps-bs3d"}
+BENT = 16, 22, 7
+"""Intersections, segments and seed of a network that bends."""
 
 
 def draw(source: Path, name: str) -> None:
@@ -34,6 +37,7 @@ def draw(source: Path, name: str) -> None:
 
 def main() -> None:
     """Draw all."""
+    write_plot(HERE / "maps-bent.svg", generate(*BENT, bent=0.7))
     draw(EXAMPLES / "crossing.osm", "maps-crossing")
     for file, name in TOWNS.items():
         if len(sys.argv) > 1:

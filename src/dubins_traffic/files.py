@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import gzip
+import io
 import os
+import shutil
 import sys
+import tempfile
+import threading
+import zlib
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -14,6 +20,8 @@ from dubins_traffic.errors import InputError
 STANDARD = "-"
 MOST_BYTES = 1 << 28
 """Most bytes of a document, 256 MiB: some hundred times the largest road network."""
+GZIP, GZIP_MAGIC = ".gz", b"\x1f\x8b"
+"""Suffix of files that are packed by gzip, and what these begin with."""
 LOCK = ".lock"
 """Name of the file that is locked where a folder can't be."""
 
@@ -84,37 +92,63 @@ def is_stream(path: str | Path) -> bool:
 
 
 def read_text(path: str | Path) -> str:
-    """Return the UTF-8 text of a file; ``-`` reads standard input.
+    """Return the UTF-8 text of a file, which may be packed by gzip; ``-`` reads standard input.
 
     Raises
     ------
     InputError
-        As `read_bytes`, or if it is not UTF-8.
+        As `read_bytes` and `decoded`.
     """
     return decoded(read_bytes(path), str(path))
 
 
 def decoded(data: bytes, name: str) -> str:
-    """Return the text that `data` is in UTF-8; InputError, naming the file, if it is none."""
+    """Return the text that `data` is in UTF-8, packed by gzip or not; InputError, naming the file, if it is none."""
     try:
-        return data.decode("utf-8-sig")
+        return unpacked(data, name).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"not UTF-8 text (byte {error.start})", file=name) from None
 
 
+def unpacked(data: bytes, name: str) -> bytes:
+    """Return what gzip has packed in `data`; data that does not begin as gzip does is returned as it is.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or unpacks to more than `MOST_BYTES`; no more than these are unpacked.
+    """
+    if not data.startswith(GZIP_MAGIC):
+        return data
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
+            found = packed.read(MOST_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"not what gzip packs ({error})", file=name, expected="a whole file") from None
+    if len(found) > MOST_BYTES:
+        raise InputError("unpacks to too much", file=name, expected=f"at most {MOST_BYTES >> 20} MiB")
+    return found
+
+
 def write_text(path: str | Path, text: str) -> None:
-    """Write `text` as UTF-8, whole or not at all.
+    """Write `text` as UTF-8, whole or not at all; packed by gzip where the path ends in ``.gz``.
 
     Raises
     ------
     InputError
         As `replace_file`.
     """
-    replace_file(Path(path), lambda neighbour: neighbour.write_bytes(text.encode("utf-8")))
+    data = text.encode("utf-8")
+    if Path(path).suffix.lower() == GZIP:
+        data = gzip.compress(data, mtime=0)
+    replace_file(Path(path), lambda neighbour: neighbour.write_bytes(data))
 
 
 def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool = False) -> None:
     """Let `write` make a temporary neighbour of `path`, then put it in the place of `path` in one step.
+
+    A link stays one: what it leads to is replaced. What is no file, a device or a pipe, stays what it is: it is written
+    to, once all is made.
 
     With `durable` it has reached the disk before it takes that place, and the place itself before this returns, so
     that not even a loss of power leaves half a file.
@@ -126,7 +160,11 @@ def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool =
     """
     if path.is_dir():
         raise InputError("a folder", file=str(path), expected="a file to write")
-    neighbour = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    if is_stream(path):
+        _write_to_stream(path, write)
+        return
+    name, path = path, Path(os.path.realpath(path))
+    neighbour = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_native_id()}.tmp")
     try:
         write(neighbour)
         if durable:
@@ -135,10 +173,44 @@ def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool =
         if durable:
             _flush(path.parent)
     except OSError as error:
-        raise InputError(f"can't be written ({error.strerror or error})", file=str(path)) from error
+        raise InputError(f"can't be written ({error.strerror or error})", file=str(name)) from error
     finally:
         with contextlib.suppress(OSError):
             neighbour.unlink(missing_ok=True)
+
+
+def _write_to_stream(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file, and write what is in it to a device or a pipe."""
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            made = Path(folder) / (path.name or "made")
+            write(made)
+            with made.open("rb") as source, path.open("wb") as stream:
+                shutil.copyfileobj(source, stream)
+    except OSError as error:
+        raise InputError(f"can't be written ({error.strerror or error})", file=str(path)) from error
+
+
+def require_place(path: Path) -> None:
+    """Refuse a path to which no file could be written later, before there is work to lose.
+
+    Parameters
+    ----------
+    path : Path
+        Where a file is to be written.
+
+    Raises
+    ------
+    InputError
+        If a folder is there, or its folder is missing or may not be written to.
+    """
+    folder = path.parent
+    if path.is_dir():
+        raise InputError("a folder", file=str(path), expected="a file to write")
+    if not folder.is_dir():
+        raise InputError("no such folder", file=str(folder), expected="a folder to write to")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError("no permission to write", file=str(folder), expected="a folder to write to")
 
 
 def make_folder(folder: Path, what: str) -> None:

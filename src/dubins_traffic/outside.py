@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.util
+import os
 import re
 import sys
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -22,6 +24,24 @@ CLASS = "a class without arguments"
 def plainly(error: BaseException) -> str:
     """Return what an exception says, in a line."""
     return shown(f"{type(error).__name__}: {error}")
+
+
+@contextlib.contextmanager
+def put_back() -> Generator[None]:
+    """Put back after the body what code of a user's may leave changed: the current folder, and the standard streams."""
+    streams = sys.stdin, sys.stdout, sys.stderr
+    try:
+        here = os.open(".", os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:  # it was removed, or may not be read
+        here = None
+    try:
+        yield
+    finally:
+        sys.stdin, sys.stdout, sys.stderr = streams
+        if here is not None:
+            with contextlib.suppress(OSError):  # the code may have closed it
+                os.fchdir(here)
+                os.close(here)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +108,8 @@ def find(spec: str, seam: Seam) -> Callable[[], Any]:
         `SystemExit` too; only Ctrl-C goes through.
     """
     place, _, name = spec.rpartition(":")
-    module = _load_file(place, spec, seam) if place.endswith(".py") else _load_module(place, spec, seam)
+    with put_back():
+        module = _load_file(place, spec, seam) if place.endswith(".py") else _load_module(place, spec, seam)
     found = getattr(module, name, None)
     if found is None:
         raise seam.refuse(f"no class {name} in {place}", spec, _offer(module, seam))
@@ -116,7 +137,8 @@ def make(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
     """
     name = spec.rpartition(":")[2]
     try:
-        made = maker()
+        with put_back():
+            made = maker()
     except KeyboardInterrupt:
         raise
     except BaseException as error:

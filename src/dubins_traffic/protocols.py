@@ -1,4 +1,6 @@
-"""The seams: what a simulator, a driver, a controller, a sink must be. No room above may ask for more.
+"""The seams: the protocols of simulators, drivers, controllers, sinks, watchers, transports and clocks.
+
+Rooms above depend on these protocols alone, never on more of what implements them.
 
 The order of events in a tick is that of `docs/semantics.md`: sense, decide, clip, move, label, push.
 """
@@ -40,9 +42,11 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a simulator can do: step many trials at once, give equal bytes for equal seeds, wait for commands.
+    """What a simulator can do.
 
-    `forks`: a deep copy of it goes on from where it is, as it would itself, and shares nothing with it that changes.
+    `batched`: it steps many trials at once. `deterministic`: equal seeds give equal bytes. `lockstep`: it waits for
+    the commands of every tick. `forks`: a deep copy of it goes on from the present frame exactly as the original
+    would, and shares no state with it.
     """
 
     batched: bool
@@ -60,7 +64,7 @@ class Simulator(Protocol):
         ...
 
     def reset(self, instances: Sequence[Instance]) -> State:
-        """Place the cars of a batch; the returned state is this simulator's own, updated in place by `step`."""
+        """Place the cars of a batch; return the simulator's state, (B, N) arrays that `step` updates in place."""
         ...
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -68,13 +72,13 @@ class Simulator(Protocol):
         ...
 
     def close(self) -> None:
-        """Free what the simulator holds."""
+        """Free the simulator's resources."""
         ...
 
 
 @runtime_checkable
 class Scans(Protocol):
-    """A simulator with lasers of its own; for others, laser ranges are worked out from the state."""
+    """A simulator that measures laser ranges itself; for others, ranges are computed from the state."""
 
     def scan(self, car: int, rays: Floats, longest: float) -> Floats:
         """Return how far each ray goes before it meets a body: (R,), metres, `longest` where it meets none.
@@ -85,13 +89,14 @@ class Scans(Protocol):
 
 
 class Driver(Protocol):
-    """Drives some of the cars of a batch (built-in e-agents; a controller made to fit).
+    """Drives some of the cars of a batch: the built-in e-agents, or cars of another process.
 
-    In a fork of a trial a deep copy of it goes on. One that can't be copied raises InputError when it is.
+    A fork of a trial goes on with a deep copy of each driver. A driver that can't be copied raises InputError in
+    `__deepcopy__`.
     """
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
-        """Begin a batch whose first frame is `state`."""
+        """Begin a batch whose first frame is `state`, (B, N) arrays."""
         ...
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
@@ -101,70 +106,70 @@ class Driver(Protocol):
 
 @runtime_checkable
 class Draws(Protocol):
-    """A driver whose choices are random; they follow from the seed of the instance."""
+    """A driver that draws random numbers; they follow from the seed of the instance."""
 
     def reseed(self, seed: int) -> None:
-        """Let all that is drawn from now on follow from another seed; what has been drawn stays."""
+        """Draw from another seed from now on; what has been drawn before stays."""
         ...
 
 
 @runtime_checkable
 class Forks(Protocol):
-    """A sink of which a deep copy goes on in a fork of its trial; one that does not say so stays behind."""
+    """A sink that may go on in a fork of its trial as a deep copy; a fork leaves out all other sinks."""
 
     @property
     def forks(self) -> bool:
-        """Whether a deep copy has seen what it has seen, and shares nothing with it that changes."""
+        """Whether a deep copy of the sink holds all it has received and shares no state with it."""
         ...
 
 
 class Controller(Protocol):
-    """Drives the ego. A class without arguments that has these methods; `close` may be left out."""
+    """Drives the ego. A class with these methods whose constructor takes no arguments; see also `Closes`, `Reports`."""
 
     def start(self, problem: Problem) -> None:
-        """Learn the problem; the wall-clock time of this call is the *time to begin*."""
+        """Prepare for the problem; the wall-clock time of this call is the *time to begin*."""
         ...
 
     def act(self, observation: Observation) -> Command | tuple[float, float] | None:
-        """Choose speed (m/s) and yaw rate (rad/s) for the coming tick. None gives up."""
+        """Return speed (m/s) and yaw rate (rad/s) for the coming tick; None gives up and ends the trial."""
         ...
 
 
 @runtime_checkable
 class Closes(Protocol):
-    """A controller that wants to know that its trial is over."""
+    """A controller that is told when its trial is over."""
 
     def close(self) -> None:
-        """Free what is held."""
+        """Free the controller's resources; called once, after the trial has ended."""
         ...
 
 
 @runtime_checkable
 class Reports(Protocol):
-    """A controller or driver that has something to say of what it does; it stands in the record as events.
+    """A controller or driver that reports what it does; its reports become events in the record.
 
-    Those of a controller are events of the ego, those of a driver of no car.
+    Reports of a controller are events of the ego; reports of a driver are events of no car.
     """
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return kind and detail of what has happened since the last call.
+        """Return (kind, detail) of each thing to report since the last call.
 
-        It is made after every `act` or `decide`, of drivers also after `reset`.
+        It is called after every `act` or `decide`, and of drivers also after `reset`.
         """
         ...
 
 
 class Watcher(Protocol):
-    """Is shown every frame of a trial at once, before anyone decides on it; a Sink gets them in blocks."""
+    """Is shown every frame of a trial as soon as it is reached, before any driver decides; a Sink gets blocks."""
 
     def begin(self, instance: Instance) -> None:
-        """A trial has been placed; its first frame follows."""
+        """Begin a trial whose cars have been placed; `watch` with frame 0 follows."""
         ...
 
     def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
-        """Frame `tick` has been reached; the arrays are the simulator's own and change with the next tick.
+        """Look at frame `tick`, just reached; the arrays (1, N) are the simulator's own and change in the next tick.
 
-        `observe` returns the ego's observation of this frame, made once for all who ask.
+        `observe` returns the ego's observation of this frame; it is made once, however often it is called.
 
         Raises
         ------
@@ -176,11 +181,11 @@ class Watcher(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One frame as a transport sends it, to be read before the method that is given it returns.
+    """One frame as a transport sends it; valid only until the method that receives it returns.
 
-    `time` is in simulated seconds; `state` and `labels` hold every car of the trial, (1, N). `observe(n)` makes car
-    n's own observation, of a frame once however often it is asked: what a controller in this process would be handed.
-    `running` is false while the cars are only shown and nobody drives.
+    `time` is in simulated seconds; `state` and `labels` hold every car of the trial, (1, N). `observe(n)` returns
+    car n's own observation, as a controller in this process would get it; it is made once per frame and car.
+    `running` is false while the cars are only shown and no car is driven.
     """
 
     tick: int
@@ -192,45 +197,46 @@ class View:
 
 
 class Mailbox(Protocol):
-    """Where a transport puts what arrives. Any thread may call these; none of them waits, keeps a queue or raises."""
+    """Receives what arrives at a transport. Any thread may call its methods; none of them blocks, queues or raises."""
 
     def command(self, car: str, speed: float, yaw_rate: float, tick: int | None = None) -> None:
-        """`car` shall drive at `speed` (m/s) and `yaw_rate` (rad/s); `tick` is the frame that this answers, if known.
+        """Take a command for `car`: `speed` (m/s), `yaw_rate` (rad/s); `tick` is the frame that it answers, if known.
 
-        Numbers that are not finite are passed on: they are that driver's fault. Unknown cars are counted, no more.
+        Numbers that are not finite are passed on as the fault of that car's driver. Commands for unknown cars are only
+        counted.
         """
         ...
 
     def fault(self, car: str, end: End, detail: str) -> None:
-        """The peer of `car` has done something that ends its driving, such as `End.PEER_GARBAGE`."""
+        """Take note that the peer of `car` made a fault that ends its driving, such as `End.PEER_GARBAGE`."""
         ...
 
     def joined(self, car: str) -> None:
-        """A peer of `car` is there, or there again."""
+        """Take note that a peer of `car` has connected, or connected again."""
         ...
 
     def left(self, car: str) -> None:
-        """The last peer of `car` has gone; it may come back within the link's patience."""
+        """Take note that the last peer of `car` has gone; it may come back within the link's patience."""
         ...
 
     def stop(self, end: End, detail: str) -> None:
-        """End the trial that is running, if one is, for a reason that is no single peer's."""
+        """End the running trial, if there is one, for a reason that is not a single peer's."""
         ...
 
     def pause(self, paused: bool) -> None:
-        """Let simulated time stand still, or go on."""
+        """Stop simulated time, or let it go on."""
         ...
 
     def place(self, car: str, pose: Pose) -> None:
-        """Put `car` there, if no trial runs; a running trial lets nobody move cars but their drivers."""
+        """Put `car` at `pose` if no trial is running; during a trial only drivers move cars."""
         ...
 
 
 class Transport(Protocol):
-    """Carries frames to drivers elsewhere and their commands back; one for all remote cars of a session.
+    """Carries frames to drivers in other processes and commands back; one transport serves a whole session.
 
     All methods are called from the trial's thread, in the order open, (begin, frame..., announce, frame..., end)...,
-    close. What arrives goes to the mailbox, from whatever thread it arrives in.
+    close. What arrives goes to the mailbox, in the thread in which it arrives.
     """
 
     @property
@@ -244,85 +250,85 @@ class Transport(Protocol):
         ...
 
     def open(self, mailbox: Mailbox) -> None:
-        """Begin to listen. InputError or TransportError if that can't be."""
+        """Begin to listen; raise InputError or TransportError if that is impossible."""
         ...
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
-        """The world of `instance` has been put up; commands of the cars `remote` are wanted."""
+        """Show the world of `instance` to peers; commands are expected for the cars named in `remote`."""
         ...
 
     def announce(self, instance: Instance) -> None:
-        """Tell the peers the problem: the trial begins. `time to begin` counts from here."""
+        """Send the problem to the peers: the trial begins. The *time to begin* counts from here."""
         ...
 
     def frame(self, view: View) -> None:
-        """Send a frame to all peers. What can't be sent at once is dropped: never wait for a peer."""
+        """Send a frame to all peers without waiting for any: what can't be sent at once is dropped."""
         ...
 
     def end(self, ending: Ending) -> None:
-        """The trial is over; tell the peers."""
+        """Tell the peers that the trial is over, and why."""
         ...
 
     def close(self) -> None:
-        """Leave nothing behind. May be called twice."""
+        """Close all connections and free all resources; may be called twice."""
         ...
 
 
 @runtime_checkable
 class Streams(Protocol):
-    """A transport that sends the world more often than once a tick while wall-clock time passes."""
+    """A transport that also sends the world between two ticks, as wall-clock time passes."""
 
     @property
     def interval(self) -> float:
-        """Seconds of wall clock between two views."""
+        """Wall-clock seconds between two views."""
         ...
 
     def stream(self, view: View) -> None:
-        """Send the world as it is between two frames: `view.time` and `view.state` lie between those of ticks."""
+        """Send the world between two frames: `view.time` and `view.state` are interpolated between those of ticks."""
         ...
 
 
 @runtime_checkable
 class Polled(Protocol):
-    """A transport without threads of its own: what has come is taken by the trial's thread when it waits.
+    """A transport without threads of its own: the trial's thread receives messages while it waits.
 
     Handing a message over from another thread would cost about as much as a whole exchange of messages.
     """
 
     def receive(self, seconds: float) -> None:
-        """Wait for a message, so long at most, and hand all that have come to the mailbox."""
+        """Wait at most `seconds` for a message, and hand all that have arrived to the mailbox."""
         ...
 
 
 @runtime_checkable
 class Looks(Protocol):
-    """A transport that sees who is there by looking, now and then, and at once before a peer is called silent."""
+    """A transport that finds peers by polling: now and then, and once more before a peer is declared silent."""
 
     def look(self) -> None:
-        """Tell the mailbox who has come and who has gone by now."""
+        """Tell the mailbox which peers have connected and which have gone since the last look."""
         ...
 
 
 class Clock(Protocol):
-    """Says when frames are due and how long commands are waited for; times are those of `time.monotonic`."""
+    """Says when frames are due and how long to wait for commands; times are those of `time.monotonic`, seconds."""
 
     @property
     def lockstep(self) -> bool:
-        """Whether the simulation waits for the command of every tick; then due times are always past."""
+        """Whether the simulation waits for the command of every tick; then every due time is in the past."""
         ...
 
     def start(self, period: float, now: float) -> None:
-        """Simulated time 0 is now; a tick takes `period` simulated seconds."""
+        """Begin simulated time 0 at `now`; a tick takes `period` simulated seconds."""
         ...
 
     def due(self, tick: int) -> float:
-        """Return when frame `tick` is to be sent."""
+        """Return the time at which frame `tick` is to be sent."""
         ...
 
     def until(self, tick: int, now: float) -> float:
-        """Return until when the commands that answer frame `tick` are waited for."""
+        """Return the time until which to wait for the commands that answer frame `tick`."""
         ...
 
     def shift(self, seconds: float) -> None:
-        """Move all that is to come by `seconds`: the trial was paused, or the machine stood still."""
+        """Delay all due times by `seconds`: the trial was paused, or the machine was suspended."""
         ...

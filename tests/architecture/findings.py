@@ -203,16 +203,21 @@ def _code(module: Module) -> list[str]:
 
 
 def _is_apart(part: ast.AST) -> bool:
-    """Whether a statement is an import, a text or a declaration of a field."""
+    """Whether a statement is an import, a text or a declaration of a field, with a first value or without."""
     if isinstance(part, ast.Import | ast.ImportFrom):
         return True
-    if isinstance(part, ast.AnnAssign) and part.value is None:
+    if isinstance(part, ast.AnnAssign) and (part.value is None or _is_number(part.value)):
         return True
     return (
         isinstance(part, ast.Expr)
         and isinstance(part.value, ast.Constant)
         and isinstance(part.value.value, str)
     )
+
+
+def _is_number(value: ast.expr) -> bool:
+    """Whether an expression is a number, or one with its sign."""
+    return isinstance(value.operand if isinstance(value, ast.UnaryOp) else value, ast.Constant)
 
 
 CHECKS: Mapping[str, Callable[[], Findings]] = {

@@ -3,7 +3,8 @@
 A parameter is said to be something where
 
 - its type is a table or a row, a class of the package that says what its fields are, or is a tuple of such;
-- `dubins_traffic.kernels` lists its name and type among those that mean the same in every kernel; or
+- `dubins_traffic.kernels` lists its name and type among those that mean the same in every kernel, or the package that
+  holds the kernel does among those that mean the same in all of its own; or
 - the kernel's docstring names it in backticks, with a shape, a unit or a range in parentheses behind it, as in
   ``"`margin` (m)"``, or its section *Parameters* has an entry for it that gives one.
 """
@@ -17,11 +18,12 @@ from functools import cache
 
 from tests.architecture.house import Findings, Module, modules
 
-JIT = frozenset({"jit", "jit_inline", "jit_long", "jit_wide"})
+JIT = frozenset({"jit", "jit_inline", "jit_long", "jit_look", "jit_rare", "jit_wide"})
 """What makes a function a kernel."""
 WIDE = 8
 """So many parameters of a kernel are too many: tables, rows and nouns (a pose, a body) hold what belongs together."""
 _ROW = re.compile(r"^(\w+(?:, \w+)*) +(\w+) {2,}\S", re.MULTILINE)
+_OF_ROWS = re.compile(r"^(?:Rows|Grid)\[(\w+)\]$")
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*)(?: : (.*))?\n((?:    .*\n?)+)", re.MULTILINE)
 _SHAPE = re.compile(r"\((?:[A-Z]\w*(?: \+ \d+)?|\d+),[^)]*\)|\bmetres\b")
 _UNIT = re.compile(
@@ -36,7 +38,7 @@ def kernels_without_units() -> Findings:
     found: dict[str, str | int] = {}
     for module in modules():
         for kernel in public_kernels(module):
-            missing = [one.arg for one in kernel.args.args if not is_said(kernel, one)]
+            missing = [one.arg for one in kernel.args.args if not is_said(kernel, one, module.name)]
             if missing:
                 found[f"{module.name}.{kernel.name}"] = ", ".join(missing)
     return found
@@ -66,10 +68,11 @@ def kernels(module: Module) -> Iterator[ast.FunctionDef]:
                 yield item
 
 
-def is_said(kernel: ast.FunctionDef, one: ast.arg) -> bool:
-    """Whether it is said what a parameter of a kernel is."""
+def is_said(kernel: ast.FunctionDef, one: ast.arg, name: str = "") -> bool:
+    """Whether it is said what a parameter of a kernel of the module `name` is."""
     kind = "" if one.annotation is None else ast.unparse(one.annotation)
-    if (one.arg, kind) in common_parameters() or kind.split("[")[0] in table_types():
+    common = common_parameters("kernels") | common_parameters(name.rpartition(".")[0])
+    if (one.arg, kind) in common or kind.split("[")[0] in table_types():
         return True
     text = ast.get_docstring(kernel) or ""
     if re.search(rf"`{one.arg}` \([^)]*\w[^)]*\)", text):
@@ -82,10 +85,10 @@ def is_said(kernel: ast.FunctionDef, one: ast.arg) -> bool:
 
 
 @cache
-def common_parameters() -> frozenset[tuple[str, str]]:
-    """Return names and types of the parameters that mean the same in every kernel."""
-    (kernels,) = (module for module in modules() if module.name == "kernels")
-    rows = _ROW.findall(ast.get_docstring(kernels.tree) or "")
+def common_parameters(room: str) -> frozenset[tuple[str, str]]:
+    """Return names and types of the parameters that a package's docstring says mean the same in every kernel."""
+    texts = [ast.get_docstring(module.tree) or "" for module in modules() if module.name == room]
+    rows = _ROW.findall("\n".join(texts))
     return frozenset((name, kind) for names, kind in rows for name in names.split(", "))
 
 
@@ -100,8 +103,9 @@ def table_types() -> frozenset[str]:
 
 
 def _fields(item: ast.ClassDef) -> set[str]:
-    """Return the types of a class's fields."""
-    return {ast.unparse(part.annotation) for part in item.body if isinstance(part, ast.AnnAssign)}
+    """Return the types of a class's fields; of rows of a table that of a row."""
+    kinds = {ast.unparse(part.annotation) for part in item.body if isinstance(part, ast.AnnAssign)}
+    return {_OF_ROWS.sub(r"\1", kind) for kind in kinds}
 
 
 def _says_its_fields(item: ast.ClassDef) -> bool:

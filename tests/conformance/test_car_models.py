@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from dubins_traffic.cars import dynamics
 from dubins_traffic.cars.body import Body, Bounds, Car, Disc, DiscObstacle, Rectangle
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.batch import run_batch
+from dubins_traffic.envs.settings import Settings
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.draw import draw
@@ -125,6 +132,132 @@ def test_bodies_never_overlap_and_what_is_fixed_stands(model: str, body: Body) -
     assert touched >= 3
 
 
+def driven(model: str, commands: Sequence[tuple[float, float]], start: Pose, rate: float = 30.0) -> Floats:
+    """Return x, y, cosine and sine (K + 1, 4) of a car that holds each of the commands for a tick."""
+    simulator = Embedded()
+    state = simulator.reset([scene([start], Car(bounds=BOUNDS, model=model), rate=rate)])
+    rows = [[state.x[0, 0], state.y[0, 0], state.c[0, 0], state.s[0, 0]]]
+    for command in commands:
+        simulator.step(np.array([[command]]))
+        rows.append([state.x[0, 0], state.y[0, 0], state.c[0, 0], state.s[0, 0]])
+    return np.array(rows)
+
+
+PHASES = [(0.8, 0.0), (0.8, 1.2), (0.3, -0.6), (-0.5, 0.4), (0.0, 1.0), (1.1, 2.0)]
+HELD = [command for command in PHASES for _ in range(10)]
+"""Commands, each for ten ticks."""
+
+
+def test_what_is_clipped_once_is_taken_as_it_is(model: str) -> None:
+    """Else records, which hold the commands taken, could not be run again."""
+    own = dynamics.begun(Car(bounds=BOUNDS, model=model), 1 / 30)
+    for speed, yaw_rate in [*PHASES, (9.0, -9.0), (-9.0, 0.0), (0.0, 0.0)]:
+        taken = own.clip(speed, yaw_rate)
+        assert own.clip(*taken) == taken
+        arcs = own.advance(*taken)
+        assert sum(seconds for _, _, seconds in arcs) == pytest.approx(1 / 30, rel=1e-12)
+
+
+def test_a_car_is_where_a_fine_integration_of_its_arcs_leads(model: str) -> None:
+    own = dynamics.begun(Car(bounds=BOUNDS, model=model), 1 / 30)
+    place = [0.3, -0.2, 0.4]
+    rows = driven(model, HELD, pose(*place))
+    for tick, command in enumerate(HELD):
+        for speed, yaw_rate, seconds in own.advance(*own.clip(*command)):
+            u = min(max(speed, -BOUNDS.speed), BOUNDS.speed)
+            most = min(BOUNDS.yaw_rate, abs(u) / BOUNDS.turning_radius)
+            w = min(max(yaw_rate, -most), most)
+
+            def flow(_t: float, at: Any, u: float = u, w: float = w) -> list[float]:
+                return [u * math.cos(at[2]), u * math.sin(at[2]), w]
+
+            if seconds > 0.0:
+                place = solve_ivp(flow, (0.0, seconds), place, rtol=1e-11, atol=1e-12).y[:, -1].tolist()
+        assert rows[tick + 1] == pytest.approx(
+            [place[0], place[1], math.cos(place[2]), math.sin(place[2])], abs=1e-8
+        )
+
+
+def test_a_command_held_twice_as_long_leads_where_two_ticks_do(model: str) -> None:
+    whole = driven(model, HELD, pose(0, 0, 0.5))
+    halves = driven(model, [command for command in HELD for _ in range(2)], pose(0, 0, 0.5), rate=60.0)
+    exact = 1e-9 if model == "dubins" else 5e-3 if model == OUTSIDE else 1e-4
+    assert np.abs(whole - halves[::2]).max() < exact
+
+
+def test_rigid_motions_commute_with_the_motion(model: str) -> None:
+    rows = driven(model, HELD, pose(0.3, -0.2, 0.4))
+    turn, c, s = 1.1, math.cos(1.1), math.sin(1.1)
+    moved = driven(model, HELD, pose(0.3 * c + 0.2 * s + 5.0, 0.3 * s - 0.2 * c - 3.0, 0.4 + turn))
+    turned = np.array([[c, -s], [s, c]])
+    assert moved[:, :2] == pytest.approx(rows[:, :2] @ turned.T + [5.0, -3.0], abs=1e-9)
+    assert moved[:, 2:] == pytest.approx(rows[:, 2:] @ turned.T, abs=1e-9)
+
+
+def test_interpreted_it_writes_the_same_record(model: str, tmp_path: Path) -> None:
+    (tmp_path / "small.json").write_text(json.dumps(drawn(model, duration_bounds=[1, 1]).to_document()))
+    found: list[bytes] = []
+    for switch in ("0", "1"):
+        out = tmp_path / switch
+        command = [
+            "run",
+            str(tmp_path / "small.json"),
+            "--controller",
+            "lanes",
+            "--trials",
+            "1",
+            "--records",
+            str(out),
+        ]
+        env = {**os.environ, "NUMBA_DISABLE_JIT": switch}
+        subprocess.run(
+            [sys.executable, "-m", "dubins_traffic.cli", *command], env=env, check=True, timeout=600
+        )
+        found.append((out / "trial-0000.mcap").read_bytes())
+    assert found[0] == found[1]
+
+
+def test_the_bicycle_follows_its_equations() -> None:
+    """Speed and steering angle go to what is asked for at their limits; the way follows, to 1e-4 m in two seconds."""
+    base, gain, loss, rate, steps = 0.2, 1.5, 3.0, 2.0, 500
+    most = math.atan(base / BOUNDS.turning_radius)
+    rows = driven("bicycle", HELD, pose(0, 0))
+    x = y = heading = v = angle = 0.0
+    h = 1 / 30 / steps
+    for k, (speed, yaw_rate) in enumerate(HELD, start=1):
+        wheel = min(max(math.atan(base * yaw_rate / speed), -most), most) if speed else angle
+        for _ in range(steps):
+            goal = 0.0 if v * speed < 0.0 else speed
+            limit = (loss if abs(goal) < abs(v) else gain) * h
+            now, turned = (
+                min(max(goal, v - limit), v + limit),
+                min(max(wheel, angle - rate * h), angle + rate * h),
+            )
+            bend = math.tan(0.5 * (angle + turned)) / base
+            middle = heading + 0.25 * h * (v + now) * bend
+            x += 0.5 * h * (v + now) * math.cos(middle)
+            y += 0.5 * h * (v + now) * math.sin(middle)
+            heading += 0.5 * h * (v + now) * bend
+            v, angle = now, turned
+        assert rows[k, :2] == pytest.approx([x, y], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("wheelbase", 0.0), ("wheelbase", 5e-324), ("braking", -1.0), ("steering_rate", "much")],
+)
+def test_a_bicycle_that_is_none_is_refused(name: str, value: Any) -> None:
+    car = {"model": "bicycle", "parameters": {name: value}}
+    with pytest.raises(InputError, match=rf"car\.parameters\.{name}"):
+        run_trial(draw(drawn("bicycle", car=car), SEED, 0), "lanes")
+
+
+def test_environments_refuse_a_car_model_by_name() -> None:
+    with pytest.raises(InputError, match="environments move cars together") as caught:
+        Settings(drawn("bicycle"))
+    assert caught.value.field == "car.model"
+
+
 TWIN = """
 class Twin:
     def begin(self, car, period, parameters): self.period = period
@@ -211,6 +344,22 @@ def test_a_model_of_another_package_is_found_by_its_entry_point(
         dynamics.forget()
 
 
+@pytest.mark.parametrize("options", [["--controller", "rules"], ["--controller", "lanes", "--shield"]])
+def test_a_run_of_another_model_is_refused_before_it_begins(
+    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bicycle.json"
+    file.write_text(json.dumps(drawn("bicycle").to_document()))
+    records = tmp_path / "records"
+    assert main(["run", str(file), "--trials", "1", "--records", str(records), *options]) == 2
+    said = capsys.readouterr().err
+    assert "bicycle.json" in said
+    assert "car.model: " in said
+    assert "is known to be right for the Dubins car only: got 'bicycle'" in said
+    assert not records.exists()
+    assert main(["run", str(file), "--trials", "1", "--controller", "lanes"]) in (0, 1)
+
+
 def test_what_is_for_dubins_cars_alone_is_refused() -> None:
     words = "for the Dubins car only"
     made = draw(drawn(OUTSIDE), SEED, 0)
@@ -252,6 +401,7 @@ def test_what_is_no_car_model_is_refused(spec: str, words: str) -> None:
         (("return speed, yaw_rate", "return speed"), "; expected 2 finite numbers"),
         (("(speed, yaw_rate, self.period)", ""), "advance gave 0 arcs"),
         (("self.period)", "0.5 * self.period)"), "advance gave arcs that last 0.0166667 s"),
+        (("[(", "iter(lambda: (0.0, 0.0, 0.0), None) or [("), "advance gave more than 256 arcs"),
         (("(speed, yaw", "(float('nan'), yaw"), "advance gave (nan, 0.0, "),
         (("return [(", "return 5, [("), "advance gave 5; expected 3 finite numbers"),
     ],

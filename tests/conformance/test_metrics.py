@@ -205,9 +205,9 @@ GOOD = {"begin": "pass", "frames": "pass", "end": "pass", "result": "return {'ow
         (BODY.format(**{**GOOD, "end": "1 / 0"}), "raised ZeroDivisionError.* in end"),
         (BODY.format(**{**GOOD, "result": "return {}"}), "other values than its columns"),
         (BODY.format(**{**GOOD, "result": "return 7"}), "other values than its columns"),
-        (BODY.format(**{**GOOD, "result": "return {'own': 'much'}"}), "tells no float64 for own"),
-        (BODY.format(**{**GOOD, "result": "return {'own': float('nan')}"}), "tells no float64 for own"),
-        (BODY.format(**{**GOOD, "result": "return {'own': True}"}), "tells no float64 for own"),
+        (BODY.format(**{**GOOD, "result": "return {'own': 'much'}"}), "returns no float64 for own"),
+        (BODY.format(**{**GOOD, "result": "return {'own': float('nan')}"}), "returns no float64 for own"),
+        (BODY.format(**{**GOOD, "result": "return {'own': True}"}), "returns no float64 for own"),
     ],
 )
 def test_what_is_no_metric_is_refused_by_its_name(code: str, words: str, tmp_path: Path) -> None:

@@ -1,12 +1,12 @@
 """Solves games of cells symbolically, with omega and dd; run by the Python that has them.
 
-Standard input: {"following": cells that each cell leads to, "nodes": how many cells are nodes, "goals": nodes of
-each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered": whether crossings
-keep the order of arrival, "enters": nodes that are to be entered, "crossings": nodes that are such, "opposite": the
-other half of each bend or -1, "beside": lanes near the exits of each node, "leaves", "frees": what is assumed, "unmet",
-"moves_up": whether E4 is weak and E5 strict}. Standard output: {"seconds", "valid", "winning"}, the latter two as
-numbers of labelled positions, and with "list" in the request also "lost": those that are not won, each the cells of the
-cars, ego first, and pairs (i, j) such that i is before j if they wait together.
+Standard input, a line for each game: {"following": cells that each cell leads to, "nodes": how many cells are nodes,
+"goals": nodes of each goal, "targets": nodes in which the ego is to be again and again, "others": e-agents, "ordered":
+whether crossings keep the order of arrival, "enters": nodes that are to be entered, "crossings": nodes that are such,
+"opposite": the other half of each bend or -1, "beside": lanes near the exits of each node, "leaves", "frees": what is
+assumed, "unmet", "moves_up": whether E4 is weak and E5 strict}. Standard output, a line for each: {"seconds", "valid",
+"winning"}, the latter two as numbers of labelled positions, and with "list" in the request also "lost": those that are
+not won, each the cells of the cars, ego first, and pairs (i, j) such that i is before j if they wait together.
 """
 
 from __future__ import annotations
@@ -217,7 +217,11 @@ def all_of(parts: Any) -> str:
 
 
 def main() -> None:
-    request = json.load(sys.stdin)
+    for line in sys.stdin:
+        print(json.dumps(answer_to(json.loads(line))), flush=True)
+
+
+def answer_to(request: dict[str, Any]) -> dict[str, Any]:
     begun = time.perf_counter()
     game = Game(request)
     won = game.solve()
@@ -236,7 +240,7 @@ def main() -> None:
             ]
             for found in lost
         ]
-    print(json.dumps(answer))
+    return answer
 
 
 if __name__ == "__main__":

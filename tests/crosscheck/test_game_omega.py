@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
+from collections.abc import Iterator
 from math import factorial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,23 +15,16 @@ from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import solve
 from tests.games import ALL, board, pan
-from tests.tools import interpreter_with
+from tests.tools import Solvers, solvers
 
 SCRIPT = Path(__file__).with_name("omega_game.py")
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
 
 
-def asked(some: Board) -> Any:
-    ran = subprocess.run(
-        [interpreter_with("omega"), str(SCRIPT)],
-        input=json.dumps(request(some, lost=True)),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
-    assert ran.returncode == 0, ran.stderr[-2000:]
-    return json.loads(ran.stdout.strip().splitlines()[-1])
+@pytest.fixture(scope="module")
+def omega() -> Iterator[Solvers]:
+    with solvers() as made:
+        yield made
 
 
 def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
@@ -73,9 +64,9 @@ def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
     ],
     ids=lambda some: f"{some.arena.cells} cells, {some.others} cars, {some.assumption}",
 )
-def test_winners_are_those_of_omega(some: Board) -> None:
+def test_winners_are_those_of_omega(some: Board, omega: Solvers) -> None:
     solution = solve(build(some))
-    found = asked(some)
+    found = omega.ask("omega", SCRIPT, request(some, lost=True))
     labels = factorial(some.others)
     assert found["valid"] == labels * some.positions
     assert found["winning"] == labels * int(solution.winning.sum())

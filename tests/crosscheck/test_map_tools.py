@@ -13,7 +13,7 @@ import pytest
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import BENT
-from tests.tools import interpreter_with
+from tests.tools import interpreter_with, sumo_program
 
 HERE = Path(__file__).parent
 NETWORKS = {
@@ -74,7 +74,6 @@ def test_sumo_finds_the_same(network: RoadNetwork, tmp_path: Path) -> None:
 
 
 def test_sumo_runs_and_netconvert_reads(network: RoadNetwork, tmp_path: Path) -> None:
-    programs = Path(interpreter_with("sumo")).parent
     network.write(tmp_path / "town.net.xml")
     network.write(tmp_path / "town.xodr")
     for command in (
@@ -82,7 +81,7 @@ def test_sumo_runs_and_netconvert_reads(network: RoadNetwork, tmp_path: Path) ->
         ["netconvert", "-s", "town.net.xml", "-o", "again.net.xml"],
         ["netconvert", "--opendrive-files", "town.xodr", "-o", "drive.net.xml"],
     ):
-        whole = [str(programs / command[0]), *command[1:]]
+        whole = [sumo_program(command[0]), *command[1:]]
         done = subprocess.run(whole, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
         assert done.returncode == 0, done.stderr
         assert "rror" not in done.stderr, done.stderr

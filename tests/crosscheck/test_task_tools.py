@@ -204,11 +204,12 @@ def test_tulip_finds_the_task_realizable_unless_the_ego_must_enter_whoever_is_ah
 def test_tlsf_of_a_town_keeps_the_grammar(spec: Spec, town: Instance) -> None:
     whole = task(town.problem, town.names)
     sections = tlsf_sections(spec(town, "--format", "tlsf"))
-    assert len(sections["guarantee"]) == len(whole.guarantees)
+    assert sum(len(sections[name]) for name in ("preset", "assert", "guarantee")) == len(whole.guarantees)
     assert set(sections["outputs"]) == set(whole.outputs)
     assert set(whole.inputs) < set(sections["inputs"])
     memories = len(sections["inputs"]) - len(whole.inputs)
-    assert len(sections["assume"]) == len(whole.assumptions) + 2 * memories
+    assumed = sum(len(sections[name]) for name in ("initially", "require", "assume"))
+    assert assumed == len(whole.assumptions) + 2 * memories
 
 
 def test_slugs_of_a_town_keeps_the_grammar(spec: Spec, town: Instance) -> None:

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from benchmarks import towns
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.clearance import clearance_faults
@@ -13,10 +14,10 @@ from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.sumo import SumoNet
 from dubins_traffic.roads.network import RoadNetwork
 from tests.room import lacking
-from tests.tools import interpreter_with
+from tests.tools import interpreter_with, sumo_program
 
-TOWNS = {"DRT/osm": 16_000.0, "bs3d/bs": 5_600.0}
-"""Files below `tools/game`, and the least metres with one lane in each direction in them."""
+TOWNS = {"DRT": 16_000.0, "bs3d": 5_600.0}
+"""Towns of `benchmarks.towns`, and the least metres with one lane in each direction in them."""
 LEAST = 0.85
 
 
@@ -36,12 +37,13 @@ def test_these_are_the_two_largest() -> None:
         name = file.relative_to(folder() / "game").as_posix() if "game" in file.parts else file.name
         lengths[name.removesuffix(".net.xml")] = sum(road.length for road in found.roads if road.is_plain)
     largest = sorted(lengths, key=lambda name: lengths[name])[-2:]
-    assert set(largest) == set(TOWNS)
+    assert {f"{name}.net.xml" for name in largest} == {towns.TOWNS[town] for town in TOWNS}
 
 
 @pytest.mark.parametrize("town", TOWNS)
 def test_a_town_is_kept(town: str) -> None:
-    document, losses = SumoNet().reduced((folder() / "game" / f"{town}.net.xml").read_text())
+    assert folder().is_dir()
+    document, losses = towns.reduced(town)
     network = RoadNetwork.from_document(document)
     assert losses.tolerance == 0.1
     assert losses.plain_length >= TOWNS[town]
@@ -51,18 +53,25 @@ def test_a_town_is_kept(town: str) -> None:
     assert lacking(network) == []
 
 
+@pytest.mark.parametrize(("town", "number"), [("DRT", 0), ("DRT", 2), ("bs3d", 0), ("bs3d", 1)])
+def test_rules_is_clean_there_among_lawful_cars(town: str, number: int) -> None:
+    """A sample of `benchmarks.towns`; in all but the last, cars once turned off their lanes where they left discs."""
+    assert folder().is_dir()
+    one = towns.drive(number, town, 60.0)
+    assert (one.own, one.others, one.collisions) == ((), (), 0)
+    assert one.distance > 20.0
+
+
 def test_the_same_town_by_way_of_opendrive(tmp_path: Path) -> None:
-    programs = Path(interpreter_with("sumo")).parent
     source = folder() / "game" / "bs3d" / "bs.net.xml"
     command = [
-        str(programs / "netconvert"),
+        sumo_program("netconvert"),
         "-s",
         str(source),
         "--opendrive-output",
         str(tmp_path / "bs.xodr"),
     ]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
-    direct = SumoNet().reduced(source.read_text())
     document, losses = OpenDrive().reduced((tmp_path / "bs.xodr").read_text())
     assert losses.kept_share >= LEAST
-    assert len(document["segments"]) == len(direct.document["segments"])
+    assert len(document["segments"]) == len(towns.reduced("bs3d").document["segments"])

@@ -1,7 +1,7 @@
 """Realizability by TuLiP; run by an interpreter that has it.
 
-Reads Python files that define `specification` from the standard input, a JSON list; writes for each whether it is
-realizable.
+Each line of the standard input is a JSON list of Python files that define `specification`; for each line one is
+written that says of each of them whether it is realizable.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ import sys
 
 
 def main() -> None:
-    """Answer one request."""
+    """Answer requests."""
     from tulip.interfaces import omega
 
-    answers: list[bool] = []
-    for text in json.load(sys.stdin):
-        names: dict[str, object] = {}
-        exec(text, names)
-        answers.append(bool(omega.is_realizable(names["specification"])))
-    sys.stdout.write("\n" + json.dumps(answers) + "\n")
+    for line in sys.stdin:
+        answers: list[bool] = []
+        for text in json.loads(line):
+            names: dict[str, object] = {}
+            exec(text, names)
+            answers.append(bool(omega.is_realizable(names["specification"])))
+        sys.stdout.write("\n" + json.dumps(answers) + "\n")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

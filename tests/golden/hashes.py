@@ -2,7 +2,7 @@
 
     python -m tests.golden.hashes            compare with tests/golden/hashes.json; status 1 if anything differs
     python -m tests.golden.hashes --write    write the file anew
-    python -m tests.golden.hashes PATTERN    only cases whose name matches, as agent/*
+    python -m tests.golden.hashes PATTERN... only cases whose name matches one of them, as agent/*
 
 A hash that changes on purpose is listed with its reason in tests/golden/EXCEPTIONS.md.
 """
@@ -44,11 +44,11 @@ def differences(name: str, found: dict[str, str], expected: dict[str, str] | Non
 def main() -> int:
     """Compare or write the hashes; return the exit status."""
     reader = argparse.ArgumentParser(prog="python -m tests.golden.hashes")
-    reader.add_argument("pattern", nargs="?", default="*")
+    reader.add_argument("patterns", nargs="*", default=["*"])
     reader.add_argument("--write", action="store_true")
     given = reader.parse_args()
     expected = golden() if FILE.exists() else {}
-    some = {name: case for name, case in cases().items() if fnmatch(name, given.pattern)}
+    some = {name: case for name, case in cases().items() if any(fnmatch(name, own) for own in given.patterns)}
     found: dict[str, dict[str, str]] = {}
     lines: list[str] = []
     for k, (name, case) in enumerate(some.items(), 1):

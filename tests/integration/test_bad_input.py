@@ -485,6 +485,16 @@ def as_nobody(folder: Path) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("place")
+@pytest.mark.parametrize("name", ["", ".", "/"])
+@pytest.mark.parametrize("command", ["plot", "replay", "shrink"])
+def test_what_has_no_name_has_no_output_beside_it(command, name, run_here):
+    status, out, err = run_here([command, name])
+    assert (status, out) == (2, "")
+    assert err.startswith("dubins-traffic: --output: missing; expected a file to write")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.usefixtures("place")
 def test_debug_shows_where(run_here):
     status, _, err = run_here(["--debug", "plot", "nowhere.json", "-o", "x.svg"])
     assert status == 2

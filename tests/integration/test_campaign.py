@@ -11,6 +11,7 @@ import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,8 @@ def test_ten_kills_lose_and_repeat_nothing_that_was_finished(tmp_path: Path, tab
         quiet = subprocess.DEVNULL
         own = command(file, out, "--resume", "--workers", "1")
         with subprocess.Popen(own, stderr=quiet, start_new_session=True) as process:
-            time.sleep(chance.uniform(0.5, 3.5))
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(chance.uniform(0.5, 3.5))
             process.kill()
         await_group(process.pid)
         before, finished = finished, kept(out) if not (out / "results.parquet").exists() else TRIALS

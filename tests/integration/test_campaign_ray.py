@@ -19,8 +19,8 @@ from tests.campaigns import campaign, command, logged, run, succeed, written
 
 pytest.importorskip("ray")
 
-DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=24)
-TRIALS = 2 * 4 * 24
+DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=12)
+TRIALS = 2 * 4 * 12
 BOUND = 120.0
 """Seconds within which the trials of a cluster must have begun."""
 SILENCE = 5.0

@@ -389,7 +389,7 @@ def test_ctrl_c_keeps_finished_trials(jobs, place):
 
 
 def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
-    ask = ["batch", CONFIG, "--trials", "200", "--batch", "2", "--keep", "all", "--records", "out", "--json"]
+    ask = ["batch", CONFIG, "--trials", "5000", "--batch", "2", "--keep", "all", "--records", "out", "--json"]
     process = subprocess.Popen(
         [COMMAND, *ask], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -400,8 +400,8 @@ def test_ctrl_c_keeps_the_finished_trials_of_a_batch(place):
     out, err = process.communicate(timeout=600)
     assert process.returncode == 1
     kept = [trial["trial"] for trial in json.loads(out)["trials"]]
-    assert err == f"dubins-traffic: interrupted after {len(kept)} of 200 trials\nout\n"
-    assert 2 <= len(kept) < 200
+    assert err == f"dubins-traffic: interrupted after {len(kept)} of 5000 trials\nout\n"
+    assert 2 <= len(kept) < 5000
     assert kept == list(range(len(kept)))
 
 

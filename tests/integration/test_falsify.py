@@ -2,15 +2,18 @@
 
 import json
 import os
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
+from dubins_traffic.falsification import search
 from dubins_traffic.falsification.archive import files
-from dubins_traffic.falsification.case import read_case
+from dubins_traffic.falsification.case import Case, read_case
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
 from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.judging import confirm, judge
@@ -24,7 +27,7 @@ FULL = os.environ.get("DUBINS_TRAFFIC_ESTIMATES") == "full"
 
 
 def _bytes(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.json"))}
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.*"))}
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +48,17 @@ def test_every_case_is_violated_within_the_assumption_when_it_is_judged_afresh(f
         assert not verdict.assumption_broken
         assert breach is not None
         assert breach.tick == case.story.tick == case.instance.ticks
+
+
+def test_the_page_of_a_search_tells_what_its_report_does(found: Path) -> None:
+    report = json.loads((found / "search.json").read_text())
+    page = (found / "coverage.html").read_text()
+    never = sum(not row["tested"] and not row["broken"] for row in report["coverage"])
+    assert page.count("never tested</b>") == never > 0
+    assert f"{never} of {len(report['coverage'])} cells were never put to the test" in page
+    links = re.findall(r'href="([^"]*)"', page)
+    assert len(links) == len(report["cases"]) > 0
+    assert all((found / link).is_file() for link in links)
 
 
 def _simple() -> dt.Controller:
@@ -70,6 +84,39 @@ def test_the_same_seed_gives_the_same_bytes_whoever_runs_the_trials_and_however_
     assert _bytes(stopped) == _bytes(found)
 
 
+def test_a_search_that_is_interrupted_while_it_judges_goes_on_as_if_it_had_not_been(
+    found: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, judged = search.case_in, [0]
+
+    def once(*given: Any) -> Case | None:
+        judged[0] += 1
+        if judged[0] == 4:
+            raise KeyboardInterrupt
+        return real(*given)
+
+    monkeypatch.setattr(search, "case_in", once)
+    with pytest.raises(KeyboardInterrupt):
+        dt.falsify("junction", "simple", tmp_path / "found", trials=192, seed=1, duration=8.0)
+    dt.falsify("junction", "simple", tmp_path / "found", trials=192, seed=1, duration=8.0, resume=True)
+    assert _bytes(tmp_path / "found") == _bytes(found)
+
+
+def test_a_search_that_was_killed_finds_again_what_it_had_not_noted(found: Path, tmp_path: Path) -> None:
+    """It has written cases down, but goes on from where it had found none."""
+    folder = tmp_path / "found"
+    states: list[bytes] = []
+
+    def look(_: object) -> None:
+        states.append((folder / "state.json").read_bytes())
+
+    dt.falsify("junction", "simple", folder, trials=64, seed=1, duration=8.0, progress=look)
+    assert list(files(folder))
+    (folder / "state.json").write_bytes(states[0])
+    dt.falsify("junction", "simple", folder, trials=192, seed=1, duration=8.0, resume=True)
+    assert _bytes(folder) == _bytes(found)
+
+
 def test_a_shrunk_case_loses_its_breach_with_any_one_thing_less(found: Path, tmp_path: Path) -> None:
     path = next(path for path in files(found) if path.name.startswith("3.clear"))
     small = dt.shrink(path)
@@ -91,11 +138,19 @@ def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest
     folder = tmp_path / "found"
     arguments = ["--controller", "simple", "--rule", "3.stop", "--trials", "16", "--duration", "6", "-o"]
     assert main(["falsify", "junction", *arguments, str(folder), "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    told = capsys.readouterr()
+    report = json.loads(told.out)
     assert report["trials"] == 16
+    empty = [row for row in report["coverage"] if not row["tested"] and not row["broken"]]
+    warning = f"{len(empty)} of {len(report['coverage'])} cells were never put to the test"
+    assert (warning in told.err) == bool(empty)
     assert all(name.startswith("3.stop") for name in report["cases"])
     assert {row["rule"] for row in report["coverage"]} == {"3.stop"}
     case = str(next(files(folder)))
+    assert main(["shrink", case, "-o", str(tmp_path / "missing" / "small.json")]) == 2
+    told = capsys.readouterr().err
+    assert "missing: no such folder" in told
+    assert "without" not in told, "work was done that could not be kept"
     assert main(["shrink", case, "-o", str(tmp_path / "small.json")]) == 0
     assert "without having stopped" in capsys.readouterr().out
     assert "<html" in (tmp_path / "small.html").read_text()
@@ -155,7 +210,7 @@ def test_splitting_and_monte_carlo_agree_on_an_event_whose_probability_is_known(
 
 def test_an_event_of_one_in_a_million_is_estimated_with_fifty_thousand_trials() -> None:
     configuration, found = corridor(13), []
-    runs, particles = (10, 2_500) if FULL else (3, 400)
+    runs, particles = (10, 2_500) if FULL else (1, 400)
     for run in range(runs):
         instances = list(draw_many(configuration, run, range(particles)))
         once = split(instances, standing(), NEAR, instances[0].ticks, np.random.default_rng(run))

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import typer
 
-from dubins_traffic.cli.main import app
+from dubins_traffic.cli.commands import app
 from tests.ports import kept_port
 from tests.ros import PATIENCE, ROOT, Graph, configuration, graph, need_ros, read_until
 
@@ -74,28 +74,6 @@ def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path:
     }
     order = [said.index(word) for word in ("compiling", "compiled", place[kind], "trial 0 (1 of")]
     assert order == sorted(order)
-
-
-def test_json_lines_work_as_typed(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "attach.md").read_text(encoding="utf-8")
-    section = text.partition("## Over JSON lines")[2].partition("\n## ")[0]
-    (typed,) = re.findall(r"```bash\ndubins-traffic (.*?)\n```", section, re.DOTALL)
-    (code,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    around = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
-    command = [sys.executable, "-m", "dubins_traffic.cli", *shlex.split(typed)]
-    process = subprocess.Popen(command, cwd=tmp_path, env=around, stderr=subprocess.PIPE, text=True)
-    try:
-        read_until(process, "JSON lines at 127.0.0.1:7411")
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, env=around, check=True, capture_output=True, text=True
-        )
-        process.communicate(timeout=PATIENCE)
-    finally:
-        process.kill()
-    assert done.stdout.count("'end': 'duration'") == 3
-    assert process.returncode == 0
-    assert len(list((tmp_path / "out").glob("*.mcap"))) == 3
 
 
 def test_the_launch_file_works_as_typed(tmp_path: Path) -> None:

@@ -102,6 +102,70 @@ class Lost(Drives):
         return (0.3, 0.1)
 
 
+class Odd(type):
+    @property
+    def __name__(cls): raise ZeroDivisionError
+
+
+class OddError(Exception, metaclass=Odd):
+    @property
+    def __traceback__(self): raise ZeroDivisionError
+
+
+class RaisesOddly(Drives):
+    def act(self, observation): raise OddError("odd")
+
+
+class NamesItsEnd(Drives):
+    """Says by itself that its trial is over, as those may who hear of others' programs."""
+    end, detail = "duration", "all done"
+    def act(self, observation):
+        from dubins_traffic.errors import PeerError
+        if observation.tick < 5:
+            return (0.3, 0.1)
+        error = PeerError(self.end, "")
+        error.detail = self.detail
+        raise error
+
+
+class NamesNoEnd(NamesItsEnd):
+    end = "glory"
+
+
+class NamesNoDetail(NamesItsEnd):
+    end, detail = "gave_up", 7
+
+
+class ChangesTheProblem(Drives):
+    def start(self, problem): problem.formulas["won"] = "G true"
+
+
+class Disturbs(Drives):
+    """Leaves this process otherwise than it was."""
+    def start(self, problem):
+        import tempfile, threading
+        print("it starts")
+        os.chdir(tempfile.gettempdir())
+        os.fork()
+    def act(self, observation):
+        sys.stdout = None
+        return (0.3, 0.1)
+
+
+class LeavesAThread(Drives):
+    def start(self, problem):
+        import threading
+        threading.Thread(target=threading.Event().wait, name="waits").start()
+
+
+class IsTold(Drives):
+    """Sends its own process the signal to end."""
+    def act(self, observation):
+        if observation.tick == 5:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return (0.3, 0.1)
+
+
 class Together(Drives):
     def start_batch(self, trials, problems): sys.exit(0)
     def act_batch(self, view): return [[0.0, 0.0]] * len(view.trial)
@@ -140,6 +204,11 @@ def outside(*arguments: str, **environment: str) -> subprocess.CompletedProcess[
 
 
 FAULTY = {
+    "RaisesOddly": "OddError: odd at tick 0 (hostile.py:",
+    "NamesItsEnd": "PeerError: duration: ",
+    "NamesNoEnd": "PeerError: glory: ",
+    "NamesNoDetail": "PeerError: gave_up: ",
+    "ChangesTheProblem": "TypeError: a problem is never changed: make a copy, by dict(...) at tick 0 (hostile.py:",
     "ExitsInStart": "SystemExit at tick 0 (hostile.py:",
     "ExitsInAct": "SystemExit: 0 at tick 5 (hostile.py:",
     "ExitsInReport": "SystemExit at tick 0 (hostile.py:",

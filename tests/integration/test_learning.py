@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import importlib.util
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,6 @@ from dubins_traffic.scoring.score import Score
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "learning"
 PAGE = ROOT / "docs" / "learning.md"
-
-
-def test_the_page_on_learning_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 4
-    for block in blocks:
-        exec(compile(block, PAGE.name, "exec"), {})
-    assert (tmp_path / "episode.mcap").is_file()
 
 
 def test_the_page_names_all_that_stands_in_an_observation() -> None:

@@ -64,12 +64,13 @@ def driven(env: Any, seed: int, steps: int = 10**6, bias: float = 0.5) -> list[A
     """Drive an episode at random, rather forward; return what each step has given, and poses, tick by tick."""
     chance = np.random.default_rng(seed)
     found: list[Any] = [env.reset(seed=seed)]
+    cars = 1 + len(env.unwrapped.trial.e_agents)
     while env.agents and len(found) <= steps:
         actions = {
             name: np.clip(np.add(chance.uniform(-1.0, 1.0, 2), (bias, 0.0)), -1.0, 1.0) for name in env.agents
         }
         state = env.unwrapped._crew.group.state
-        found.append((*env.step(actions), [array[0].copy() for array in state[:6]]))
+        found.append((*env.step(actions), [array[0, :cars].copy() for array in state[:6]]))
     return found
 
 

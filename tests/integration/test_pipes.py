@@ -127,6 +127,17 @@ def test_a_reader_that_has_had_enough_is_no_error(command):
         assert done.stderr == ""
 
 
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [("network --grid 3 3 >&-", 0), ("network nowhere 2>&-", 2), ("instance small.json <&- >&- 2>&-", 0)],
+)
+def test_streams_that_are_closed_lead_nowhere(command, status):
+    done = subprocess.run(
+        ["bash", "-c", f"{COMMAND} {command}"], check=False, capture_output=True, text=True, timeout=300
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("", "", status)
+
+
 def test_a_reader_of_messages_that_has_had_enough_is_no_traceback():
     script = f"{COMMAND} plot nowhere.json -o x.svg 2>&1 >/dev/null | true; echo ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", script], check=False, capture_output=True, text=True, timeout=300)

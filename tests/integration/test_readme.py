@@ -1,4 +1,4 @@
-"""The README's code runs as it stands, in its order."""
+"""The code of the README, and then that of the tour, runs as it stands, in its order."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from dubins_traffic import load_config, run_batch, run_trial
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+ALL = os.environ.get("DUBINS_TRAFFIC_PAGES") == "all"
+MANY = "--trials 500"
+"""Of the search on the page."""
 FILE_NAME = re.compile(r"# (\w+\.(?:py|toml))\n")
 
 
@@ -56,10 +60,12 @@ def run_block(language: str, text: str, folder: Path) -> None:
 
 
 def test_all_code_runs(tmp_path):
-    ran = runnable(README)
-    assert len(ran) >= 6
+    """As it stands; of the trials of the search `make test` runs a part, and `make test-all` all."""
+    ran = [*runnable(README), *runnable(TOUR)]
+    assert len(ran) >= 12
+    assert sum(MANY in text for _, text in ran) == 1
     for language, text in ran:
-        run_block(language, text, tmp_path)
+        run_block(language, text if ALL else text.replace(MANY, "--trials 100"), tmp_path)
     made = {path.suffix for path in tmp_path.rglob("*")}
     assert {".mcap", ".png", ".svg", ".pdf", ".html", ".csv", ".json", ".rnd"} <= made
 

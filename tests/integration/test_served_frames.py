@@ -20,7 +20,7 @@ from dubins_traffic.competition.templates import write_template
 from dubins_traffic.service.client import packed
 from tests.services import COMMAND, Person, Service, serving, wait_until
 
-TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SERVED_TRIALS", "24"))
+TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SERVED_TRIALS", "12"))
 LONGEST_S = 240.0 + 30.0 * TRIALS
 FINAL = ("done", "rejected", "failed", "cancelled")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
+from dubins_traffic.campaign.report.statistics import share
+from dubins_traffic.suites.suite import load_suite, shipped_suites
 from tests.browser import browsing, need_browser
 
 ROOT = Path(__file__).parents[2]
@@ -69,6 +72,23 @@ def test_every_page_of_the_documentation_is_there(pages: dict[Path, Page], site:
     assert wanted - there == {"package.md"}
 
 
+def test_the_menu_names_every_page_once(site: Path) -> None:
+    text = (site / "index.html").read_text(encoding="utf-8")
+    entries = re.findall(r'toctree-l1[^>]*><a class="reference internal" href="[^"]*">([^<]*)<', text)
+    assert len(entries) > 40
+    assert len(set(entries)) == len(entries)
+    assert "README" in entries
+    assert "dubins-traffic" not in entries
+
+
+def test_words_are_those_that_were_written(site: Path) -> None:
+    """Quotes of the tables can be copied, and fields of tuples say nothing that Python says by itself."""
+    assert "\N{LEFT DOUBLE QUOTATION MARK}" not in (site / "documents.html").read_text(encoding="utf-8")
+    told = (site / "reference" / "api" / "driving.html").read_text(encoding="utf-8")
+    assert "yaw_rate" in told
+    assert "Alias for field number" not in told
+
+
 def leads(path: Path, link: str) -> tuple[Path, str]:
     parts = urlsplit(link)
     target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
@@ -103,13 +123,48 @@ def test_every_trial_of_the_gallery_has_a_page(pages: dict[Path, Page], site: Pa
         if "gallery/" in link
     }
     assert {path.resolve() for path in (site / "gallery").iterdir()} == shown
-    assert len(shown) >= 19
+    assert len(shown) >= 21
+
+
+def rows_of(text: str, heading: str) -> dict[str, list[str]]:
+    """Return the cells of the first table below a heading, by the first of each row."""
+    part = text.partition(f'<section id="{heading}">')[2].partition("</table>")[0]
+    lines = re.findall(r"<tr[^>]*>(.*?)</tr>", part, re.DOTALL)
+    cells = [
+        [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", line)] for line in lines
+    ]
+    return {line[0]: line[1:] for line in cells if line}
+
+
+def test_the_numbers_of_the_results_are_those_of_the_files(site: Path) -> None:
+    text = (site / "results.html").read_text(encoding="utf-8")
+    for name in shipped_suites():
+        suite = load_suite(name)
+        file = json.loads((site / "results" / f"{suite.label}.json").read_text(encoding="utf-8"))
+        assert file["hash"] == suite.hash
+        assert (site / "results" / f"{name}.html").is_file()
+        rows = rows_of(text, name)
+        assert len(file.get("entries", [])) == (0 if suite.model.games else 6)
+        for k, entry in enumerate(file.get("entries", [])):
+            columns = entry["columns"]
+            if suite.model.cases:
+                assert rows["clean"][k].startswith(f"{sum(columns['clean'])} of 57 [")
+                continue
+            cells = rows[entry["controller"]]
+            values = [float(value or 0) for value in columns[suite.model.metric]]
+            assert cells[0] == str(len(values))
+            assert cells[1].startswith(f"{sum(values) / len(values):.4g}")
+            if name == "rules-2026":
+                clean = share(sum(columns["clean"]), len(values))
+                assert cells[3].startswith(f"{clean.share:.1%} [")
+        if suite.model.games:
+            assert {line[-2] for line in rows.values()} == {"right"}
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
     need_browser()
-    with browsing(tmp_path_factory.mktemp("profile")) as driver:
+    with browsing(tmp_path_factory.mktemp("profile"), traffic=True) as driver:
         yield driver
 
 
@@ -118,3 +173,24 @@ def test_the_search_works_from_a_file(site: Path, browser: webdriver.Chrome) -> 
     WebDriverWait(browser, 300).until(
         lambda page: page.find_elements(By.CSS_SELECTOR, "#search-results a[href*='rules.html']")
     )
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["index", "rules", "gallery", "results", "tutorials/first-controller", "reference/api/trials"],
+)
+def test_a_page_asks_for_files_beside_it_alone(name: str, site: Path, browser: webdriver.Chrome) -> None:
+    browser.get("about:blank")
+    for kind in ("performance", "browser"):
+        browser.get_log(kind)  # of pages before
+    browser.get((site / f"{name}.html").as_uri())
+    width = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    assert browser.execute_script(width) <= 0
+    events = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
+    sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+    asked = [
+        one["request"]["url"] for one in sent if not one["request"]["url"].startswith(("data:", "chrome:"))
+    ]
+    assert len(asked) > 3
+    assert [address for address in asked if not address.startswith(site.as_uri())] == []
+    assert [said["message"] for said in browser.get_log("browser") if said["level"] == "SEVERE"] == []

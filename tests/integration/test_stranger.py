@@ -13,6 +13,8 @@ from tests.integration.test_tutorials import follow
 from tests.tools import interpreter_with
 
 PATIENCE_S = 1800.0
+STEPS = ("first-controller", "reading-a-verdict", "campaign")
+"""Tutorials on the path."""
 
 
 def done(words: Sequence[object], folder: Path, around: Mapping[str, str]) -> str:
@@ -34,18 +36,33 @@ def installed(folder: Path) -> dict[str, str]:
     around = {name: own for name, own in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     done([sys.executable, "-m", "build", "--wheel", "--outdir", folder / "dist", ROOT], folder, around)
     (wheel,) = (folder / "dist").iterdir()
-    done([sys.executable, "-m", "venv", folder / "environment"], folder, around)
+    done([sys.executable, "-m", "venv", "--without-pip", folder / "environment"], folder, around)
     programs = folder / "environment" / "bin"
-    pip = [programs / "python", "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt"]
+    pip = [sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet", "--no-compile"]
+    pip += ["--constraint", ROOT / "constraints.txt"]
     done([*pip, f"{wheel}[campaign,pandas]"], folder, around)
     return around | {"PATH": f"{programs}{os.pathsep}{around['PATH']}"}
 
 
+def test_the_first_page_leads_there() -> None:
+    """It installs what `installed` does, and links to each step; the last one names its program."""
+    page = (ROOT / "website" / "index.md").read_text(encoding="utf-8")
+    assert "\npip install '.[campaign,pandas]'\n" in page
+    places = [page.index(f"(tutorials/{name}.md)") for name in STEPS] + [
+        page.index("(foreign-strategies.md)")
+    ]
+    assert places == sorted(places)
+    last = (ROOT / "docs" / "foreign-strategies.md").read_text(encoding="utf-8")
+    assert "python examples/foreign_synthesis.py --tulip " in last
+
+
 def test_the_path_of_a_stranger(tmp_path: Path) -> None:
     around = installed(tmp_path)
-    for name in ("first-controller", "reading-a-verdict", "campaign"):
+    for name in STEPS:
         (tmp_path / name).mkdir()
         follow(name, tmp_path / name, around)
+    report = (tmp_path / "campaign" / "first" / "report" / "index.html").read_text(encoding="utf-8")
+    assert "Brackets hold 95 % intervals" in report
     where = [
         tmp_path / "environment" / "bin" / "python",
         "-c",

@@ -1,5 +1,6 @@
 """A batch gives the scores and verdicts of its trials run one by one, bit for bit."""
 
+import gc
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -8,9 +9,10 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.state import Command, Observation, Pose
+from dubins_traffic.engine.asking import ask
 from dubins_traffic.engine.batch import outcomes, run_batch
 from dubins_traffic.engine.batch_records import failed
-from dubins_traffic.engine.controlled import BatchView, ask
+from dubins_traffic.engine.controlled import BatchView
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
@@ -390,3 +392,17 @@ def test_a_frame_in_which_every_goal_is_taken_finds_room_for_its_breaches(monkey
     (own,) = ask([draw(config, SEED, 0)], Stands, "driver", 1)
     assert own.ending.end is End.DURATION
     assert len(own.score.goals) == 289
+
+
+@pytest.mark.parametrize("controller", ["rules", "lanes"])
+def test_nothing_is_left_of_the_trials_that_a_batch_has_run(controller) -> None:
+    instances = [draw(configuration(), number) for number in range(24)]
+
+    def objects() -> int:
+        list(outcomes(instances, controller))
+        gc.collect()
+        return len(gc.get_objects())
+
+    objects()
+    before = objects()
+    assert objects() - before < len(instances)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dubins_traffic.cars.body import DiscObstacle
 from dubins_traffic.cars.state import Frames, Pose
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.problem.configuration import Configuration, load_config
@@ -20,7 +21,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.reader import read
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score, score
-from tests.chain_reference import RING, SNAKE
+from tests.chain_reference import RING, SNAKE, Track
 from tests.judge_trials import BENT, compare
 
 SEED = 4
@@ -68,7 +69,17 @@ def test_a_rigid_motion_of_the_map_commutes_with_a_trial(network: Any, tmp_path:
     config = _configured(network=None, rnd=network.to_document())
     here = draw(config, SEED, 0)
     starts = [_moved(pose, turn) for pose in here.starts]
-    there = replace(here, problem=replace(here.problem, network=moved), starts=tuple(starts))
+    discs: list[DiscObstacle] = []
+    for s in np.flatnonzero(network.bent).tolist():
+        spot, way = Track(network, s).point(0.4 * float(network.lengths[s]))
+        spot -= 0.35j * way
+        discs.append(DiscObstacle(spot.real, spot.imag, 0.1))
+    away = [turn * complex(disc.x, disc.y) + SHIFT for disc in discs]
+    beside = tuple(DiscObstacle(spot.real, spot.imag, 0.1) for spot in away)
+    here = replace(here, problem=replace(here.problem, obstacles=tuple(discs)))
+    there = replace(
+        here, problem=replace(here.problem, network=moved, obstacles=beside), starts=tuple(starts)
+    )
     frames: list[Frames] = []
     verdicts: list[Any] = []
     for k, found in enumerate((here, there)):

@@ -31,13 +31,13 @@ KEPT = {"1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.c
 """Rules that E1 and E2 state."""
 
 
-def trial(number: int, seconds: float, agents: int = 6) -> Instance:
+def trial(number: int, seconds: float, agents: int = 6, bent: float = 0.0) -> Instance:
     """Return a random trial whose e-agents are driven from outside."""
     draws = Draws(11, number, 0)
     more: dict[str, Any] = {"rules": True}
     if number % 4 == 0:
         more["car"] = {"body": {"rectangle": {"length": 0.4, "width": 0.25}}}
-    roads = random_roads(draws, 9, 0.8)
+    roads = random_roads(draws, 9, 0.8, bent)
     drawn = random_trial(
         roads, [{"type": "lawful", "name": f"a{k}"} for k in range(agents)], seconds, 5, number, **more
     )

@@ -18,12 +18,12 @@ from dubins_traffic.agents.choices import (
     empty,
     from_rows,
     mutated,
-    place_in_lane,
     reductions,
     table_of,
     to_rows,
     with_choices,
 )
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.draw import draw
@@ -149,15 +149,9 @@ def test_a_nudged_car_that_is_in_time_and_exact_does_what_its_kind_does(tmp_path
     assert not np.array_equal(lawful, late)
 
 
-def test_a_place_in_a_lane_lies_on_its_right_side() -> None:
+def test_a_car_starts_where_it_is_put_and_keeps_its_table() -> None:
     instance = next(trials(1, 0.0))
-    network, w = instance.problem.network, instance.problem.car.w
-    pose = place_in_lane(network, 0, 0.5, w)
-    start, end = (np.asarray(network.points[v]) for v in network.lane_ends(0))
-    along = (end - start) / np.hypot(*(end - start))
-    away = np.array([pose.x, pose.y]) - 0.5 * (start + end)
-    assert along[0] * away[1] - along[1] * away[0] == pytest.approx(-w)
-    assert (pose.c, pose.s) == pytest.approx(tuple(along))
+    pose = Pose(0.5, -0.3, 1.0, 0.0)
     moved = with_choices(instance, {}, {1: pose})
     assert moved.starts[1] == pose
     assert np.array_equal(table_of(with_choices(instance, {1: empty(3)}).e_agents[0]), empty(0))

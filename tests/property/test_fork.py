@@ -206,13 +206,13 @@ def test_a_record_that_is_asked_for_is_that_of_the_whole_trial(at: int, tmp_path
 def test_a_fork_that_can_t_be_is_refused_and_the_trial_goes_on(tmp_path: Path) -> None:
     instance = draw(configuration(KINDS[:1], "plain", rules=True, seconds=2), SEED, 0)
     trial = Trial(instance)
-    with pytest.raises(InputError, match="no record to go on with"):
+    with pytest.raises(InputError, match="no record to continue"):
         trial.fork(record=tmp_path / "fork.mcap")
     with pytest.raises(InputError, match="seed"):
         trial.fork(-1)
     (tmp_path / "there.mcap").write_bytes(b"mine")
     with Trial(instance, record=tmp_path / "trial.mcap") as recorded:
-        with pytest.raises(InputError, match="one seed"):
+        with pytest.raises(InputError, match="another seed"):
             recorded.fork(3, record=tmp_path / "fork.mcap")
         with pytest.raises(InputError, match="exists"):
             recorded.fork(record=tmp_path / "there.mcap")
@@ -376,7 +376,7 @@ def test_forks_of_trials_whose_controllers_are_asked_equal_the_trials(world: str
 def test_a_controller_of_whole_batches_does_not_go_on_twice() -> None:
     config = configuration((), "plain", rules=False)
     own = Controlled([draw(config, SEED, 0)], Wheel, Wheel())
-    with pytest.raises(DubinsTrafficError, match="whole batches"):
+    with pytest.raises(DubinsTrafficError, match="a BatchController can't be forked"):
         own.fork([0])
 
 

@@ -315,7 +315,7 @@ def test_shipped_configurations_can_be_drawn(name: str) -> None:
     config = load_config(name)
     for trial in range(3):
         instance = draw(config, 0, trial)
-        assert isinstance(instance.problem.car.body, Disc)
+        assert isinstance(instance.problem.car.body, Rectangle if name == "suburb" else Disc)
         assert instance_from_document(json.loads(json.dumps(instance_to_document(instance)))) == instance
 
 

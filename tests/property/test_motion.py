@@ -87,7 +87,7 @@ def test_cells_find_the_same_pairs_as_looking_at_all(seed) -> None:
     state.y[0] = rng.uniform(-4, 4, n)
     found = []
     none = pack_obstacles([[]])
-    search = near.search_room(n, 4000)
+    search = near.search_tables(n, 4000)
     distance = rng.uniform(0.1, 1.5)
     count = near.candidates(0, distance, 0.1, state, none, search)
     found = {tuple(sorted(row)) for row in numbers(search.pair, np.int64)[:count].tolist()}

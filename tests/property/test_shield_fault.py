@@ -54,9 +54,10 @@ def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(
     trials = pairs(body, 5)
     problem = trials[0].problem
     state = Embedded().reset(trials)
+    bodies = pack_obstacles([()] * PAIRS)
     traffic = Traffic(
-        state, Labels.zeros(PAIRS, 2), pack([problem.network], [0.6]), pack_obstacles([()] * PAIRS),
-        egos([one.problem for one in trials], 2, np.zeros(PAIRS, dtype=np.int64)), scratch(2, 8),
+        state, Labels.zeros(PAIRS, 2), pack([problem.network], [0.6]), bodies,
+        egos([one.problem for one in trials], 2, np.zeros(PAIRS, dtype=np.int64)), scratch(2, 8, bodies),
     )  # fmt: skip
     vehicle: Any = vehicles_of([problem])[0]
     bounds, travel = problem.car.bounds, travel_of(vehicle)

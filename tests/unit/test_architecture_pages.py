@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from tests.architecture.house import PACKAGE
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PICTURES = DOCS / "pictures"
+NAME = re.compile(r"`(dubins_traffic(?:\.\w+)+)`")
+NO_NAMES = {f"dubins_traffic.{group}" for group in ("metrics", "map_formats", "car_models")}
+"""Groups of entry points."""
 
 
 def page(name: str) -> str:
@@ -34,6 +40,27 @@ def test_the_architecture_names_every_room() -> None:
     table = page("architecture.md").partition("## Rooms")[2].partition("## What may be plugged in")[0]
     cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
     assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == rooms()
+
+
+def names() -> list[str]:
+    pages = [path for path in DOCS.rglob("*.md") if path.parent.name != "design"]
+    texts = [path.read_text(encoding="utf-8") for path in [*pages, ROOT / "README.md"]]
+    return sorted({name for text in texts for name in NAME.findall(text)} - NO_NAMES)
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_name_of_the_package_on_a_page_exists(name: str) -> None:
+    """It is a module, or stands in one, or is the field of a class in one."""
+    words = name.split(".")
+    for count in range(len(words), 0, -1):
+        try:
+            found: object = importlib.import_module(".".join(words[:count]))
+        except ModuleNotFoundError:
+            continue
+        for word in words[count:]:
+            found = getattr(found, word)
+        return
+    pytest.fail(name)
 
 
 def test_the_files_that_the_notes_name_exist() -> None:

@@ -91,3 +91,12 @@ def test_what_is_no_network_is_refused_by_segment_and_corner(rows: Any, field: s
 
 def test_roads_may_bend_round_each_other() -> None:
     _network([0, 0, 8, 0, 2, 2, 1, 6, 2, 1], [0, 0, 8, 0.5, 2, 4, 1, 6, 4, 1])
+
+
+@pytest.mark.parametrize("last", [[4.0, 2.0], [-4.0, 2.0]])
+def test_arcs_with_hardly_a_line_between_them_do_not_cross(last: list[float]) -> None:
+    """A document may have been rounded: what is left of a side that two arcs shared is no crossing."""
+    for gap in (1e-9, 1e-8, 1e-7, 1e-6, 1e-5):
+        radius = 1.0 - 0.5 * gap
+        made = _network([-4.0, 0.0, *last, 2, 0, radius, 2, 2, radius])
+        assert len(made.chains.owner) in (4, 5)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pyarrow import parquet
 
-from dubins_traffic.campaign import rows
+from dubins_traffic.campaign import manifest, rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
 from dubins_traffic.campaign.folder import Folder, opened
 from dubins_traffic.campaign.records import Keep, Records, read_keep
@@ -119,10 +119,10 @@ def test_changed_surroundings_are_refused(tmp_path: Path) -> None:
     ):
         pass
     written(tmp_path, campaign())
-    manifest = out / "manifest.json"
-    document = json.loads(manifest.read_text())
+    place = out / "manifest.json"
+    document = json.loads(place.read_text())
     document["versions"]["dubins-traffic"] = "0.0.1"
-    manifest.write_text(json.dumps(document))
+    place.write_text(json.dumps(document))
     with (
         pytest.raises(InputError, match=r"versions.dubins-traffic: changed .*expected \"0.0.1\""),
         opened(out, own, resume=True, records=None),
@@ -179,3 +179,32 @@ def test_a_machine_without_the_controller_makes_no_rows(short: Campaign) -> None
     chunk = replace(next(short.chunks()), controller="/nowhere/mine.py:Mine")
     with pytest.raises(InputError, match=r"no such file: /nowhere/mine.py"):
         run_chunk(chunk)
+
+
+DAMAGE: dict[str, tuple[str, dict[str, Any], str]] = {
+    "a text for an entry": (manifest.NAME, {"controllers": ["lanes"]}, r"controllers\[0\]: wrong value"),
+    "no controllers": (manifest.NAME, {"controllers": []}, "controllers: "),
+    "no versions": (manifest.NAME, {"versions": [1]}, "versions: wrong value"),
+    "not our version": (manifest.NAME, {"versions": {}}, "versions.dubins-traffic: missing"),
+    "another campaign": (manifest.CAMPAIGN, {"seed": 77}, "campaign.json: changed since the campaign began"),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_what_is_told_of_a_campaign_is_as_it_was_written(kind: str, short: Campaign, tmp_path: Path) -> None:
+    with opened(tmp_path / "out", short, resume=False, records=None):
+        pass
+    name, change, needle = DAMAGE[kind]
+    path = tmp_path / "out" / name
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(InputError, match=needle):
+        manifest.stored_campaign(tmp_path / "out", manifest.read(tmp_path / "out") or {})
+
+
+def test_a_controller_that_is_missing_in_the_manifest(short: Campaign, tmp_path: Path) -> None:
+    with opened(tmp_path / "out", short, resume=False, records=None):
+        pass
+    known = manifest.read(tmp_path / "out") or {}
+    twice = {**known, "controllers": [*known["controllers"], *known["controllers"]]}
+    with pytest.raises(InputError, match="controllers: other controllers"):
+        manifest.stored_campaign(tmp_path / "out", twice)

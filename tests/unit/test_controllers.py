@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from dubins_traffic.cars.body import Bounds, Car
 from dubins_traffic.cars.state import Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.simple import Simple
@@ -19,6 +20,7 @@ PLACES = np.array([[2.0, 0.0], [2.0, 2.0], [-1.0, 0.5]])
 
 def problem(count: int = 3, radius: float = 1.0) -> Any:
     return SimpleNamespace(
+        car=Car(),
         network=SimpleNamespace(points=PLACES),
         goals=tuple((k, 0) for k in range(count)),
         goal_vertices=tuple(range(count)),
@@ -55,6 +57,19 @@ def test_simple_takes_the_next_goal_within_half_the_radius() -> None:
     assert controller.act(seen(1.51, 0.0, 0.0)) == (0.0, 0.9)
     assert controller.act(seen(2.0, 1.6, math.pi / 2)) == (0.0, 0.9)
     assert controller.act(seen(-0.9, 0.5, 0.0)) == (0.0, -0.9)
+
+
+def test_simple_drives_arcs_with_a_car_that_cannot_turn_in_place() -> None:
+    """A point within its tightest circle it leaves behind first; one behind it turns for."""
+    own = problem(1, 0.01)
+    own.car = Car(bounds=Bounds(turning_radius=1.0))
+    controller = Simple()
+    controller.start(own)
+    gx, gy = PLACES[0]
+    assert controller.act(seen(gx - 4.0, gy, 0.0)) == pytest.approx((0.5, 0.0))
+    assert controller.act(seen(gx, gy - 0.5, 0.0)) == (0.5, 0.0)
+    assert controller.act(seen(gx + 4.0, gy - 1.0, 0.0)) == pytest.approx((0.5, 0.5))
+    assert controller.act(seen(gx + 4.0, gy + 1.0, 0.0)) == pytest.approx((0.5, -0.5))
 
 
 def test_simple_goes_round_its_goals() -> None:

@@ -257,7 +257,7 @@ def test_without_pandas_the_extra_is_named(values: dict[str, Any], monkeypatch: 
 @pytest.mark.parametrize(
     ("call", "python", "typed"),
     [
-        (lambda _: dt.run_batch("demo", trials=1, keep="some"), "keep: not a choice", "--keep: not a choice"),
+        (lambda _: dt.run_batch("demo", trials=1, keep="some"), "keep: unknown choice", "--keep: unknown choice"),
         (lambda _: dt.plan("demo", deadline=-1.0), "deadline: not a time", "--deadline: not a time"),
         (lambda place: dt.plan("demo", data=place), "overwrite_data=True", "-F"),
         (lambda place: dt.RecordWriter(place).begin(instance(ROUGH)), "overwrite=True replaces", "--overwrite"),

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from dubins_traffic.roads.chain import chain
 from dubins_traffic.roads.maps.arms import spread
+from dubins_traffic.roads.maps.conflicts import on_itself
 from dubins_traffic.roads.maps.fitting import Fit, Limits, fit
 from dubins_traffic.roads.maps.geometry import Placed, clothoid, cubic, cubic_over
 from dubins_traffic.roads.maps.polylines import rounded, to_segments, true_length
+from dubins_traffic.roads.maps.settings import ImportSettings
 
 LIMITS = Limits(0.1, 4.8, 9.0)
 
@@ -125,3 +127,32 @@ def test_arms_are_turned_as_little_as_needed() -> None:
     assert max(abs(a - b) for a, b in zip(wanted, (0.0, 0.8, 3.0), strict=True)) < 0.14
     assert spread([0.0, 0.01, 3.0], 1.07) is None
     assert spread([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 1.07) is None
+
+
+def test_a_line_that_comes_near_itself_is_told_however_long_it_is() -> None:
+    room = ImportSettings().room(0.1875)
+    straight = np.array([[0.0, 0.0], [90_000.0, 0.0]])
+    assert not on_itself(straight, room)
+    wide, narrow = (np.array([[0.0, 0.0], [900.0, 0.0], [900.0, gap], [0.0, gap]]) for gap in (80.0, 6.0))
+    assert not on_itself(wide, room)
+    assert on_itself(narrow, room)
+    crossing = np.array([[0.0, 0.0], [3000.0, 0.0], [3000.0, 2000.0], [1501.0, 2000.0], [1501.0, -50.0]])
+    assert on_itself(crossing, room)
+
+
+def test_a_corner_on_an_end_is_no_arc() -> None:
+    """As an instruction in a map may say; nothing is divided by the length of such a leg."""
+    start, end = np.array([0.0, 0.0]), np.array([10.0, 0.0])
+    with np.errstate(all="raise"):
+        for corner in ((0.0, 0.0, 2.0), (10.0, 0.0, 2.0), (5.0, 0.0, 0.0)):
+            assert np.isfinite(rounded(start, (corner,), end, 0.01)).all()
+
+
+def test_a_long_winding_road_is_fitted_in_seconds() -> None:
+    """Corners go one by one: were all points measured each time, this would take many minutes."""
+    x = np.linspace(0.0, 2000.0, 400)
+    line = np.stack([x, 30.0 * np.sin(0.0314 * x)], axis=-1)
+    found = fit(line, Limits(0.1, 4.8, 9.0))
+    assert found is not None
+    assert found.lost == 0.0
+    assert len(found.corners) < 200

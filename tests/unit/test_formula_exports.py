@@ -21,7 +21,7 @@ from dubins_traffic.logic.formula import ASCII, Brackets, Formula, FormulaError,
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.logic.printer import SPIN, written_implication, written_together
 from tests.formulas import drawn
-from tests.grammars import slugs_sections, tlsf_sections
+from tests.grammars import TLSF, slugs_sections, tlsf_sections
 
 TASK = Specification(
     assumptions=tuple(
@@ -83,9 +83,9 @@ def test_tlsf_keeps_its_grammar() -> None:
     sections = tlsf_sections(text)
     assert sections["inputs"] == [*TASK.inputs, "past_1", "past_2"]
     assert sections["outputs"] == [*TASK.outputs]
-    assert len(sections["assume"]) == 4 + 3
-    assert len(sections["guarantee"]) == 7
-    assert "G (left -> (F[0:10] (!left)))" in text
+    assert [len(sections[name]) for name in TLSF[2:]] == [2, 1, 2, 3, 3, 3], text
+    assert any("G (left -> (F[0:10] (!left)))" in part for part in sections["guarantee"])
+    assert "enter -> (X brake)" in sections["assert"]
 
 
 def test_slugs_keeps_its_grammar() -> None:

@@ -5,10 +5,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from shapely.affinity import rotate, translate
-from shapely.geometry import Polygon, box
+from shapely.geometry import LineString, Point, Polygon, box
+from shapely.ops import unary_union
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.errors import InputError
+from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.simulators import registry
 from dubins_traffic.simulators.gazebo import packages, prefix
@@ -65,6 +67,35 @@ def test_roads_are_those_of_2016(version: Version) -> None:
     sizes = [[float(part) for part in (size.text or "").split()] for size in root.iter("size")]
     assert sum(size[:2] == [4.2, 1.2] for size in sizes) == 4
     assert sum(size[:2] == [3.0, MARKER] for size in sizes) == 4
+
+
+def _boxes(root: ElementTree.Element, name: str) -> list[Polygon]:
+    """Return the boxes of roads that are called so, in the plane."""
+    found: list[Polygon] = []
+    for model in root.iter("model"):
+        own = next((each for each in model.iter("visual") if each.get("name") == name), None)
+        if own is not None:
+            x, y, _, _, _, yaw = (float(part) for part in (model.findtext("pose") or "").split())
+            aside = float((own.findtext("pose") or "").split()[0])
+            long, wide, _ = (float(part) for part in (own.findtext("geometry/box/size") or "").split())
+            shape = box(aside - 0.5 * long, -0.5 * wide, aside + 0.5 * long, 0.5 * wide)
+            found.append(translate(rotate(shape, yaw, (0, 0), use_radians=True), x, y))
+    return found
+
+
+def test_roads_that_bend_are_paved_evenly() -> None:
+    network = generate(9, 12, 4, bent=1.0)
+    root = ElementTree.fromstring(to_sdf(network))
+    surface = unary_union(_boxes(root, "surface"))
+    lines = [LineString(network.lane_curve(2 * s, 0.0)) for s in range(len(network.segments))]
+    assert surface.buffer(1e-6).contains(unary_union([line.buffer(0.58) for line in lines]))
+    # Corners of the boxes reach 0.25 m beyond round ends.
+    assert (
+        unary_union([line.buffer(0.62) for line in lines])
+        .union(unary_union([Point(*place).buffer(0.86) for place in network.points]))
+        .contains(surface)
+    )
+    assert len(_boxes(root, "marker")) > 3 * len(network.segments)
 
 
 def test_an_instance_is_shown_with_its_bodies() -> None:

@@ -1,6 +1,8 @@
 """Tables with names: the same rows in compiled kernels and in plain Python."""
 
+import gc
 import pickle
+import weakref
 from copy import deepcopy
 
 import numpy as np
@@ -128,3 +130,30 @@ def test_a_row_is_copied(call) -> None:
     call(drivers, 1, 0)
     drivers[1, 1].speed = 4.0
     assert (drivers[0, 0].speed, drivers[0, 0].lane) == (3.0, 7)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        lambda: table(Driver, (4, 2)),
+        lambda: table(Driver, (4, 2)).copy(),
+        lambda: deepcopy(table(Driver, (4, 2))),
+        lambda: pickle.loads(pickle.dumps(table(Driver, (4, 2)))),
+        lambda: stack([table(Driver, 2), table(Driver, 2), table(Driver, 2)]),
+        lambda: table(Driver, (4, 2))[[0, 1, 1]],
+        lambda: table(Driver, (4, 2))[1:],
+        lambda: table(Driver, (3, 4, 2))[1],
+        lambda: table(Driver, (4, 2))[np.arange(4) > 0],
+    ],
+)
+def test_a_table_that_nobody_uses_is_let_go_with_all_that_it_knows(drawn) -> None:
+    own = drawn()
+    own[1, 1].waited = 3
+    assert own[1][1].waited == own["waited"][1, 1] == own[1:][0, 1].waited == 3
+    own[1][1].speed = 2.0
+    assert own[1, 1] is own[1, 1]
+    assert own[1, 1].speed == own["speed"][1, 1] == own[1]["speed"][1] == 2.0
+    left = weakref.ref(own)
+    del own
+    gc.collect()
+    assert left() is None

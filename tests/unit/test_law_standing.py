@@ -108,7 +108,7 @@ def test_cars_of_other_shapes_keep_the_rules_and_pass_what_stands(body: dict[str
 
 UNFIT: dict[str, dict[str, Any]] = {
     "speed_min": {"bounds": {"speed_min": 0.1, "turning_radius": 0.2}},
-    "turning_radius": {"bounds": {"turning_radius": 0.28}},
+    "turning_radius": {"bounds": {"turning_radius": 0.6}},
     "rectangle.width": {"body": {"rectangle": {"length": 0.3, "width": 0.52}}},
     "disc.radius": {"body": {"disc": {"radius": 0.25}}},
     "rectangle.length": {"body": {"rectangle": {"length": 0.8, "width": 0.4}}},

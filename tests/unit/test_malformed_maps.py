@@ -17,6 +17,7 @@ NODES = "<node id='1' lat='49' lon='9'/><node id='2' lat='49.001' lon='9'/>"
 WAY = "<way id='5'><nd ref='1'/><nd ref='2'/><tag k='highway' v='residential'/></way>"
 LINE = '<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>'
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+ENDLESS = '<!DOCTYPE r [<!ENTITY a "&b;"><!ENTITY b "&a;">]>'
 OUTER = '<!DOCTYPE r SYSTEM "file:///etc/passwd">'
 ROOTS = {"commonroad": "commonRoad", "lanelet2": "osm", "opendrive": "OpenDRIVE", "sumo": "net", "osm": "osm"}
 
@@ -37,6 +38,7 @@ def general() -> list[tuple[str, str, Make, str]]:
         found += [
             (name, "truncated", lambda name=name: written(name)[: len(written(name)) // 2], "not XML"),
             (name, "entity bomb", text(f"{BOMB}<{root}>&b;</{root}>"), "document type"),
+            (name, "entity loop", text(f"{ENDLESS}<{root}>&a;</{root}>"), "document type"),
             (name, "outer entity", text(f"{OUTER}<{root}/>"), "document type"),
             (name, "other root", text("<html><body/></html>"), "another root"),
             (name, "nested", text("<a>" * 100 + "</a>" * 100), "nested too deep"),
@@ -47,6 +49,7 @@ def general() -> list[tuple[str, str, Make, str]]:
     return found
 
 
+FAR = {f"{end}{k}": (9e4 * (end == "b"), 100.0 * k) for k in range(20) for end in "ab"}
 SUMO: list[tuple[str, Make, str]] = [
     ("NaN", inner("sumo", ' x="0"', ' x="nan"'), "not a number"),
     ("infinite", inner("sumo", ' x="0"', ' x="1e999"'), "not a number"),
@@ -61,17 +64,27 @@ SUMO: list[tuple[str, Make, str]] = [
     ("half a point", text(sumo(["a b 1 shape='1,2 3'"], {"a": (0, 0), "b": (90, 0)})), "not a point"),
     ("one point", text(sumo(["a b 1 shape='1,2'"], {"a": (0, 0), "b": (90, 0)})), "not a line"),
     ("width", inner("sumo", 'width="0.6"', 'width="-1"'), "width of a lane"),
+    ("endless road", text(sumo(both("a b 1"), {"a": (0, 0), "b": (9e6, 0)})), "too long"),
+    ("half the world", text(sumo([f"a{k} b{k} 1" for k in range(20)], FAR)), "too large a map"),
+    ("loop of one point", text(sumo(["a a 1 shape='0,0 0,0'"], {"a": (0, 0)})), "nothing of the map"),
     ("all too short", text(sumo(both("a b 1"), {"a": (0, 0), "b": (3, 0)})), "nothing of the map"),
     ("frame", inner("sumo", "frame 3.0", "frame three"), "not numbers"),
     ("other instruction", inner("sumo", "frame 3.0", "fame 3.0"), "unknown instruction"),
 ]
+OFFSET = opendrive(LINE).replace("<lanes>", '<lanes><laneOffset s="{s}" a="{a}" b="0" c="0" d="0"/>')
 OPENDRIVE: list[tuple[str, Make, str]] = [
     ("no geometry", text(opendrive("")), "has no line"),
     ("no shape", text(opendrive(LINE.replace("<line/>", ""))), "not one shape"),
     ("two shapes", text(opendrive(LINE.replace("<line/>", "<line/><arc curvature='1'/>"))), "not one shape"),
     ("negative length", text(opendrive(LINE.replace('"100"', '"-1"'))), "not a length"),
-    ("endless", text(opendrive(LINE.replace('"100"', '"1e300"'))), "not a length"),
+    ("endless", text(opendrive(LINE.replace('"100"', '"1e99"'))), "not a length"),
+    ("beyond numbers", text(opendrive(LINE.replace('"100"', '"1e300"'))), "too large: got '1e300'"),
     ("no length", text(opendrive(LINE.replace('"100"', '"0"'))), "no length"),
+    (
+        "gap",
+        text(opendrive(LINE + LINE.replace('s="0" x="0"', 's="100" x="1e7"'))),
+        "not where the piece before ends: got '1e.07 m away'",
+    ),
     ("curvature", text(opendrive(LINE.replace("<line/>", '<arc curvature="1e9"/>'))), "too sharp"),
     ("no curvature", text(opendrive(LINE.replace("<line/>", "<arc/>"))), "missing"),
     (
@@ -85,6 +98,8 @@ OPENDRIVE: list[tuple[str, Make, str]] = [
         text(opendrive(LINE, link='<link><successor elementId="9"/></link>')),
         "linked to no road",
     ),
+    ("lane offset", text(OFFSET.format(s="0", a="1e300")), "too large"),
+    ("lane offset nowhere", text(OFFSET.format(s="nan", a="1")), "not a number"),
     ("heading", text(opendrive(LINE.replace('hdg="0"', 'hdg="NaN"'))), "not a number"),
 ]
 COMMONROAD: list[tuple[str, Make, str]] = [
@@ -99,6 +114,7 @@ COMMONROAD: list[tuple[str, Make, str]] = [
     ("lanelet twice", inner("commonroad", '<lanelet id="2"', '<lanelet id="1"'), "stands twice"),
     ("empty coordinate", inner("commonroad", "<x>0</x>", "<x/>"), "not a number"),
     ("gigantic", inner("commonroad", "<x>0</x>", "<x>1e15</x>"), "not a"),
+    ("beyond numbers", inner("commonroad", "<x>0</x>", "<x>-1e308</x>"), "leftBound: too large"),
 ]
 LANELET2: list[tuple[str, Make, str]] = [
     ("no such node", inner("lanelet2", '<nd ref="', '<nd ref="x'), "no such node"),
@@ -109,6 +125,7 @@ LANELET2: list[tuple[str, Make, str]] = [
      "no line"),
     ("node twice", inner("lanelet2", '<node id="2"', '<node id="1"'), "stands twice"),
     ("local metres", inner("lanelet2", 'k="local_x" v="0"', 'k="local_x" v="far"'), "not a number"),
+    ("beyond numbers", inner("lanelet2", 'k="local_x" v="0"', 'k="local_x" v="1e308"'), "too large"),
 ]  # fmt: skip
 OSM: list[tuple[str, Make, str]] = [
     ("latitude", text(f"{OSM_HEAD}{NODES.replace('49.001', '149')}{WAY}</osm>"), "out of range"),
@@ -142,6 +159,21 @@ def test_a_broken_map_is_refused_with_its_file(name: str, what: str, make: Make,
     with pytest.raises(InputError, match=words) as caught:
         RoadNetwork.from_text(make(), "broken.map", registry.load(name))
     assert caught.value.file == "broken.map", what
+
+
+@pytest.mark.parametrize(
+    ("link", "words"),
+    [
+        ("<successor ref='1'/>", "nothing of the map"),
+        ("<adjacentRight ref='1' drivingDir='same'/>", "no roads"),
+    ],
+)
+def test_a_lanelet_that_leads_to_itself_is_refused(link: str, words: str) -> None:
+    side = "<point><x>0</x><y>{0}</y></point><point><x>90</x><y>{0}</y></point>"
+    bounds = f"<leftBound>{side.format(3)}</leftBound><rightBound>{side.format(0)}</rightBound>"
+    text = f"<commonRoad><lanelet id='1'>{bounds}{link}</lanelet></commonRoad>"
+    with pytest.raises(InputError, match=words):
+        RoadNetwork.from_text(text, "ring.xml", registry.load("commonroad"))
 
 
 def test_what_is_too_large_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

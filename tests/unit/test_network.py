@@ -27,6 +27,12 @@ def test_numbers_and_places_of_a_grid() -> None:
         GRID.vertex((4, 0))
 
 
+def test_a_network_is_told_by_its_lattice_or_by_its_metres() -> None:
+    assert GRID.summary == "17 segments, 12 intersections on a 3 x 4 lattice"
+    off = RoadNetwork(((0, 0, 1.5, 0), (1.5, 0, 1.5, 2)), 4.0, (0.0, 0.0, 0.0), (3, 2))
+    assert off.summary == "2 segments, 3 intersections on 6 x 8 m"
+
+
 def test_transform_turns_then_shifts_and_is_not_scaled() -> None:
     network = RoadNetwork.grid(2, 2, 5.0, (1.0, 2.0, math.pi / 2))
     assert network.points[network.vertex((1, 0))] == pytest.approx([1.0, 7.0], abs=1e-12)

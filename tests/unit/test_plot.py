@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from shapely import MultiLineString
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.sink import End, Ending
+from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import KERB, MARGIN
 from dubins_traffic.viewer.plot import write_plot
+from dubins_traffic.viewer.scene import centre_lines, centre_paths, short
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside
 
 
@@ -58,6 +61,27 @@ def test_roads_are_4w_wide_with_round_ends(tmp_path: Path) -> None:
     assert 1.0 - bare.sum() / whole == pytest.approx(with_kerbs.area / box, rel=0.02)
 
 
+def test_the_chords_of_a_bend_are_one_line_and_lines_of_straight_roads_stay() -> None:
+    network = generate(9, 12, 4, bent=1.0)
+    paths = centre_paths(network, 0.6)
+    assert len(paths) == len(network.segments)
+    assert max(len(path) for path in paths) > 6
+    assert sum(len(path) - 1 for path in paths) == len(centre_lines(network, 0.6))
+    straight = centre_paths(ROUGH, 0.6)
+    assert np.array_equal(np.array(straight), centre_lines(ROUGH, 0.6))
+
+
+def test_places_off_the_lattice_are_named_shortly(tmp_path: Path) -> None:
+    assert [short(number) for number in (3, 12, 2.5, -2.437475584289642, -5.75e-11, 183.7)] == [
+        "3", "12", "2.5", "-2.44", "0", "183.7",
+    ]  # fmt: skip
+    document = {"version": 2, "length": 1, "segments": [[-2.437475584289642, 0, 9, -5.75e-11]]}
+    write_plot(tmp_path / "a.svg", RoadNetwork.from_document(document))
+    text = (tmp_path / "a.svg").read_text()
+    assert "-2.44,0" in text
+    assert "-2.43747" not in text
+
+
 def test_a_record_shows_goals_obstacles_paths_and_contacts(tmp_path: Path, record: Record) -> None:
     assert record.frames.contacts
     write_plot(tmp_path / "record.svg", record)
@@ -77,6 +101,14 @@ def test_a_record_shows_goals_obstacles_paths_and_contacts(tmp_path: Path, recor
     path = re.compile(rf"<path [^>]*fill: none; stroke: {palette.EGO_COLOUR.lower()}")
     assert path.search(texts["record"])
     assert not path.search(texts["instance"])
+
+
+def test_a_record_without_frames_is_refused(tmp_path: Path, record: Record) -> None:
+    held = {each.name: getattr(record.frames, each.name) for each in fields(record.frames)}
+    none = {name: value[:0] for name, value in held.items() if isinstance(value, np.ndarray | tuple)}
+    empty = replace(record, blocks=(), frames=replace(record.frames, **none))
+    with pytest.raises(InputError, match="nothing to draw: got 0; expected at least one frame"):
+        write_plot(tmp_path / "empty.svg", empty)
 
 
 def test_names_are_no_mathematics_and_a_crowd_has_room(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.osm import OpenStreetMap
@@ -91,6 +92,18 @@ def test_short_roads_are_drawn_together_or_go() -> None:
     assert crowded.degrees.max() <= 4
 
 
+def test_thousands_of_short_roads_go_in_seconds_and_leave_what_can_be_held() -> None:
+    """They go many at once, and a round costs as much as the part of the map at which it looks."""
+    count = 58
+    nodes = {f"{x}-{y}": (1000.0 + x, float(y)) for x in range(count) for y in range(count)}
+    upright = [f"{x}-{y} {x}-{y + 1} 1" for x in range(count) for y in range(count - 1)]
+    level = [f"{x}-{y} {x + 1}-{y} 1" for x in range(count - 1) for y in range(count) if (x + y) % 2 == 0]
+    network, losses = reduced([*ROADS, *both(*upright, *level)], {**CROSS, **nodes})
+    assert len(upright + level) > 4900
+    assert len(network.segments) == 4
+    assert {name for name, (fate, _) in fates(losses).items() if fate == "kept"} == {"on", "oe", "os", "ow"}
+
+
 def test_arms_too_near_each_other_are_turned_or_go() -> None:
     nodes = {"o": (0.0, 0.0), "a": (100.0, 0.0), "b": (70.0, 90.0), "c": (-100.0, 0.0), "d": (100.0, 25.0)}
     turned, losses = reduced(both("o a 1", "o b 1", "o c 1"), nodes)
@@ -135,10 +148,30 @@ def test_a_scale_of_ones_own() -> None:
     document, losses = SumoNet().reduced(text, settings=ImportSettings(scale=0.5))
     assert losses.scale == 0.5
     assert sorted(RoadNetwork.from_document(document).lengths.tolist()) == [40.0, 40.0, 45.0, 45.0]
+    assert losses.w == 0.3
     with pytest.raises(InputError, match="out of range"):
         ImportSettings(scale=-1.0)
     with pytest.raises(InputError, match="out of range"):
         ImportSettings(tolerance=float("nan"))
+
+
+def test_lanes_of_ones_own_hold_as_much_at_the_scale_of_the_map() -> None:
+    """At bends, wider roads need more room beside intersections: what is demanded grows with `w`."""
+    edges = [
+        *ROADS,
+        *both("e f 1"),
+        "f g 1 shape='160,0 200,3 230,40 235,90'",
+        "g f 1 shape='235,90 230,40 200,3 160,0'",
+    ]
+    text = sumo(edges + both("f h 1"), {**CROSS, "f": (160.0, 0.0), "g": (235.0, 90.0), "h": (160.0, -80.0)})
+    _, small = SumoNet().reduced(text)
+    document, losses = SumoNet().reduced(text, settings=ImportSettings(scale=1.0), own_lanes=True)
+    assert losses.w == pytest.approx(1.6)
+    assert (losses.segments, losses.kept_share) == (small.segments, pytest.approx(small.kept_share))
+    grown = losses.w / 0.3
+    network = RoadNetwork.from_document(document)
+    assert network.bent.any()
+    assert clearance_faults(network, grown, 0.177 * grown, losses.w, 0.5 * grown) == []
 
 
 def test_a_clothoid_of_opendrive_is_held() -> None:
@@ -199,9 +232,22 @@ def test_network_from_a_map_tells_what_was_lost(town: Path, capsys: pytest.Captu
     assert found["one_plus_one"]["kept_share"] == 1.0
     assert {"fate": "dropped", "reason": "one-way", "roads": 1, "length": 80.0} in found["table"]
     assert (out / "losses.png").read_bytes().startswith(b"\x89PNG")
+    assert main([*command, "--losses", str(out / "losses.svg")]) == 0
+    picture = (out / "losses.svg").read_text()
+    for words in ("the network", "kept within the tolerance (340 m)", "dropped: one-way (1, 80 m)"):
+        assert words in picture
     assert len(RoadNetwork.read(out / "town.json").segments) == 4
     assert main(["network", "--from", str(town), "--scale", "0.5", "-o", str(out / "large.json")]) == 0
     assert RoadNetwork.read(out / "large.json").lengths.max() == 45.0
+    # Lanes of 3.2 m of the map at half its size: w from the file.
+    assert "w = 0.8 m" in capsys.readouterr().err
+    again = [*command[:-1], str(out / "own.json"), "--scale", "1", "--losses", str(out / "own-losses.json")]
+    assert main(again) == 0
+    assert json.loads((out / "own-losses.json").read_text())["w"] == 1.6
+    own = RoadNetwork.read(out / "own.json")
+    assert clearance_faults(own, 1.6 / 0.3, 0.177, 1.6) == []
+    assert main([*again, "--w", "0.3"]) == 0
+    assert json.loads((out / "own-losses.json").read_text())["w"] == 0.3
 
 
 def test_network_from_a_map_refuses_what_makes_no_sense(
@@ -211,8 +257,19 @@ def test_network_from_a_map_refuses_what_makes_no_sense(
     assert main(["network", "--grid", "2", "2", "--losses", str(town.parent / "a.json")]) == 2
     assert main(["network", "--from", str(town), "--scale", "0"]) == 2
     assert main(["network", "--from", str(town), "--losses", str(town.parent / "a.gif")]) == 2
-    assert not (town.parent / "a.json").exists()
-    assert "expected" in capsys.readouterr().err
+    assert main(["network", "--grid", "2", "2", "--scale", "2"]) == 2
+    ours, made, report = (town.parent / name for name in ("ours.json", "made.json", "a.json"))
+    ours.write_text(RoadNetwork.grid(2, 3).to_json())
+    assert main(["network", "--from", str(ours), "--w", "0.3", "-o", str(made)]) == 2
+    for losses in (town.parent / "none" / "a.json", town.parent / "a.gif", town.parent):
+        assert main(["network", "--from", str(town), "--losses", str(losses), "-o", str(made)]) == 2
+        assert main(["convert", str(town), "--losses", str(losses), "-o", str(made)]) == 2
+    assert main(["convert", str(ours), "--losses", str(report), "-o", str(made)]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "expected" in told.err
+    assert not made.exists()
+    assert not report.exists()
 
 
 def test_convert_goes_from_format_to_format(town: Path, capsys: pytest.CaptureFixture[str]) -> None:

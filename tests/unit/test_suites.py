@@ -14,6 +14,7 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from dubins_traffic.campaign.report.statistics import estimate, share
+from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.schema import ID, schema_text, shipped_schema
 from dubins_traffic.suites import gather
@@ -171,6 +172,33 @@ def test_results_of_another_suite_are_refused(ran: Path, tmp_path: Path) -> None
         compare_trials(suite, open_sources([str(other)]))
 
 
+def test_results_say_which_version_of_the_code_made_them(ran: Path, tmp_path: Path) -> None:
+    """On the table and on the page, so that whoever reads them later knows it."""
+    suite = Suite.from_document(document())
+    own = json.loads(ran.read_text())
+    alone = results(suite, open_sources([str(ran)]))
+    assert f"\nMade by dubins-traffic {own['package']} (sources {own['code'][:12]}).\n" in alone[TABLE]
+    older = changed(ran, tmp_path, package="0.1.0", code="0" * 64)
+    both = results(suite, open_sources([f"ada={ran}", f"bob={older}"]))
+    told = "Made by different versions of the code, in which trials may go differently: "
+    assert f"{told}ada by dubins-traffic {own['package']} (sources {own['code'][:12]}); bob by" in both[TABLE]
+    assert "bob by dubins-traffic 0.1.0 (sources 000000000000)." in both[TABLE]
+    assert "code of bob lanes" in both["index.html"]
+
+
+@pytest.mark.parametrize("kind", [cases, games])
+def test_pages_of_cases_and_games_say_it_too(kind: Any, tmp_path: Path) -> None:
+    suite = Suite.from_document(kind())
+    if kind is cases:
+        path = run_cases(suite, tmp_path / "own", ["simple"])
+    else:
+        path = run_games(suite, tmp_path / "own", Solver())
+    older = changed(path, tmp_path, package="0.1.0", code="0" * 64)
+    both = results(suite, open_sources([f"ada={path}", f"bob={older}"]))
+    for made in both.values():
+        assert "bob by dubins-traffic 0.1.0 (sources 000000000000)." in made
+
+
 def bad_columns(entry: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
     columns = entry["columns"]
     yield {name: values[:-1] for name, values in columns.items()}, "another length"
@@ -179,7 +207,23 @@ def bad_columns(entry: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
         "columns.rounds: a column is missing",
     )
     yield columns | {"rounds": ["x"] * 4}, "columns.rounds: a column of other values"
+    yield columns | {"end": [None, *columns["end"][1:]]}, "columns.end: a column of other values"
+    yield columns | {"verdict": ["won", *columns["verdict"][1:]]}, "columns.verdict: a column of other values"
     yield columns | {"rounds": [1]}, "columns of several lengths"
+
+
+def test_a_suite_that_is_not_shipped_is_asked_for(
+    ran: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its folder may be called as NAME=DIR is written."""
+    monkeypatch.chdir(tmp_path)
+    Path("rate=0.1").mkdir()
+    Path("rate=0.1", ran.name).write_text(ran.read_text())
+    assert main(["suite", "compare", "rate=0.1"]) == 2
+    assert "results of a suite that is not shipped" in capsys.readouterr().err
+    Path("mine.json").write_text(json.dumps(document()))
+    assert main(["suite", "compare", "rate=0.1", "--suite", "mine.json"]) == 0
+    assert "| controller |" in capsys.readouterr().out
 
 
 def test_files_that_are_no_results_are_refused(ran: Path, tmp_path: Path) -> None:

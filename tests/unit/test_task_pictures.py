@@ -1,4 +1,4 @@
-"""The pictures of docs/task.md: all there, all shown, small, and what the command draws."""
+"""The pictures of docs/task.md: all there, all shown, small, and what the command draws; and that of the README."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib
 import pytest
 
+from dubins_traffic.cli.main import main
 from tests.rules_scripts import Frame, flags, instance, label
 
 ROOT = Path(__file__).parents[2]
@@ -39,11 +40,31 @@ def test_pictures_are_small() -> None:
     assert all((PICTURES / name).stat().st_size < 100_000 for name in SHOWN)
 
 
-def test_pictures_are_up_to_date(drawn: Path) -> None:
+def need_pinned() -> None:
+    """Skip where Matplotlib is another one than that by which the pictures were drawn."""
     pinned = re.search(r"^matplotlib==(\S+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.M)
     assert pinned is not None
     if matplotlib.__version__ != pinned[1]:
         pytest.skip(f"they were drawn with matplotlib {pinned[1]}")
+
+
+def test_the_trial_of_the_readme_is_what_its_commands_draw(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need_pinned()
+    monkeypatch.chdir(tmp_path)
+    page = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    commands = [
+        found.split()[1:]
+        for found in re.findall(r"`(dubins-traffic (?:run|plot) [^`]*\bfirst\b[^`]*)`", page)
+    ]
+    assert [words[0] for words in commands] == ["run", "plot"]
+    assert [main(words) for words in commands] == [0, 0]
+    assert (tmp_path / "trial.svg").read_bytes() == (PICTURES / "trial.svg").read_bytes()
+
+
+def test_pictures_are_up_to_date(drawn: Path) -> None:
+    need_pinned()
     stale = [name for name in SHOWN if (drawn / name).read_bytes() != (PICTURES / name).read_bytes()]
     assert not stale, "run: python docs/pictures/make.py"
 

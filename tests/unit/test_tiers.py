@@ -152,6 +152,17 @@ def test_processes_at_once_have_one_companion(cache) -> None:
     until(lambda: len(companions(cache)) <= 1)
 
 
+def test_the_same_version_elsewhere_compiles_nothing(cache, tmp_path, monkeypatch) -> None:
+    there = python(cache, CALL, "compiled")
+    made = {path: path.stat().st_mtime_ns for path in kernels(cache)}
+    package = Path(dubins_traffic.__file__).parent
+    shutil.copytree(package, tmp_path / "src" / package.name, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
+    assert python(cache, CALL, "auto") == there  # and does not say that anything is compiled
+    assert {path: path.stat().st_mtime_ns for path in kernels(cache)} == made
+    assert not list(cache.rglob("asked-*/*.json"))
+
+
 def test_two_installations_with_other_sources_share_a_cache(cache, tmp_path, monkeypatch) -> None:
     python(cache, CALL, "compiled")
     assert companions(cache)

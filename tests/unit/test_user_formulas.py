@@ -251,7 +251,10 @@ def test_commands_show_them(command: Command, tmp_path: Path) -> None:
     checked = json.loads(command("check", kept, "--json"))["records"][0]
     assert checked["formulas"] == live["trials"][0]["formulas"]
     assert [one["name"] for one in checked["formulas"]] == list(MINE)
-    assert all(set(one) == {"name", "formula", "verdict", "time", "early"} for one in checked["formulas"])
+    assert all(
+        set(one) == {"name", "formula", "verdict", "time", "early", "robustness"}
+        for one in checked["formulas"]
+    )
     text = command("check", kept)
     for words in ("no crash: ", "never: false since 0.000 s", "goals: presumably "):
         assert words in text
@@ -272,7 +275,7 @@ def test_a_problem_without_rules_is_checked_by_its_formulas(command: Command, tm
 
 def test_the_example_of_the_documentation_can_be_judged() -> None:
     text = (DOCS / "verdicts.md").read_text()
-    example = re.search(r'    "formulas": \{\n(?:    .*\n)+?    \}', text)
+    example = re.search(r'^"formulas": \{\n(?:.*\n)+?\}', text, re.MULTILINE)
     assert example is not None
     found = json.loads("{" + example[0] + "}")["formulas"]
     made = draw(load_config("town"), 0, 0)

@@ -1,28 +1,28 @@
-"""What is chosen for a car of the kind `chosen`: tables to draw, to change a little, and to shrink.
+"""The choices of e-agents of the kind `chosen`: tables that can be drawn, mutated and shrunk.
 
-A table is an array (K, CHOICES) of numbers with a row for each of the first K legs of a car and the columns `CHOICE`;
-what is not a number is left to the law, so a table of none is the kind `lawful`. In
-documents only the numbers stand, as rows of `problem.kinds.Choice`.
+A table is an array (K, CHOICES) with a row for each of the first K legs of a car and the columns `CHOICE`. NaN leaves a
+choice to the law, so with a table of NaN the car drives like one of the kind `lawful`. Documents hold only the numbers,
+as rows of `problem.kinds.Choice`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.policies.rules.tables import LONGEST_WAY, through_speed
+from dubins_traffic.policies.rules.abilities import LONGEST_WAY, through_speed
 from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.rules.parameters import RuleParameters
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
-    from dubins_traffic.roads.network import RoadNetwork
 
 
 class _Choice(NamedTuple):
@@ -48,19 +48,21 @@ CHOICE: Final = _Choice()
 CHOICES: Final = len(CHOICE)
 NAMES: Final = tuple(name.lower() for name in CHOICE._fields)
 """The keys of a row in a document, in the order of the columns."""
+EXIT: Final = NAMES[CHOICE.EXIT]
 EXITS: Final = 4
 BOUNDS: Final = np.array(
     [(0.0, EXITS - 1.0), (0.15, 1.0), (0.0, 30.0), (0.0, 1.0), (0.0, 8.0), (0.0, 1.0), (0.06, 0.8)]
 )
-"""Between which values tables are drawn, a row for each column; `cut` knows the limits of a problem."""
+"""Least and greatest value of each column in tables that are drawn; `cut` adds the limits of a problem."""
+LOW, SPAN = BOUNDS[:, 0].copy(), BOUNDS[:, 1] - BOUNDS[:, 0]
 LEAST_GAP, MOST_GAP = float(BOUNDS[CHOICE.GAP, 0]), float(BOUNDS[CHOICE.GAP, 1])
 """Gaps that the law can keep, metres."""
 SLOWEST = 2.4
-"""A car drives at least so many times as fast as one that lingers."""
+"""Least speed that can be chosen, in units of the speed below which a car lingers."""
 SHARE = 0.8
-"""Up to which share of the time that E3 to E5 allow something is chosen."""
-STEP = 0.15
-"""How far `mutated` moves a number, standard deviation as a share of its range."""
+"""Largest share of the time allowed by E3 to E5 that can be chosen."""
+STEP = 0.3
+"""Largest standard deviation by which `mutated` moves a number, as a share of its range; the least is 0.01."""
 
 
 def empty(legs: int) -> Floats:
@@ -82,19 +84,21 @@ def from_rows(rows: Sequence[Mapping[str, Any]]) -> Floats:
 def to_rows(table: Floats) -> list[dict[str, Any]]:
     """Return the rows of a document with what a table chooses; legs for which nothing is chosen are left out."""
     rows: list[dict[str, Any]] = []
-    for leg in np.flatnonzero(np.isfinite(table).any(axis=1)).tolist():
-        row: dict[str, Any] = {"at": leg}
-        for column in np.flatnonzero(np.isfinite(table[leg])).tolist():
-            value = float(table[leg, column])
-            row[NAMES[column]] = int(value) if column == CHOICE.EXIT else value
-        rows.append(row)
+    numbers: list[list[float]] = table.tolist()
+    for leg, values in enumerate(numbers):
+        row = {name: value for name, value in zip(NAMES, values, strict=True) if isfinite(value)}
+        if row:
+            if EXIT in row:
+                row[EXIT] = int(row[EXIT])
+            rows.append({"at": leg, **row})
     return rows
 
 
 def drawn(dice: np.random.Generator, legs: int, share: float = 0.3) -> Floats:
     """Return a table of `legs` rows of which each number is chosen with probability `share`, uniform in `BOUNDS`."""
-    low, high = BOUNDS[:, 0], BOUNDS[:, 1]
-    table = low + (high - low) * dice.random((legs, CHOICES))
+    table = dice.random((legs, CHOICES))
+    table *= SPAN
+    table += LOW
     table[:, CHOICE.EXIT] = dice.integers(0, EXITS, legs)
     table[dice.random((legs, CHOICES)) >= share] = np.nan
     return table
@@ -104,17 +108,19 @@ def mutated(dice: np.random.Generator, table: Floats) -> Floats:
     """Return a table that differs in one number: moved a little, chosen anew, or left to the law."""
     own = table.copy()
     leg, column = int(dice.integers(len(own))), int(dice.integers(CHOICES))
-    chosen = np.argwhere(np.isfinite(own))
+    chosen = np.isfinite(own).ravel().nonzero()[0]
     move = dice.random()
     if len(chosen) and move < 0.7:
-        leg, column = chosen[dice.integers(len(chosen))].tolist()
+        leg, column = divmod(int(chosen[dice.integers(len(chosen))]), CHOICES)
     low, high = BOUNDS[column].tolist()
-    if np.isfinite(own[leg, column]) and move < 0.2:
+    value = float(own[leg, column])
+    if isfinite(value) and move < 0.2:
         own[leg, column] = np.nan
     elif column == CHOICE.EXIT:
         own[leg, column] = dice.integers(0, EXITS)
-    elif np.isfinite(own[leg, column]) and move < 0.5:
-        moved = own[leg, column] + STEP * (high - low) * dice.standard_normal()
+    elif isfinite(value) and move < 0.5:
+        far = STEP * 10.0 ** (-2.0 * dice.random()) * (high - low)
+        moved = value + far * dice.standard_normal()
         own[leg, column] = min(max(moved, low), high)
     else:
         own[leg, column] = low + (high - low) * dice.random()
@@ -122,7 +128,7 @@ def mutated(dice: np.random.Generator, table: Floats) -> Floats:
 
 
 def reductions(table: Floats) -> Iterator[Floats]:
-    """Yield the tables with one thing less: without one leg's choices, first, then without one number."""
+    """Yield smaller tables: first those without the choices of one leg, then those without one number."""
     chosen = np.isfinite(table)
     for leg in np.flatnonzero(chosen.sum(axis=1) > 1).tolist():
         own = table.copy()
@@ -135,7 +141,7 @@ def reductions(table: Floats) -> Iterator[Floats]:
 
 
 def cut(table: Floats, speed: float, problem: Problem) -> Floats:
-    """Return a table whose numbers keep to what E3 to E5 allow in a problem.
+    """Return a table with its numbers clipped to what E3 to E5 allow in a problem.
 
     Parameters
     ----------
@@ -172,9 +178,10 @@ def cut(table: Floats, speed: float, problem: Problem) -> Floats:
 def with_choices(
     instance: Instance, tables: Mapping[int, Floats], starts: Mapping[int, Pose] | None = None
 ) -> Instance:
-    """Return an instance in which tables drive some e-agents, by their numbers (1 is the first), and where they start.
+    """Return an instance in which `tables` drive some e-agents, which may also begin at other `starts`.
 
-    Whoever is of the kind `chosen` already keeps its other parameters; of others the kind is changed.
+    Both are by the numbers of the cars (1 is the first e-agent). An e-agent of the kind `chosen` keeps its other
+    parameters; any other is changed to that kind.
     """
     agents, poses = list(instance.e_agents), list(instance.starts)
     for n, table in tables.items():
@@ -189,11 +196,3 @@ def with_choices(
 def table_of(agent: EAgent) -> Floats:
     """Return the table that drives an e-agent of the kind `chosen`."""
     return from_rows(agent.parameters["choices"])
-
-
-def place_in_lane(network: RoadNetwork, lane: int, share: float, w: float) -> Pose:
-    """Return the pose in the middle of a lane after a share of its way, w metres right of the centre line."""
-    (x, y), (end_x, end_y) = np.asarray(network.lane_line(lane, -w))[[0, -1]].tolist()
-    far = float(np.hypot(end_x - x, end_y - y))
-    c, s = (end_x - x) / far, (end_y - y) / far
-    return Pose(x + share * (end_x - x), y + share * (end_y - y), c, s)

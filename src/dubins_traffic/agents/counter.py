@@ -1,4 +1,4 @@
-"""The e-agents `counter`: one team that plays the counterstrategy of the game of cells on the road."""
+"""The e-agents `counter`: one team that plays the counterstrategy of the game of cells on the roads."""
 
 from __future__ import annotations
 
@@ -37,33 +37,33 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 NO_GOAL: Final = -2
-"""The vertex of the stages that the law is given: at no intersection, since the strategy sends the cars."""
+"""Stands for the goals of the cars in the law's tables: no intersection, since the strategy sends the cars."""
 NOT_LIKED: Final = 100.0
-"""What an exit counts that the strategy does not take, metres."""
+"""Cost, in metres, of an exit that the strategy does not choose."""
 BEFORE_LINE: Final = 0.2
-"""How far from the place where it could take its place in the order a car stands that is to have none, metres."""
+"""A car that shall have no place in the order of arrival stands this far before it could take one, metres."""
 COMMITTED: Final = 0.85
-"""A car this near to the middle of a disc, in units of R, has begun its way to an exit and keeps to it."""
+"""A car nearer than this to the middle of a disc, in units of R, is on its way to an exit and keeps to it."""
 EVERYWHERE: Final = 1e9
 COUNTERSTRATEGY: Final = "counterstrategy"
-"""Kind of the events that tell how the ego is kept from a goal."""
+"""Kind of the events that describe how the team keeps the ego from a goal."""
 
 
 class CounterTeam:
     """Drives all e-agents of a trial, which are of kind `counter` (a `protocols.Driver`).
 
-    They hold places and make way as the counterstrategy says, by the law of the road where that is assumed of them.
-    Where the ego wins the game they drive about.
+    They hold places and make way as the counterstrategy says. They keep those rules that the problem assumes of them.
+    If the ego wins the game, they drive at random.
     """
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
-        """Solve the game; InputError unless one trial is begun, and all its e-agents are of this kind."""
+        """Solve the game of a trial; InputError unless it is the only trial and all its e-agents are of this kind."""
         if len(instances) != 1 or any(agent.kind != COUNTER for agent in instances[0].e_agents):
             raise InputError(
-                "these play together and alone",
+                "e-agents of this kind share a trial with no other kind, and are not batched",
                 field="type",
                 value=COUNTER,
-                expected="e-agents of no other kind",
+                expected="one trial whose e-agents are all of this kind",
             )
         (instance,) = instances
         problem = instance.problem
@@ -71,7 +71,7 @@ class CounterTeam:
         self._roads = pack([problem.network], [problem.car.lane_width])
         self._obstacles = pack_obstacles([problem.obstacles])
         self._drivers = _drivers(instance)
-        self._scratch = scratch(state.x.shape[1], len(problem.network.segments))
+        self._scratch = scratch(state.x.shape[1], len(problem.network.segments), self._obstacles)
         self._points: list[list[float]] = problem.network.points.tolist()
         rules = RuleParameters.from_mapping(problem.rules)
         self._radius, self._reach = problem.intersection_radius, problem.car.body.reach
@@ -104,7 +104,7 @@ class CounterTeam:
                 self._hold(car, commands[0, car.car])
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return, once, how the ego is kept from a goal."""
+        """Return, once, a description of how the team keeps the ego from a goal."""
         if not self._reports:
             return ()
         found, self._reports = self._reports, []
@@ -115,7 +115,7 @@ class CounterTeam:
         self._drivers.seed[:] = seed
 
     def _choose(self, tick: int, cars: Sequence[Sighting]) -> None:
-        """Choose the cells to which the cars go in this turn, and prepare the law for it."""
+        """Choose the cells to which the cars go in this turn, and set the law's tables accordingly."""
         play, position = self._play, self._play.position
         self._targets = [-1] * len(play.cells)
         if position is None or not any(loss.lost[position] for loss in self._strategy.solution.losses):
@@ -133,13 +133,13 @@ class CounterTeam:
             self._send(car)
 
     def _most_urgent(self, tick: int, position: int) -> int:
-        """Return which of the debts of a position has to be paid first, by when it has come up and the time it has."""
+        """Return the debt of a position that is due first, by the tick since which it is owed and the time allowed."""
         owed = self._strategy.debts(position)
         self._since = {debt: self._since.get(debt, tick) for debt in owed}
         return min(owed, key=lambda debt: (self._since[debt] + self._times[debt], debt), default=0)
 
     def _jump(self, cars: Sequence[Sighting]) -> None:
-        """Let the cars that are sent into an intersection enter it when it is clear, in whatever order."""
+        """Let the cars that are sent into an intersection enter it when it is clear, whatever the order of arrival."""
         for car in cars[1:]:
             enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
             clear = car.propositions.bits & FLAG.CLEAR != 0
@@ -166,7 +166,7 @@ class CounterTeam:
             own_car.next_lane = liked[0]
 
     def _is_turning(self, car: Sighting, node: int) -> bool:
-        """Say whether a car has begun its way through a disc; who stands in one has stopped at its edge."""
+        """Tell whether a car in a disc is on its way to an exit; one that stands in it has stopped at its edge."""
         return self._distance(car, node) < COMMITTED * self._radius
 
     def _distance(self, car: Sighting, node: int) -> float:
@@ -174,7 +174,7 @@ class CounterTeam:
         return hypot(x - car.pose.x, y - car.pose.y)
 
     def _hold(self, car: Sighting, command: Floats) -> None:
-        """Let a car stand: in the disc that its centre is in, before the one ahead, or farther back without a place."""
+        """Make a car stand: in its disc, before the disc ahead, or farther back if it is to have no place."""
         arena, cell = self._board.arena, self._play.cells[car.car]
         nodes = len(arena.nodes)
         if cell < nodes:
@@ -191,7 +191,7 @@ class CounterTeam:
 
 
 def _times(board: Board, rules: RuleParameters) -> list[float]:
-    """Return how much time the rules allow for each debt, seconds: of nodes, lanes and goals."""
+    """Return the time that the rules allow for each debt, seconds: of nodes, then lanes, then goals."""
     arena = board.arena
     lanes = [
         rules.enter_time if arena.nodes[node].crossing else rules.rest_time for node, _ in arena.lane_end
@@ -200,19 +200,19 @@ def _times(board: Board, rules: RuleParameters) -> list[float]:
 
 
 def _assumed(instance: Instance) -> Assumption:
-    """Return what the team keeps: what its cars say, or the problem."""
+    """Return which rules the team keeps: as its cars' parameters say, or as the problem assumes."""
     words = {agent.parameters["assume"] for agent in instance.e_agents}
     if len(words) > 1:
         raise InputError(
-            "one team, one assumption",
+            "the e-agents of one team must make the same assumption",
             field="assume",
             value=sorted(map(str, words)),
-            expected="the same for all",
+            expected="equal values for all e-agents of the kind counter",
         )
     (own,) = words
     assumed = assumption_of(instance.problem) if own is None else Assumption.parse(own.split(","))
     if not assumed.yields:
-        raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2, and others")
+        raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2 among them")
     return assumed
 
 
@@ -223,7 +223,7 @@ def _sighting(n: int, state: State, labels: Labels) -> Sighting:
 
 
 def _drivers(instance: Instance) -> Drivers:
-    """Return the team as the law drives it: each car on a round of its own, without goals, at prices of its own."""
+    """Return the team's cars as the law's tables: each on a round without goals, with exit costs of its own."""
     problem, cars = instance.problem, len(instance.starts)
     rows = table(Driver, (1, cars))
     for n, agent in enumerate(instance.e_agents, start=1):

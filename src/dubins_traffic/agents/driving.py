@@ -1,4 +1,4 @@
-"""Driving on lanes, as all e-agents do that drive where they like: next lane, next waypoint, commands."""
+"""Driving on lanes without regard for rules: choose the next lane, set the next waypoint, drive to it (compiled)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,24 @@ from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.random import DRAW, below
-from dubins_traffic.policies.waypoint import pursue, turn_then_drive
+from dubins_traffic.policies.waypoint import pursue, turn_or_pursue, turn_then_drive
+from dubins_traffic.roads.lookup import bends_before, lane_length
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.routing.lane_graph import FAR, aim_for, frame, lane_at, place_of, spread
+from dubins_traffic.routing.lane_graph import (
+    FAR,
+    aim_for,
+    foot,
+    frame,
+    lane_at,
+    place_of,
+    place_on_lane,
+    spread,
+)
 
 AIM = 0.6
-"""How far along the lane's line a car that can't turn in place aims, metres (for w = 0.3 m), or twice its radius."""
+"""Distance to the waypoint of a car that can't turn in place, metres (for w = 0.3 m); at least twice its radius."""
+BEND_AIM = 0.3
+"""Distance to the waypoint on a bent road of a car that can turn in place, metres (for w = 0.3 m)."""
 TIRES = 4.0
 """Mean time for which a car whose patience ended waits for its way to be clear before it turns round, seconds."""
 BACK = -0.99
@@ -24,9 +36,10 @@ BACK = -0.99
 def drive(
     b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) of a car that drives to its waypoint, after choosing the next where it is time.
+    """Return (speed, yaw rate) toward the waypoint of car n, which is set anew when the car has reached it.
 
-    `seen` (whether the ego is to be sought), `weary` (whether its patience ended and something is in its way).
+    `seen` (bool): the ego is seen and to be followed; `weary` (bool): the car's patience has ended and something is in
+    its way.
     """
     team, agent = scene.agents.team[b], scene.agents.agent[b, n]
     most = Command(agent.speed, agent.yaw_rate)
@@ -39,6 +52,9 @@ def drive(
     reached = agent.reached
     if weary or agent.lane < 0 or dx * dx + dy * dy < reached * reached:
         navigate(b, n, tick, pose, seen, weary, scene)
+    if agent.leg == 1 and bends_before(scene.roads, team.net, agent.lane, pose.x, pose.y):
+        x, y = _ahead(pose, BEND_AIM * team.w / 0.3, agent.lane, team.net, agent.offset, scene.roads)
+        return turn_or_pursue(pose, x, y, most, team.slowest, team.radius, team.period)
     return turn_then_drive(pose, agent.goal_x, agent.goal_y, most, agent.tangent, agent.miss, team.period)
 
 
@@ -50,14 +66,14 @@ def pose_of(state: State, b: int, n: int) -> Pose:
 
 @jit
 def tires(tick: int, n: int, team: Team) -> bool:
-    """Return whether a car that is barred turns round in this tick: at random, so that not all do at once."""
+    """Tell whether a barred car turns round in this tick: at random, so that not all cars do at once."""
     bound = min(int(TIRES / team.period) + 1, 1 << 16)
     return below(team.seed, team.trial, n, tick, DRAW.TURN, bound) == 0
 
 
 @jit
 def begin_lane(pose: Pose, roads: RoadTable, net: int, agent: Agent, cycle: Ints, leg: int) -> None:
-    """Take the lane of the nearest segment that leads along the heading, `leg` (as `Agent.leg`).
+    """Put a car on the lane of the nearest segment that follows its heading; set `Agent.leg` to `leg` (as there).
 
     `cycle` (M,) holds the lanes of all cycles in order.
     """
@@ -69,10 +85,10 @@ def begin_lane(pose: Pose, roads: RoadTable, net: int, agent: Agent, cycle: Ints
 
 @jit
 def navigate(b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene) -> None:
-    """Set the next waypoint: the end of the lane; after turning round at an end first the start of the lane back.
+    """Set the next waypoint: the end of the lane, or, after turning round there, first the start of the lane back.
 
-    A `weary` (bool) car turns round where it stands, others have reached their waypoint or begin to drive; where the
-    ego is `seen` (bool) they go toward it.
+    A `weary` (bool) car turns round where it stands; any other has reached its waypoint or begins to drive. The next
+    lane leads toward the ego if that is `seen` (bool).
     """
     roads, cycle = scene.roads, scene.agents.cycle
     net, agent = scene.agents.team[b].net, scene.agents.agent[b, n]
@@ -90,17 +106,24 @@ def navigate(b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, sce
     else:
         agent.leg = 1
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads, net, lane)
-    progress = length if agent.leg == 1 else 0.0
-    _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
+    progress = lane_length(roads, net, lane) if agent.leg == 1 else 0.0
+    agent.goal_x, agent.goal_y = _beside(lane, progress, net, agent.offset, roads)
 
 
 @jit
-def _aim_at(agent: Agent, x: float, y: float, tx: float, ty: float) -> None:
-    """Set the waypoint `offset` right of a point of a centre line with direction (tx, ty)."""
-    offset = agent.offset
-    agent.goal_x = x + offset * ty
-    agent.goal_y = y - offset * tx
+def _beside(lane: int, along: float, net: int, offset: float, roads: RoadTable) -> tuple[float, float]:
+    """Return the point `offset` (m) right of a lane's road `along` (m) from its start."""
+    x, y, tx, ty = place_on_lane(roads, net, lane, along)
+    return x + offset * ty, y - offset * tx
+
+
+@jit
+def _ahead(
+    pose: Pose, far: float, lane: int, net: int, offset: float, roads: RoadTable
+) -> tuple[float, float]:
+    """Return the point `offset` (m) right of a lane's road that is `far` (m) ahead of a car along it."""
+    along, _, _, _, _ = foot(roads, net, lane, pose.x, pose.y)
+    return _beside(lane, along + far, net, offset, roads)
 
 
 @jit
@@ -112,26 +135,24 @@ def navigate_arcs(b: int, n: int, tick: int, pose: Pose, seen: bool, scene: Scen
     """
     roads, team, agent = scene.roads, scene.agents.team[b], scene.agents.agent[b, n]
     net, radius, offset = team.net, team.radius, agent.offset
-    x, y = pose.x, pose.y
     if agent.lane < 0:
         begin_lane(pose, roads, net, agent, scene.agents.cycle, -1)
     lane = agent.lane
-    x0, y0, tx, ty, length = frame(roads, net, lane)
-    ahead = length - (x - x0) * tx - (y - y0) * ty
+    along, _, tx, ty, length = foot(roads, net, lane, pose.x, pose.y)
+    ahead = length - along
     if agent.leg < 0 and ahead <= 2.0 * (offset + radius):
         agent.leg = choose(b, n, tick, lane, seen, scene)
     coming = agent.leg
     if coming >= 0:
         _, _, ux, uy, _ = frame(roads, net, coming)
-        along = tx * ux + ty * uy
-        half = (tx * uy - ty * ux) / (1.0 + along) if along > BACK else 0.0
+        cosine = tx * ux + ty * uy
+        half = (tx * uy - ty * ux) / (1.0 + cosine) if cosine > BACK else 0.0
         if ahead <= radius * abs(half) - offset * half:
             lane = coming
             agent.lane = lane
             agent.leg = -1
-            x0, y0, tx, ty, length = frame(roads, net, lane)
-    progress = (x - x0) * tx + (y - y0) * ty + max(AIM * team.w / 0.3, 2.0 * radius)
-    _aim_at(agent, x0 + progress * tx, y0 + progress * ty, tx, ty)
+    far = max(AIM * team.w / 0.3, 2.0 * radius)
+    agent.goal_x, agent.goal_y = _ahead(pose, far, lane, net, offset, roads)
 
 
 @jit

@@ -38,15 +38,15 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 REMEMBERED = 12.0
-"""How much of the ego's path is remembered beside the gap, metres (for w = 0.3 m)."""
+"""Length of the ego's path that is remembered in addition to the gap, metres (for w = 0.3 m)."""
 PAIRS = 64
 
 
 class Fleet:
     """Drives the e-agents of every instance of a batch (a `protocols.Driver`).
 
-    The commands are a function of the states since `reset`, the instances and their seeds, and of nothing else:
-    trials of a batch do not touch each other. The ego's commands are left alone; those of remote cars are whatever.
+    The commands depend on the states since `reset`, the instances and their seeds alone, so trials of a batch do not
+    influence each other. The ego's commands are not written; those written for remote cars mean nothing.
 
     Notes
     -----
@@ -97,7 +97,7 @@ class Fleet:
             self._nudge(tick, commands, self._agents)
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return what the cars that play a counterstrategy and the user's own have to say."""
+        """Return the reports of the team of kind `counter` and of the user's own e-agents."""
         told = () if self._counter is None else self._counter.report()
         return told if self._own is None else (*told, *self._own.report())
 
@@ -122,9 +122,9 @@ class Fleet:
 
 
 def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
-    """Return the e-agents of a batch with `cars` places a trial, but for those that keep the rules.
+    """Return the tables of the e-agents of a batch, (B, cars), except those driven by other classes.
 
-    `net` holds the number of each trial's road network.
+    `net` (B,) holds the number of each trial's road network.
     """
     agents = table(Agent, (len(instances), cars))
     lists = Lists()
@@ -154,7 +154,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
 
 
 def _lawful() -> Lawful:
-    """Return the driver of the cars that keep the rules; what it needs is compiled only where there are such cars."""
+    """Return the driver of the cars that keep the rules; its kernels are imported only if there are such cars."""
     from dubins_traffic.agents.lawful import Lawful
 
     return Lawful()
@@ -188,7 +188,7 @@ def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Row
 
 
 def _recalled(instances: Sequence[Instance], agents: Rows[Agent]) -> Floats:
-    """Fill in by how much cars are nudged; return `Agents.recalled`."""
+    """Fill in delay and noise of the cars that are nudged; return `Agents.recalled`."""
     count = longest = 0
     for b, instance in enumerate(instances):
         for n, own in enumerate(instance.e_agents, start=1):
@@ -201,7 +201,7 @@ def _recalled(instances: Sequence[Instance], agents: Rows[Agent]) -> Floats:
 
 
 def _trails(agents: Rows[Agent], w: float) -> tuple[Rows[Trail], Rows[Point]]:
-    """Give every car that follows a ring for the ego's path; return `Agents.trail` and `Agents.point`."""
+    """Give every car that follows the ego a ring buffer of its path; return `Agents.trail` and `Agents.point`."""
     follows = agents["trail"] == 0
     followers = int(follows.sum())
     agents["trail"][follows] = np.arange(followers)

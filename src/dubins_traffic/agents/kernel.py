@@ -1,4 +1,4 @@
-"""One tick of all e-agents of a batch: who must stand, and what the others do."""
+"""One tick of the e-agents of a batch: which must stand, and the commands of all (compiled)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dubins_traffic.agents.sight import look
 from dubins_traffic.agents.tables import HELD, Agent, Scene
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 
 
 @jit
 def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
-    """Write the commands of all e-agents of the trials from `begin` (number) on.
+    """Write the commands of the e-agents of the trials from `begin` (number) on.
 
-    Returns the number of trials, or -1 - b where the room for pairs of neighbours was too small for trial b, which is
-    then untouched, like those after it.
+    Returns B, the number of trials, or -1 - b if the buffer of pairs is too small for trial b; the commands of that
+    trial and of those after it are then not written.
     """
     count = scene.state.count
     for b in range(begin, count.shape[0]):
@@ -25,9 +25,9 @@ def decide(tick: int, begin: int, commands: Floats, scene: Scene) -> int:
     return count.shape[0]
 
 
-@jit
+@jit_rare
 def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
-    """Write the commands of the e-agents of one trial; False, and nothing done, if there is no room for its pairs."""
+    """Write the commands of the e-agents of trial b; if the buffer of pairs is too small, write none, return False."""
     state, agents, work = scene.state, scene.agents, scene.space
     if look(scene, b) > work.search.pair.shape[0]:
         return False
@@ -42,12 +42,12 @@ def decide_trial(b: int, tick: int, scene: Scene, commands: Floats) -> bool:
 
 @jit
 def hold(tick: int, pose: Pose, ego: Pose, held: int, agent: Agent) -> int:
-    """Return what holds a car: SEES for no motion, BARRED for no speed, TIGHT for no turning.
+    """Return what holds a car, bits of HELD: SEES, it stands; BARRED, it has no speed; TIGHT, it does not turn.
 
     `held` (bits) is what `sight.look` found.
 
-    A car stands while it SEES something, and has no speed near the ego. When its patience ends, only what is in
-    its way or too near holds it, and WEARY says that something is in its way.
+    A car stands while it SEES a body, and has no speed near the ego. Once its patience has ended only a body in its way
+    or too near holds it, and WEARY says that a body is in its way.
     """
     dx = ego.x - pose.x
     dy = ego.y - pose.y

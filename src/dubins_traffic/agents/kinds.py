@@ -1,7 +1,7 @@
-"""The e-agents that run compiled, a kind each: what its parameters make of a car, and how it drives.
+"""The kinds of e-agents that run compiled: how each fills a car's row from its parameters, and how it drives.
 
-A kind is its parameters in `problem.kinds` and what stands of it here: a function that fills the row of a car, and in
-`act`, if it drives as no other does, what it does in a tick.
+A kind consists of its parameters in `problem.kinds` and, here, of a function that fills the row of a car and, if it
+drives unlike the others, of a branch of `act`.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ class _Does(NamedTuple):
 
 DOES: Final = _Does()
 AS_FAR_AS_2016 = 3.5
-"""Up to this far from its waypoint (metres, for w = 0.3 m) a car keeps the bearing tolerance of 2016."""
+"""Within this distance of its waypoint (metres, for w = 0.3 m) a car has the bearing tolerance of 2016."""
 WIDEST = 1.5
-"""Bearing tolerances above this count as this, rad."""
+"""Largest bearing tolerance, rad."""
 MARGIN = 0.05
-"""A car that stops for others keeps at least this between the bodies, metres."""
+"""Least gap between the bodies that a car which stops for others keeps, metres."""
 NEVER = 2**62
 
 
 @jit
 def act(b: int, n: int, tick: int, held: int, scene: Scene) -> tuple[float, float]:
-    """Return speed and yaw rate of an e-agent that `held` (bits of `tables.HELD`) does not hold."""
+    """Return speed and yaw rate that an e-agent asks for; `held` (bits of `tables.HELD`) says what holds it."""
     agent = scene.agents.agent[b, n]
     free, seen = tick >= agent.begin and held & HELD.SEES == 0, False
     if agent.does == DOES.PLAYS:
@@ -66,7 +66,7 @@ def act(b: int, n: int, tick: int, held: int, scene: Scene) -> tuple[float, floa
 
 @dataclass
 class Lists:
-    """What the cars of a batch drive along, one after another: lanes of cycles, steps of scripts."""
+    """What the cars of a batch drive along, one car's rows after another's: lanes of cycles, steps of scripts."""
 
     cycle: list[int] = field(default_factory=list[int])
     script: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
@@ -74,7 +74,7 @@ class Lists:
 
 Parameters: TypeAlias = Mapping[str, Any]
 Pack: TypeAlias = "Callable[[Instance, Parameters, Agent, Lists], None]"
-"""Fills the row of a car of one kind, which `fill` has filled as for `wander`, but for the ego's range."""
+"""Completes the row of a car of one kind, in which `fill` has set all that is common to the kinds."""
 
 
 def _wander(instance: Instance, given: Parameters, agent: Agent, lists: Lists) -> None:  # noqa: ARG001
@@ -114,7 +114,7 @@ PACKS: dict[str, Pack] = {
     "parked": _parked,
     "scripted": _scripted,
 }
-"""How the rows of cars are filled, by kind."""
+"""The function that completes the row of a car, by kind."""
 
 
 def fill(instance: Instance, own: EAgent, agent: Agent, lists: Lists) -> None:

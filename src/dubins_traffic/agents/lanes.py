@@ -12,9 +12,9 @@ from dubins_traffic.routing.lane_graph import FAR
 
 @jit
 def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
-    """Return one of the lanes out of `v`, each equally likely, but the one back, which only a dead end gives.
+    """Return a random lane out of `v`, each equally likely, except the one back, which is taken at dead ends only.
 
-    `car` (number) and tick are what the draw follows from.
+    The draw follows from the team's seed, `car` (number) and tick.
     """
     arms, degree = roads.arms, roads.degree
     if degree[v] < 2:
@@ -30,9 +30,9 @@ def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick:
 
 @jit
 def nearer_exit(roads: RoadTable, v: int, lane: int, hops: Ints) -> int:
-    """Return the lane out of `v` with the fewest hops to go; the one back where no other leads there.
+    """Return the lane out of `v` with the fewest hops to go; the lane back only if no other leads there.
 
-    `hops` (L,) is how many lanes are to go from each.
+    `hops` (L,) is the number of lanes to go from each lane.
     """
     arms, degree = roads.arms, roads.degree
     best = lane ^ 1

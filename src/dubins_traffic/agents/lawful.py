@@ -1,4 +1,4 @@
-"""The e-agents `lawful`, `nemesis` and `chosen`: the law of the road (`policies.rules.policy`), and their own ways."""
+"""The e-agents `lawful`, `nemesis` and `chosen`, which the law of the road (`policies.rules.policy`) drives."""
 
 from __future__ import annotations
 
@@ -49,13 +49,14 @@ class Lawful:
             [instance.problem.car.lane_width for instance in instances],
         )
         self._decide = bound(decide)
+        bodies = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._traffic = Traffic(
             state,
             Labels.zeros(*state.x.shape),
             roads,
-            pack_obstacles([instance.problem.obstacles for instance in instances]),
+            bodies,
             pack_drivers(instances, cars, net),
-            scratch(cars, int(np.diff(roads.seg_off).max())),
+            scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
         )
 
     def reseed(self, seed: int) -> None:
@@ -106,7 +107,7 @@ def pack_drivers(
 
 
 def _add_choices(tables: Sequence[Mapping[int, Floats]], drivers: Rows[Driver]) -> Rows[Leg]:
-    """Put what is chosen for the cars of each trial one below another; note whose rows they are."""
+    """Return the choices of all cars of all trials as one table; fill in which rows are whose."""
     found: list[Floats] = [empty(0)]
     first = 0
     for b, own in enumerate(tables):
@@ -122,7 +123,7 @@ def _add_choices(tables: Sequence[Mapping[int, Floats]], drivers: Rows[Driver]) 
 
 
 def _one_below_another(tables: Sequence[Floats]) -> Floats:
-    """Return the rows of all tables; narrower ones are filled up with infinities."""
+    """Return the rows of all tables as one; narrower tables are padded with infinities."""
     widest = max((rows.shape[1] for rows in tables), default=0)
     whole = [np.zeros((0, widest))]
     for rows in tables:
@@ -139,7 +140,7 @@ def drivers_of(
     distance: Floats,
     choice: Rows[Leg] | None = None,
 ) -> Drivers:
-    """Return the drivers of a batch, `cars` (B, N), on no way yet."""
+    """Return the drivers of a batch, `cars` (B, N), before the first tick."""
     return Drivers(
         active=(cars["kind"] != KIND.ABSENT).any(axis=1).astype(np.int64),
         net=net,
@@ -204,7 +205,7 @@ def _describe(kind: str, given: Mapping[str, Any], fastest: float, car: Driver) 
 def _add_stages(
     problems: Sequence[Problem], fleets: Sequence[_Fleet], whose: Ints, cars: Rows[Driver], stage: list[int]
 ) -> None:
-    """Put the goals of each trial, at which cars may park, and the lanes of its loops into `stage`.
+    """Append each trial's goals, at which cars may park, and the lanes of its loops to `stage`.
 
     Trial b has the cars of fleets[whose[b]], which are described by cars[b].
     """

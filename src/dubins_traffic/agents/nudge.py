@@ -1,25 +1,25 @@
-"""E-agents of the kind `nudged`: what any other kind asks for, late and with noise on the speed (compiled)."""
+"""E-agents of the kind `nudged`: commands of another kind, delayed and with noise on the speed (compiled)."""
 
 from __future__ import annotations
 
 from dubins_traffic.agents.tables import Agents
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.random import DRAW, uniform
 
 
 @jit
 def nudge(tick: int, commands: Floats, agents: Agents) -> None:
-    """Change the `commands` (B, N, 2) of all cars of a batch that are nudged, m/s and rad/s."""
+    """Delay the `commands` (B, N, 2), m/s and rad/s, of all nudged cars of a batch and add noise, in place."""
     for b in range(commands.shape[0]):
         nudge_trial(b, tick, commands, agents)
 
 
-@jit
+@jit_rare
 def nudge_trial(b: int, tick: int, commands: Floats, agents: Agents) -> None:
-    """Let each nudged car of a trial do what it asked for some ticks ago, not quite as fast or a little faster.
+    """Replace the command of each nudged car of trial b by its earlier one, at a speed with noise.
 
-    `commands` (B, N, 2), m/s and rad/s, hold what the cars ask for. Before its first command a car stands.
+    `commands` (B, N, 2), m/s and rad/s, hold the present commands. Before its first command a car stands.
     """
     for n in range(1, commands.shape[1]):
         agent = agents.agent[b, n]

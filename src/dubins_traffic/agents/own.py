@@ -1,4 +1,4 @@
-"""E-agents of the user's own, driven in Python: one object for each, from ``module:Class``."""
+"""The user's own e-agents, classes of Python given as ``module:Class``; one object drives one car."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dubins_traffic.problem.kinds import OWN
 from dubins_traffic.protocols import Draws
 
 FAULT: Final = "e-agent"
-"""Kind of the event that tells what the class of an e-agent raised."""
+"""Kind of the event whose detail is what the class of an e-agent has raised."""
 _SEAM = Seam(
     "e-agents",
     "driver of an e-agent",
@@ -28,25 +28,25 @@ _SEAM = Seam(
 
 
 class OwnAgent(Protocol):
-    """Drives one e-agent; a class without arguments, of which one object drives one car through one trial.
+    """Drives one e-agent. The constructor takes no arguments; one object drives one car through one trial.
 
-    It must do the same again in the same trial: what is random follows from ``instance.seed``, ``instance.trial`` and
-    `car`. A class attribute `parameters`, a mapping of defaults, says which parameters it takes. A fork of a trial goes
-    on with a deep copy; one that has a method ``reseed(seed)`` is told where a fork draws from another seed.
+    In the same trial it must do the same again: random numbers must follow from ``instance.seed``, ``instance.trial``
+    and `car`. A class attribute `parameters`, a mapping of defaults, names the parameters it takes. A fork of a trial
+    goes on with a deep copy, whose method ``reseed(seed)``, if it has one, is called if the fork has another seed.
     """
 
     def begin(self, instance: Instance, car: int, parameters: Mapping[str, Any]) -> None:
-        """A trial begins, in which it drives number `car`; `parameters` are all of them, defaults filled in."""
+        """Begin a trial, in which this object drives car number `car`; `parameters` has defaults filled in."""
         ...
 
     def act(self, observation: Observation) -> tuple[float, float]:
-        """Choose speed (m/s) and yaw rate (rad/s) for the coming tick from what it senses, without noise."""
+        """Return speed (m/s) and yaw rate (rad/s) for the coming tick; the observation is without noise."""
         ...
 
 
 @dataclass(slots=True)
 class _Driven:
-    """An e-agent on its way: its number, name, driver and senses; a driver that has raised is not asked again."""
+    """An e-agent of a trial: number, name, driver object and senses; one whose driver has raised is not asked again."""
 
     car: int
     name: str
@@ -56,13 +56,13 @@ class _Driven:
 
 
 class OwnAgents:
-    """Drives those e-agents of a trial that are the user's own (a `protocols.Driver`).
+    """Drives those e-agents of a trial that are classes of the user (a `protocols.Driver`).
 
     What a class raises ends the trial as a fault of that e-agent; an event tells what it was.
     """
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:  # noqa: ARG002  # they sense for themselves
-        """Make and begin the drivers of the one trial.
+        """Make the driver objects of the only trial and begin them.
 
         Raises
         ------
@@ -70,7 +70,9 @@ class OwnAgents:
             If there are several trials, a class can't be found or made, or takes other parameters.
         """
         if len(instances) != 1:
-            raise InputError("these run by themselves", field="type", value=OWN, expected="one trial")
+            raise InputError(
+                "such e-agents are not batched", field="type", value=OWN, expected="one trial at a time"
+            )
         (instance,) = instances
         self._reports: list[tuple[str, str]] = []
         self._driven = [
@@ -85,7 +87,7 @@ class OwnAgents:
             commands[0, own.car] = self._command(own, own.senses.observe(tick, state, labels))
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return what classes have raised since the last call."""
+        """Return what drivers have raised since the last call."""
         found, self._reports = self._reports, []
         return found
 

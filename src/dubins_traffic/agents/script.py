@@ -1,4 +1,4 @@
-"""Scripts: commands that an e-agent plays, each for some ticks."""
+"""Scripts: sequences of commands, each held for some ticks, that an e-agent plays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dubins_traffic.kernels.records import Rows
 
 @jit
 def play(tick: int, agent: Agent, script: Rows[Stretch]) -> tuple[float, float]:
-    """Return (speed, yaw rate) of a script in a tick."""
+    """Return the (speed, yaw rate) of an e-agent's script in a tick."""
     first = agent.first
     last = agent.last
     if first == last:

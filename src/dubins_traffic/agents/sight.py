@@ -1,4 +1,4 @@
-"""Who must stand: cars with something near in the sector that the 2016 laser covers."""
+"""Which e-agents must stand: those with a body near in the sector that the laser of 2016 covers (compiled)."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ COS_EDGE = -0.4161468365471424
 SIN_EDGE = 0.9092974268256817
 """Cosine and sine of 2.0 rad, the edge of the sector on either side of the heading."""
 ELBOW = 0.1
-"""A car whose patience ended keeps this free ahead of its body, and what it drives in a tick, metres."""
+"""Length of the strip ahead that a car whose patience has ended keeps free, beyond what it drives in a tick, metres."""
 SHOULDER = 0.03
-"""It keeps this free to either side of its body, metres."""
+"""Width of the strip to either side of the body that such a car keeps free, metres."""
 
 
 @jit
 def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
-    """Return whether a rounded box has a point nearer than `stop` (m) to (x, y) and at most 2.0 rad off the heading.
+    """Tell whether a rounded box has a point nearer than `stop` (m) to (x, y) and at most 2.0 rad off the heading.
 
     Exact: either the point of the box that is nearest lies in the sector, or else the nearest one in the sector
     lies on one of the sector's edges.
@@ -50,7 +50,7 @@ def sees(x: float, y: float, c: float, s: float, stop: float, box: Box) -> bool:
 
 @jit
 def in_way(pose: Pose, front: float, side: float, box: Box) -> bool:
-    """Return whether a rounded box meets the strip from a pose to `front` (m) ahead, `side` (m) to either side."""
+    """Tell whether a rounded box meets the strip from a pose to `front` (m) ahead, `side` (m) to either side."""
     x, y, c, s = pose
     half = 0.5 * front
     gap, _, _, _, _ = separation(Box(x + half * c, y + half * s, c, s, half, side, 0.0), box)
@@ -59,7 +59,7 @@ def in_way(pose: Pose, front: float, side: float, box: Box) -> bool:
 
 @jit
 def consider(pose: Pose, team: Team, agent: Agent, box: Box) -> int:
-    """Return the bits of `Workspace.held` that one body brings upon a car."""
+    """Return the bits of HELD with which one body holds a car at a pose."""
     x, y, c, s = pose
     stop = agent.stop
     if not sees(x, y, c, s, stop, box):
@@ -82,9 +82,9 @@ def consider(pose: Pose, team: Team, agent: Agent, box: Box) -> int:
 
 @jit
 def look(scene: Scene, b: int) -> int:
-    """Set `held` of each car of trial b by all that it sees.
+    """Set `Workspace.held` of each car of trial b by the bodies near it.
 
-    Returns the number of pairs that had to be looked at; if it exceeds the room for pairs, nothing was decided.
+    Returns the number of pairs of bodies near each other; if it exceeds the buffer of pairs, `held` is not set.
     """
     state, obstacles, work = scene.state, scene.obstacles, scene.space
     team = scene.agents.team[b]

@@ -1,4 +1,4 @@
-"""The e-agents of a batch as tables for kernels: what they are, what they remember, room to work in."""
+"""The e-agents of a batch as tables for kernels: parameters, memory and scratch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.cars.near import Search, search_room, widened
+from dubins_traffic.cars.near import Search, search_tables, widened_search
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -18,16 +18,16 @@ NOBODY: Final = -1
 
 
 class _Held(NamedTuple):
-    """What holds a car, bits of `Workspace.held`. For cars whose patience can't end only SEES is looked at."""
+    """What holds a car, bits of `Workspace.held`; a car whose patience never ends has SEES alone."""
 
     SEES: int = 1
-    """Something is nearer than the car stops at."""
+    """A body in sight is nearer than `Agent.stop`."""
     BARRED: int = 2
-    """Something is in its way."""
+    """A body is in its way."""
     TIGHT: int = 4
-    """Something is too near to turn in place."""
+    """A body is too near to turn in place."""
     WEARY: int = 8
-    """Its patience ended, and it is barred."""
+    """Its patience has ended, and it is barred."""
 
 
 HELD: Final = _Held()
@@ -38,42 +38,42 @@ STEP: Final = 0.1
 
 @record
 class Agent:
-    """An e-agent: what it is given, and what it remembers."""
+    """An e-agent: its parameters and its memory."""
 
     does: int = NOBODY
-    """What it does (`agents.kinds`); NOBODY where there's no e-agent."""
+    """How it drives (`agents.kinds.DOES`); NOBODY in places without an e-agent."""
     begin: int
     """The tick at which the car begins to drive."""
     first: int
     """Its first row of `Agents.cycle` or `Agents.script`."""
     last: int
-    """The row after its last."""
+    """The row after its last one."""
     repeat: int
     """1 if its script repeats."""
     patience: int = -1
-    """Ticks that it stands for others before it looks only at the way ahead; negative: for ever."""
+    """Ticks for which it stands for others before it minds only its way ahead; negative: for ever."""
     trail: int = -1
     """Its row of `Agents.trail` and `Agents.point`, or -1."""
     offset: float
     """How far right of the centre line it drives, metres."""
     reached: float
-    """From where a waypoint counts as reached, metres."""
+    """Distance from which a waypoint counts as reached, metres."""
     tangent: float
     """Tangent of the bearing error beyond which it turns (`policies.waypoint`)."""
     miss: float
     """Largest lateral distance of the waypoint from the line ahead that is left alone, metres."""
     stop: float
-    """It stands while a surface in sight is nearer, metres."""
+    """It stands while a body in sight is nearer than this, metres."""
     berth: float = -1.0
-    """It does not drive while the ego's centre is within, metres; negative: never mind."""
+    """It has no speed while the ego's centre is within this distance, metres; negative: the ego does not matter."""
     speed: float
     """How fast it drives, m/s."""
     yaw_rate: float
     """How fast it turns, rad/s."""
     gap: float
-    """Kept behind the ego, metres."""
+    """The gap that it keeps behind the ego, metres."""
     sight: float = 1e150
-    """From where the ego is seen, metres."""
+    """Distance up to which it sees the ego, metres."""
     lane: int = -1
     """The lane driven, -1 before the first."""
     leg: int
@@ -88,9 +88,9 @@ class Agent:
     delay: int
     """How many ticks late a nudged car does what it asks for."""
     noise: float
-    """By which share its speed is more or less at most."""
+    """Largest deviation of its speed, as a share."""
     fastest: float
-    """How fast it drives at most, m/s."""
+    """Its largest speed, m/s."""
     goal_x: float
     """The waypoint, metres."""
     goal_y: float
@@ -102,29 +102,29 @@ class Team:
     """What the e-agents of a trial have in common."""
 
     seed: np.uint64
-    """Of the random numbers."""
+    """Seed of the random numbers."""
     trial: int
-    """Number of the trial, of the random numbers."""
+    """Number of the trial by which random numbers are drawn."""
     net: int
     """Number of the road network."""
     curves: int
     """1 if the cars can't turn in place."""
     span: float
-    """No two bodies matter to each other whose centres are farther apart, metres."""
+    """Two bodies whose centres are farther apart than this don't matter to each other, metres."""
     period: float
     """Seconds of a tick."""
     slowest: float
     """Smallest speed, m/s."""
     radius: float
-    """Of the tightest turn, metres."""
+    """Radius of the tightest turn, metres."""
     w: float
-    """Width of a lane, metres."""
+    """Nominal width of the cars, metres; a lane is twice as wide."""
     half_length: float
-    """Of the body, a rounded box, metres."""
+    """Half the length of the body's core, a rounded box, metres."""
     half_width: float
-    """Of the body, metres."""
+    """Half the width of the body's core, metres."""
     rounding: float
-    """Of the body, metres."""
+    """Rounding of the body, metres."""
 
 
 @record
@@ -153,7 +153,7 @@ class Point:
 
 @record
 class Trail:
-    """What a car that follows remembers of the ego, beside points of its path."""
+    """What a car that follows the ego remembers of it, beside the points of its path."""
 
     written: int
     """Points written so far."""
@@ -172,9 +172,9 @@ class Trail:
 class Agents(Tables):
     """The e-agents of a batch.
 
-    `team` (B,), `agent` (B, N); `cycle` (M,): lanes in order; `script` (M,). Of the ego's path, for every car that
-    follows: `trail` (F,), and `point` (F, M), a ring. Of every car that is nudged: `recalled` (R, D, 2), a ring of what
-    it has asked for, m/s and rad/s.
+    `team` (B,) and `agent` (B, N). `cycle` (M,): the lanes of all cycles in order. `script` (M,): the steps of all
+    scripts. For each of the F cars that follow the ego: `trail` (F,), and `point` (F, M), a ring buffer of its path.
+    For each of the R cars that are nudged: `recalled` (R, D, 2), a ring buffer of its latest commands, m/s and rad/s.
     """
 
     team: Rows[Team]
@@ -187,7 +187,7 @@ class Agents(Tables):
 
 
 class Workspace(Tables):
-    """Scratch of the kernels: pairs of neighbours and their cells (see `cars.near`), why cars must stand, lanes."""
+    """Scratch of the kernels: pairs of near bodies and their cells (`cars.near`), what holds each car, lanes."""
 
     search: Search
     held: Ints
@@ -196,7 +196,7 @@ class Workspace(Tables):
 
 
 class Scene(Tables):
-    """All that the e-agents of a batch go by."""
+    """All tables that the e-agents of a batch decide by."""
 
     state: State
     roads: RoadTable
@@ -206,14 +206,14 @@ class Scene(Tables):
 
 
 def wider(space: Workspace) -> Workspace:
-    """Return scratch with room for four times as many pairs."""
-    return space.replace(search=widened(space.search))
+    """Return scratch with a buffer for four times as many pairs."""
+    return space.replace(search=widened_search(space.search))
 
 
 def workspace(cars: int, pairs: int, lanes: int) -> Workspace:
     """Return scratch for trials of up to `cars` cars, `pairs` pairs of neighbours and `lanes` lanes."""
     return Workspace(
-        search=search_room(cars, pairs),
+        search=search_tables(cars, pairs),
         held=np.zeros(cars, dtype=np.int64),
         hops=np.zeros(lanes, dtype=np.int64),
         queue=np.zeros(lanes, dtype=np.int64),

@@ -1,4 +1,4 @@
-"""Following the ego along its own path, which a ring buffer remembers."""
+"""Following the ego along its own path, which a ring buffer holds (compiled)."""
 
 from __future__ import annotations
 
@@ -6,30 +6,27 @@ from math import sqrt
 
 from dubins_traffic.agents.tables import STEP, Agent, Agents, Point, Team, Trail
 from dubins_traffic.cars.state import Command, Pose
-from dubins_traffic.kernels.boxes import NEVER
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows
-from dubins_traffic.policies.waypoint import pursue, turn_then_drive
+from dubins_traffic.policies.waypoint import turn_or_pursue
 
 JUMP = 0.5
-"""An ego that comes back into sight farther than this from where it was lost has left its path, metres."""
+"""If the ego comes back into sight farther than this from where it was lost, a new path begins, metres."""
 JOIN = 0.75
 """A car begins to follow when it comes this near to the ego's path, metres (for w = 0.3 m)."""
 AHEAD = 0.25
-"""It drives to the point of the path about this far ahead, metres (for w = 0.3 m)."""
+"""The car drives to the point of the path about this far ahead, metres (for w = 0.3 m)."""
 EASE = 0.25
-"""It closes what is too much of the gap as if to do so in this time, seconds."""
-STEEP = 1.0
-"""Tangent of the bearing error beyond which it turns in place."""
+"""Time constant with which the car closes a gap that is too large, seconds."""
 
 
 @jit
 def follow(
     tick: int, b: int, n: int, pose: Pose, ego: Pose, free: bool, agents: Agents
 ) -> tuple[bool, bool, float, float]:
-    """Return whether the ego is in sight, whether the car shall drive on lanes, else its speed and yaw rate.
+    """Return (ego in sight, car drives on lanes, speed, yaw rate); speed and yaw rate count if it does not.
 
-    A car that is not `free` (bool) only looks.
+    A car that is not `free` (bool) to move only observes the ego.
     """
     team, agent = agents.team[b], agents.agent[b, n]
     path, f = agents.point, agent.trail
@@ -50,7 +47,7 @@ def follow(
 
 @jit
 def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: int, trail: Trail) -> None:
-    """Remember the ego's place on path `f` (row), each `step` (m); one that comes back elsewhere begins a new path."""
+    """Append the ego's place to path `f` (row), every `step` (m); begin a new path if it reappears elsewhere."""
     dx = x - trail.x
     dy = y - trail.y
     moved = sqrt(dx * dx + dy * dy)
@@ -77,7 +74,7 @@ def observe(tick: int, x: float, y: float, step: float, path: Rows[Point], f: in
 
 @jit
 def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: Trail) -> bool:
-    """Return whether the car is on path `f` (row): from when any point of it is within `near` (m), the newest first."""
+    """Tell whether the car is on path `f` (row): it is once any point, the newest first, is within `near` (m)."""
     if trail.aimed < 0:
         written = trail.written
         for k in range(written - 1, max(written - path.shape[1], -1), -1):
@@ -94,7 +91,7 @@ def on_path(x: float, y: float, near: float, path: Rows[Point], f: int, trail: T
 def track(
     pose: Pose, seen: bool, team: Team, agent: Agent, path: Rows[Point], f: int, trail: Trail
 ) -> tuple[float, float]:
-    """Return (speed, yaw rate) along path `f` (row); gives it up at its end when the ego is not `seen` (bool)."""
+    """Return (speed, yaw rate) along path `f` (row); at its end leave the path if the ego is not `seen` (bool)."""
     x, y = pose.x, pose.y
     near = max(AHEAD * team.w / 0.3, team.radius)
     aimed = trail.aimed
@@ -115,11 +112,7 @@ def track(
         trail.written = 0
         return 0.0, 0.0
     most = Command(speed, yaw)
-    if team.curves == 0:
-        _, turn = turn_then_drive(pose, gx, gy, most, STEEP, NEVER, team.period)
-        if turn != 0.0:
-            return 0.0, turn
-    return pursue(pose, gx, gy, most, team.slowest, team.radius)
+    return turn_or_pursue(pose, gx, gy, most, team.slowest, team.radius, team.period)
 
 
 @jit

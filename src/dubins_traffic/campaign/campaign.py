@@ -36,19 +36,19 @@ class Campaign:
     Parameters
     ----------
     document : Mapping
-        What the file says, with the configurations and their road networks written in; JSON.
+        The campaign file as JSON, with the configurations and their road networks written in.
     model : CampaignModel
-        The same, checked, with defaults.
+        The same, checked, with defaults filled in.
     places : tuple of str
-        The controllers, those given by a file with its full path.
+        The controllers; those given by a file have its full path.
     cells : tuple of Cell
         All combinations, configurations outermost.
     metrics : tuple of str
-        The further metrics, those given by a file with its full path.
+        The further metrics; those given by a file have its full path.
     columns : tuple of Column
-        What these tell.
+        The columns of these metrics.
     file : str or None
-        Where it was read.
+        The file from which it was read.
 
     Notes
     -----
@@ -76,15 +76,15 @@ class Campaign:
         Parameters
         ----------
         document : Mapping
-            What a campaign file says.
+            A campaign file, as JSON.
         file : str, optional
             Named in messages.
         folder : Path, optional
             The folder in which the file stands.
         places : tuple of str, optional
-            Where the controllers are, instead of where the document says.
+            The controllers, in place of those that the document names.
         metrics : (tuple of str, tuple of Column), optional
-            Where the further metrics are, instead of where the document says, and what they tell.
+            The further metrics and their columns, in place of those that the document names.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Campaign:
 
     @property
     def controllers(self) -> tuple[str, ...]:
-        """What the controllers are called in tables."""
+        """The names of the controllers in tables."""
         return tuple(bare_name(spec) for spec in self.model.controllers)
 
     @property
@@ -122,7 +122,7 @@ class Campaign:
         return tuple(self.cells[0].values)
 
     def chunks(self) -> Iterator[Chunk]:
-        """Make all units of work, in order; they depend on the campaign alone."""
+        """Yield all chunks, in order; they depend on the campaign alone."""
         return cut(self.cells, self.places, self.model.chunk, self.model.deadline, self.metrics)
 
     def chunk(self, cell: Cell, controller: int, trial: int) -> Chunk:
@@ -140,7 +140,8 @@ def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -
     path : path
         A campaign file.
     sandbox : str, optional
-        What each controller may use in a box (`controllers.registry.sandboxed`); by default as the file names them.
+        Limits of a box for each controller (`controllers.registry.sandboxed`); by default they run as the file names
+        them.
 
     Raises
     ------
@@ -161,7 +162,7 @@ def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -
 def seed_of(root: int, configuration: str, values: Mapping[str, Scalar]) -> int:
     """Return the seed of a cell: 64 bits of SHA-256 over the root seed, the configuration's name and the factors.
 
-    Neither the controllers nor other cells come into it, so that these may be added without a change of instances.
+    It does not depend on controllers and other cells, so these can be added without a change of instances.
     """
     text = json.dumps([root, configuration, dict(sorted(values.items()))], separators=(",", ":"))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
@@ -182,7 +183,7 @@ def configuration_of(entry: ConfigurationEntry, index: int, folder: Path | None)
 
 
 def _place(spec: str, index: int, folder: Path | None) -> str:
-    """Return where a controller is, having loaded it once."""
+    """Return a controller's name, with the full path if it is a file; it is loaded once to check it."""
     spec = outside.resolved(spec, folder)
     try:
         controllers.load(spec)
@@ -194,7 +195,7 @@ def _place(spec: str, index: int, folder: Path | None) -> str:
 
 
 def _metrics(specs: list[str], folder: Path | None) -> tuple[tuple[str, ...], tuple[Column, ...]]:
-    """Return where metrics are and what they tell, having loaded each once."""
+    """Return the metrics' names, with full paths if they are files, and their columns; each is loaded once."""
     places = tuple(outside.resolved(spec, folder) for spec in specs)
     found: list[Column] = []
     for k, place in enumerate(places):

@@ -1,4 +1,4 @@
-"""The units of work of a campaign: how many trials are handed out at a time."""
+"""Cuts the trials of a campaign into chunks, the units of work."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.problem.configuration import Configuration
 
 MOST_CAR_STEPS = 3_000_000
-"""Car-steps of the largest chunks, about half a second: so much is lost with a worker."""
+"""Car-steps of the largest chunks, about half a second: as much work is lost with a worker."""
 LEAST_CAR_STEPS = 500_000
-"""Car-steps of the smallest, about a tenth of a second, ten times what it costs to hand one out and to keep it."""
+"""Car-steps of the smallest chunks, about a tenth of a second: ten times the cost of sending and storing a chunk."""
 SHARES = 16
-"""A chunk is this part of the work that is left, if that lies between: so all workers end at about the same time."""
+"""A chunk is 1 / SHARES of the remaining work, within these bounds, so that all workers end at about the same time."""
 MOST_IN_CHUNK = 2_000
 TRIAL = 1_000
-"""What it costs to begin and to score a trial, in car-steps."""
+"""Cost of beginning and scoring a trial, in car-steps."""
 ASKED = 200
-"""What it costs at least to ask a controller in Python once, in car-steps."""
+"""Least cost of asking a controller in Python once, in car-steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
     """One combination of a configuration and a value of each factor.
 
-    `values` tells the factors as tables do; `first` is the number of its first trial, of which there are `count` for
-    each controller. Trial k of every controller is ``draw(settled, seed, k)``, with `settled` the configuration that
-    has the values put in.
+    `values` has the factors as in tables. `first` is the number of the cell's first trial in the campaign; each
+    controller has `count` trials. The instance of trial k, for every controller, is ``draw(settled, seed, k)``, where
+    `settled` is the configuration with the values put in.
     """
 
     index: int
@@ -51,7 +51,7 @@ class Chunk:
     configuration : Configuration
         What the instances are drawn from, with `seed` and the number of the trial.
     controller : str
-        What `controllers.registry.load` takes.
+        The controller, as `controllers.registry.load` takes it.
     deadline : float or None
         Seconds within which each `act` must answer.
     metrics : tuple of str
@@ -116,7 +116,7 @@ def cut(
 
 
 def cost(cell: Cell, controller: str) -> float:
-    """Return about what a trial takes, in car-steps of the compiled tick."""
+    """Return an estimate of the cost of a trial, in car-steps of the compiled tick."""
     settings = cell.settled.settings
     seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
     python_cost = 0 if controller == COMPILED else ASKED
@@ -124,6 +124,6 @@ def cost(cell: Cell, controller: str) -> float:
 
 
 def _trials(left: float, each: float) -> int:
-    """Return how many trials the next chunk has at most, with so much left to do."""
+    """Return the largest number of trials of the next chunk, given the cost `left` and the cost of `each` trial."""
     steps = min(MOST_CAR_STEPS, max(LEAST_CAR_STEPS, left / SHARES))
     return max(1, min(MOST_IN_CHUNK, int(steps / each)))

@@ -1,4 +1,4 @@
-"""Where chunks are run: the seam between a campaign's schedule and processes or machines."""
+"""The seam between a campaign's schedule and the processes or machines that run its chunks."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 
 class Numbered(Protocol):
-    """What a worker is handed, pickled: a chunk of a campaign, or an errand."""
+    """Work that is pickled and sent to a worker: a chunk of a campaign, or an errand."""
 
     @property
     def number(self) -> int:
-        """Its number, which tells it from all others that are under way."""
+        """Its number, unique among all work under way."""
         ...
 
 
 @runtime_checkable
 class Errand(Numbered, Protocol):
-    """What a worker is sent for that is no chunk of a campaign, such as the trials of a search."""
+    """Work for a worker other than a chunk of a campaign, such as the trials of a search."""
 
     def run(self, cancelled: Callable[[], bool]) -> bytes:
-        """Do it, and return what came of it; ask now and then whether it is `cancelled`, and if so raise."""
+        """Do the work and return its result; call `cancelled` now and then, and raise if it returns true."""
         ...
 
 
@@ -30,14 +30,14 @@ Work = TypeVar("Work", bound=Numbered)
 
 @dataclass(frozen=True, slots=True)
 class Outcome(Generic[Work]):
-    """What became of a chunk: its part of the table, or None if it was lost with its worker."""
+    """The outcome of a chunk: its part of the table, or None if it was lost with its worker."""
 
     chunk: Work
     part: bytes | None
 
 
 class Engine(Protocol[Work]):
-    """Runs chunks, several at a time, and loses none without saying so."""
+    """Runs chunks, several at a time, and returns an outcome for every one, even if it was lost."""
 
     @property
     def capacity(self) -> int:
@@ -49,7 +49,7 @@ class Engine(Protocol[Work]):
         ...
 
     def wait(self) -> Sequence[Outcome[Work]]:
-        """Return what has become of chunks since the last call, at least one if any is under way."""
+        """Return the outcomes since the last call; wait for at least one if any chunk is under way."""
         ...
 
     def close(self) -> None:

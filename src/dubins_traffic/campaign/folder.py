@@ -37,7 +37,7 @@ class Folder:
         return (self.path / table.RESULTS).is_file()
 
     def done(self) -> list[tuple[int, int]]:
-        """Return which trials have their rows, as (first, after the last), in order.
+        """Return the ranges of trials that have rows, as (first, after the last), in order.
 
         A part that can't be read is removed: its trials run again.
         """
@@ -52,7 +52,7 @@ class Folder:
         return found
 
     def keep(self, chunk: Chunk, part: bytes) -> None:
-        """Keep the part of a chunk that has been run; when this returns it survives a loss of power.
+        """Store the part of a chunk that has been run; once this returns, the part survives a loss of power.
 
         Raises
         ------
@@ -63,7 +63,7 @@ class Folder:
         replace_file(path, lambda neighbour: neighbour.write_bytes(part), durable=True)
 
     def finish(self) -> None:
-        """Make the table of the parts, if it is not there, and remove them.
+        """Merge the parts into the table, if that does not exist, and remove them.
 
         Raises
         ------
@@ -96,7 +96,7 @@ def kept(folder: Path) -> int:
 
 
 def remaining(chunks: Iterable[Chunk], done: list[tuple[int, int]]) -> Iterator[Chunk]:
-    """Return what is left of `chunks` (in order) beside the trials that are done (in order, not overlapping)."""
+    """Yield `chunks` (in order) without the trials in the ranges `done` (in order, not overlapping)."""
     k = 0
     for chunk in chunks:
         start = chunk.number
@@ -121,7 +121,7 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
     path : Path
         The folder.
     campaign : Campaign
-        What is to be run there.
+        The campaign to run there.
     resume : bool
         Whether to go on with what has been begun there; otherwise the folder must be new or empty.
     records : str or None
@@ -157,7 +157,7 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
 
 
 def _check_empty(folder: Path) -> None:
-    """Refuse a folder that holds other files than a campaign leaves that was cut off before its manifest."""
+    """Refuse a folder that holds files other than those of a campaign cut off before it had a manifest."""
     ours = {LOCK, manifest.CAMPAIGN}
     for name in sorted(path.name for path in folder.iterdir()):
         if name not in ours and not name.endswith(".tmp"):

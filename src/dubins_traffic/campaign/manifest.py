@@ -1,4 +1,4 @@
-"""The manifest of a campaign's folder: what runs there, from what, with which versions."""
+"""The manifest of a campaign's folder: the campaign, its inputs' hashes and the versions of libraries."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any, cast
 
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.manifest_model import ManifestModel
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, replace_file
+from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import parse_json
 from dubins_traffic.release import sources_hash
 from dubins_traffic.scoring.metric import Column
@@ -21,6 +23,7 @@ from dubins_traffic.scoring.metric import Column
 FORMAT = 0
 NAME = "manifest.json"
 CAMPAIGN = "campaign.json"
+OURS = "dubins-traffic"
 LIBRARIES = ("mcap", "numba", "numpy", "pyarrow")
 
 
@@ -54,7 +57,7 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         ],
         **({"metrics": metrics, "columns": columns} if metrics else {}),
         "versions": {
-            "dubins-traffic": package_version(),
+            OURS: package_version(),
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },
@@ -75,7 +78,7 @@ def read(folder: Path) -> dict[str, Any] | None:
     Raises
     ------
     InputError
-        If it can't be read or is of another format.
+        If it can't be read, is of another format, or what is read of it is of other kinds.
     """
     path = folder / NAME
     if not path.is_file():
@@ -89,27 +92,44 @@ def read(folder: Path) -> dict[str, Any] | None:
             value=manifest.get("format"),
             expected=str(FORMAT),
         )
+    told = parse(ManifestModel, manifest, file=str(path))
+    if OURS not in told.versions:
+        raise InputError("missing", file=str(path), field=f"versions.{OURS}", expected="this key")
     return manifest
 
 
 def stored_document(folder: Path) -> dict[str, Any]:
-    """Return what was run in `folder`: the campaign file with its configurations written in."""
+    """Return the document of the campaign in `folder`: the campaign file with its configurations written in."""
     path = folder / CAMPAIGN
     return parse_json(read_text(path), str(path))
 
 
 def stored_campaign(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
-    """Return the campaign of `folder`, checked anew."""
+    """Return the campaign of `folder`, checked anew.
+
+    Raises
+    ------
+    InputError
+        If it is not the one that the manifest was made of.
+    """
+    document = stored_document(folder)
+    if _hash(document) != manifest["campaign"]:
+        raise InputError(
+            "changed since the campaign began",
+            file=str(folder / CAMPAIGN),
+            expected="it as it was, or a new folder",
+        )
     places = tuple(entry["place"] for entry in manifest["controllers"])
+    if len(places) != len(document["controllers"]):
+        expected = f"{len(document['controllers'])} entries, as in {CAMPAIGN}"
+        raise InputError("other controllers", file=str(folder / NAME), field="controllers", expected=expected)
     metrics = tuple(entry["place"] for entry in manifest.get("metrics", []))
     columns = tuple(Column(**entry) for entry in manifest.get("columns", []))
-    return Campaign.from_document(
-        stored_document(folder), str(folder / CAMPAIGN), places=places, metrics=(metrics, columns)
-    )
+    return Campaign.from_document(document, str(folder / CAMPAIGN), places=places, metrics=(metrics, columns))
 
 
 def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[str, Any]:
-    """Return the manifest of `folder` if `campaign` is what it was begun with.
+    """Return the manifest of `folder`, after checking that it was begun with `campaign`.
 
     Parameters
     ----------
@@ -132,16 +152,17 @@ def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[st
         raise _changed(campaign.file, found[0], found[2], found[1])
     now = make(campaign, records or manifest["records"])
     for what in ("controllers", "metrics"):
-        for k, (before, after) in enumerate(zip(manifest.get(what, []), now.get(what, []), strict=True)):
+        there = manifest.get(what, [])
+        for k, after in enumerate(now.get(what, [])):
+            before = there[k] if k < len(there) else {"file": None}
             if before["file"] != after["file"]:
                 name = f"{what}[{k}] ({after['place']})"
                 raise _changed(campaign.file, name, after["file"] or "no file", before["file"] or "no file")
     if now["records"] != manifest["records"]:
         raise _changed("--records", None, now["records"], manifest["records"])
-    ours = "dubins-traffic"
-    if now["versions"][ours] != manifest["versions"][ours]:
+    if now["versions"][OURS] != manifest["versions"][OURS]:
         raise _changed(
-            str(folder / NAME), f"versions.{ours}", now["versions"][ours], manifest["versions"][ours]
+            str(folder / NAME), f"versions.{OURS}", now["versions"][OURS], manifest["versions"][OURS]
         )
     return manifest
 
@@ -190,7 +211,7 @@ def hash_of_file(place: str) -> str | None:
 
 def package_version() -> str:
     """Return the version of this package."""
-    return version("dubins-traffic")
+    return version(OURS)
 
 
 def _writer(data: bytes) -> Callable[[Path], object]:

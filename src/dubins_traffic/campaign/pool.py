@@ -1,4 +1,4 @@
-"""A campaign's chunks in processes of this machine."""
+"""Runs a campaign's chunks in processes on this machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dubins_traffic.campaign.engines import Numbered, Outcome, Work
 from dubins_traffic.campaign.worker import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.runs.jobs import deaf_to_interrupts
-from dubins_traffic.runs.parent_watch import end_with_parent
+from dubins_traffic.runs.parent_watch import prepare_worker
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
@@ -45,7 +45,7 @@ class Pool(Generic[Work]):
         self._under_way[future] = chunk
 
     def wait(self) -> Sequence[Outcome[Work]]:
-        """Return what has become of chunks; if a process has died, all that were under way are lost."""
+        """Return outcomes; if a process has died, all chunks that were under way are lost."""
         done, _ = wait(self._under_way, return_when=FIRST_COMPLETED)
         if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
             done, _ = wait(self._under_way)
@@ -64,7 +64,7 @@ class Pool(Generic[Work]):
         return outcomes
 
     def close(self) -> None:
-        """Interrupt what is under way, after at most one simulated second, and end the processes."""
+        """Interrupt the chunks under way, after at most one simulated second, and end the processes."""
         self._cancelled.set()
         self._pool.shutdown(cancel_futures=True)
 
@@ -75,14 +75,17 @@ class Pool(Generic[Work]):
             initializer=_begin,
             initargs=(self._around, self._cancelled),
         )
-        with deaf_to_interrupts():
-            started = [self._pool.submit(os.getpid) for _ in range(self._workers)]
         try:
+            with deaf_to_interrupts():
+                started = [self._pool.submit(os.getpid) for _ in range(self._workers)]
             wait(started)
             for future in started:
                 future.result()
         except BrokenProcessPool as error:
             raise DubinsTrafficError("worker processes end as soon as they begin") from error
+        except KeyboardInterrupt:
+            self._pool.shutdown(cancel_futures=True)  # each worker begins, and is told to end
+            raise
 
 
 _around = Surroundings(None, ())
@@ -93,7 +96,7 @@ def _begin(around: Surroundings, cancelled: Event) -> None:
     """Prepare a worker."""
     global _around, _cancelled  # a worker's only state, set once
     _around, _cancelled = around, cancelled
-    end_with_parent()
+    prepare_worker()
 
 
 def _run(chunk: Numbered) -> bytes:
@@ -101,5 +104,5 @@ def _run(chunk: Numbered) -> bytes:
         return run_part(chunk, _around, _cancelled)
     except KeyboardInterrupt:
         raise DubinsTrafficError("interrupted") from None
-    except SystemExit as error:  # handed on, it would end the campaign as if all were well
+    except SystemExit as error:  # passed on, SystemExit would end the worker as if nothing had gone wrong
         raise DubinsTrafficError(f"a worker was told to end (status {error.code})") from error

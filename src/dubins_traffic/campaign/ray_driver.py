@@ -1,6 +1,6 @@
-"""The process that drives Ray for a campaign: takes chunks from a pipe, sends their parts back.
+"""The process that runs a campaign's chunks on Ray: takes chunks from a pipe, sends their parts back.
 
-It handles chunks as bytes, and loads nothing of this package that runs trials: a cluster is joined the sooner.
+It handles chunks as bytes and imports none of the modules that run trials, so that it joins a cluster sooner.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 
 from dubins_traffic.campaign import ray_task
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.runs.parent_watch import end_with_parent
+from dubins_traffic.runs.parent_watch import prepare_worker
 
 ALIVE, DONE, FAILED = "alive", "done", "failed"
 """Kinds of messages: (alive, processors of the cluster), (done, number, part or None if lost), (failed, why)."""
@@ -43,7 +43,7 @@ def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
     around : bytes
         What workers share, pickled.
     """
-    end_with_parent()
+    prepare_worker()
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     # Ray's own words, pages of them when a node is lost, stand in its logs; ours go through the pipe.
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -58,7 +58,7 @@ def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
         beat.start()
         _Driver(ray, pipe, send, around).run()
     except (BrokenPipeError, EOFError):
-        pass  # nobody is left to tell
+        pass  # the other end of the pipe has gone
     except Exception as error:
         send(FAILED, f"{type(error).__name__}: {error}")
     finally:

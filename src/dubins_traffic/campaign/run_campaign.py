@@ -1,4 +1,4 @@
-"""A campaign is run in its folder from its beginning, or resumed from where it was cut off."""
+"""Runs a campaign in its folder, from the beginning or from where it was cut off."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.errors import InputError
 
 Progress = Callable[[int, int], object]
-"""Told (trials done, trials in all) at the beginning and whenever a chunk is done."""
+"""Called with (trials done, trials in all) at the beginning and whenever a chunk is done."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ran:
-    """What `run_campaign` leaves: the campaign, its folder, and how many trials had their rows before."""
+    """The result of `run_campaign`: the campaign, its folder, and the number of trials that had rows before."""
 
     campaign: Campaign
     folder: Path
@@ -59,7 +59,7 @@ def run_campaign(
     records : str, optional
         Which records are kept: ``none``, ``all``, ``failures`` or ``sample:N``; by default none, or as before.
     progress : callable, optional
-        Is told how far it has come.
+        Called with the numbers of trials done and of all trials.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def run_campaign(
 
 
 def run_left(own: Folder, engine: Engine[Chunk], progress: Progress | None = None) -> None:
-    """Run on `engine` what is left of the campaign in a folder, and keep each chunk there; the table is not made yet.
+    """Run the remaining chunks of a campaign on `engine`, and store each in its folder; the table is not made yet.
 
     The exceptions are those of `run_campaign`.
     """

@@ -1,4 +1,4 @@
-"""The schedule of a campaign: keeps an engine busy, runs again what was lost, finds out what kills its worker."""
+"""The schedule of a campaign: keeps an engine busy, runs lost chunks again, finds trials that kill their worker."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from dubins_traffic.campaign.engines import Engine
 from dubins_traffic.scoring.registry import columns
 
 LOSSES = 2
-"""A chunk that was lost so often with others beside it is run alone, trial by trial."""
+"""A chunk that was lost this often with others beside it is run alone, trial by trial."""
 LOSSES_ALONE = 2
-"""A trial that was lost so often alone is to blame."""
+"""A trial that was lost this often alone is given up as the cause."""
 REASON = "the process that ran it ended, each time it was run"
 
 
 def carry_out(engine: Engine[Chunk], chunks: Iterator[Chunk]) -> Iterator[tuple[Chunk, bytes]]:
     """Run `chunks` and yield each once, with its part of the table, in the order in which they are ready.
 
-    No more than the engine's capacity are under way. What is lost is run again. What is lost again and again is run
-    with nothing beside it, a trial at a time: a trial that still ends its process becomes a row that says so.
+    At most the engine's capacity is under way. A lost chunk is run again. One that is lost repeatedly is run with
+    nothing beside it, a trial at a time: a trial that still ends its process becomes a row that says so.
     """
     losses: Counter[int] = Counter()
     again: deque[Chunk] = deque()

@@ -22,7 +22,6 @@ WALL = "wall.parquet"
 GROUP = 65_536
 """Rows in a row group; constant, so that the bytes don't depend on how the work was cut."""
 FACTOR = "factor."
-IDENTITY = ("number", "cell", "configuration", "controller", "trial", "seed")
 
 
 class Kind(Enum):
@@ -93,7 +92,7 @@ def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = K
 
 
 def faulty(folder: Path) -> tuple[int, str]:
-    """Return how many trials of a finished campaign ended by somebody's fault or came to nothing, and the first."""
+    """Return how many trials of a finished campaign failed or ended by a fault, and the first of them."""
     made = rows.arrow()
     compute: Any = made.compute
     found = made.parquet.read_table(folder / RESULTS, columns=["number", "controller", "end", "reason"])
@@ -105,7 +104,7 @@ def faulty(folder: Path) -> tuple[int, str]:
 
 
 def assumption(folder: Path) -> tuple[int, int]:
-    """Return in how many judged trials of a finished campaign others broke the assumption, of how many."""
+    """Return the number of judged trials of a finished campaign in which e-agents broke the assumption, and of all."""
     found = rows.arrow().parquet.read_table(folder / RESULTS, columns=["assumption_broken"])
     known = found["assumption_broken"].drop_null().to_pylist()
     return sum(known), len(known)

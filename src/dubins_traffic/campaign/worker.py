@@ -1,4 +1,4 @@
-"""A worker of a campaign runs its chunks, in whichever process or machine it is."""
+"""Runs a campaign's chunks in a worker: a process on this or another machine."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from dubins_traffic.campaign.records import Keep, Records
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import run_together
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.record.wall import remove_record
 from dubins_traffic.runs.jobs import Job
@@ -28,24 +29,24 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.configuration import Configuration
 
 TOGETHER = 64
-"""So many trials run at a time, if they can."""
+"""Most trials that run together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What workers share: which records are kept, and where modules of controllers are looked up."""
+    """What all workers need: which records are kept, and where modules of controllers are looked up."""
 
     records: Records | None
     paths: tuple[str, ...]
 
     @staticmethod
     def here(records: Records | None = None) -> Surroundings:
-        """Return those of this process."""
+        """Return the surroundings of this process."""
         return Surroundings(records, (str(Path.cwd()), *sys.path))
 
 
 def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | None = None) -> rows.Columns:
-    """Run the trials of a chunk and return their rows, whatever becomes of each.
+    """Run the trials of a chunk and return a row for each, whether it succeeds or fails.
 
     A trial that can't be drawn, run or scored is a row with its reason. `cancelled` interrupts the chunk.
 
@@ -58,7 +59,7 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
     """
     if records is not None:
         records.check()
-    with contextlib.suppress(controllers.ConstructionError):  # that is the fault of a trial
+    with contextlib.suppress(controllers.ConstructionError):  # counts as a fault of each trial
         controllers.load(chunk.controller)
     makers = scores.makers(chunk.metrics)
     chunk = replace(chunk, configuration=_known(chunk.configuration))
@@ -81,15 +82,16 @@ def run_part(chunk: Numbered, around: Surroundings, cancelled: Event | None = No
         return chunk.run((lambda: False) if cancelled is None else cancelled.is_set)
     if not isinstance(chunk, Chunk):
         raise DubinsTrafficError(f"no work for a worker: {type(chunk).__name__}")
-    found = run_chunk(chunk, around.records, cancelled)
+    with put_back():
+        found = run_chunk(chunk, around.records, cancelled)
     return rows.encoded(found, scores.columns(chunk.metrics))
 
 
 def _is_alone(chunk: Chunk, k: int, records: Records | None) -> bool:
-    """Tell whether a trial is run by itself from the first.
+    """Tell whether a trial has to run by itself.
 
-    That is against the clock, and where a record is wanted whatever becomes of it: also of a trial that is run without
-    others because it is suspected of ending its process.
+    It does under a deadline, and if its record is kept whatever its result; also if it is run alone because it is
+    suspected of ending its process.
     """
     if chunk.deadline is not None:
         return True
@@ -108,7 +110,7 @@ def _together(
 ) -> dict[int, rows.Row]:
     """Run trials of a chunk together; return the rows of those that fit a batch.
 
-    What is wrong with the others is found out when they are run by themselves.
+    Errors of the others come up when they are run by themselves.
     """
     found: dict[int, rows.Row] = {}
     try:
@@ -117,13 +119,13 @@ def _together(
         for outcome in run_together(instances, chunk.controller, stop, metrics):
             k = outcome.instance.trial - chunk.trial
             found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
-    except (Exception, SystemExit):  # whose fault it is shows when each is run by itself
+    except (Exception, SystemExit):  # the trial at fault is found when each is run by itself
         return {}
     return found
 
 
 def _known(configuration: Configuration) -> Configuration:
-    """Return the configuration of an earlier chunk if it is the same, with what has been worked out of it."""
+    """Return the configuration of an earlier chunk if it is equal, since it holds cached results."""
     if not _last or _last[0] != configuration:
         _last[:] = [configuration]
     return _last[0]
@@ -152,7 +154,7 @@ def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Event | None)
         found = rows.row(number, result.ending, result.score, result.wall.act_s)
     except DubinsTrafficError as error:
         found = rows.failure(number, rows.FAILED, str(error), scores.columns(chunk.metrics))
-    except (Exception, SystemExit) as error:  # one bad trial is a row, never the end of the campaign
+    except (Exception, SystemExit) as error:  # one failed trial becomes a row and never ends the campaign
         told = f"{type(error).__name__}: {error}"
         found = rows.failure(number, rows.FAILED, told, scores.columns(chunk.metrics))
     if records is not None and record is not None and not records.keeps(found):

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.errors import InputError
 
 KOBUKI_RADIUS = 0.177
 DUBINS = "dubins"
-"""The car model that is built in: what is asked for holds at once and for the whole tick."""
+"""The default car model: a command holds at once and for the whole tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +97,11 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Car:
-    """A car; all cars of a trial are alike.
+    """What the cars of a trial are; all of them are alike.
 
     `w` is the nominal width in metres that sets the roads: lanes are 2w wide, roads 4w (paper, II.A). The body
-    that collides is `body`. `model` says how it moves (`cars.dynamics`): the name of a model or where its class is;
-    `parameters` are those given to it.
+    that collides is `body`. `model` is the name of the car model (`cars.dynamics`) or ``module:Class`` of a user's;
+    `parameters` are the values given to it.
     """
 
     w: float = 0.3
@@ -111,6 +112,7 @@ class Car:
 
     def __post_init__(self) -> None:
         _positive("w", self.w)
+        object.__setattr__(self, "parameters", read_only(self.parameters))
 
     @property
     def lane_width(self) -> float:

@@ -1,8 +1,8 @@
-"""How cars move: the seam for models other than the Dubins car, and their registry.
+"""Car models: the seam for cars that move otherwise than the Dubins car, and the registry of models.
 
-The Dubins car is moved by the kernels of `cars.motion`. Another model is a class of Python that says, for each tick,
-which arcs a car drives; the embedded simulator moves the car along them and finds all contacts on the way
-(`simulators.modelled`). A new one is a file and a line in `BUILT_IN`, or a class outside the package
+The kernels of `cars.motion` move the Dubins car. Another model is a Python class that returns, for each tick, the arcs
+that a car drives; the embedded simulator moves the car along them and finds all contacts on the way
+(`simulators.modelled`). A new model is a file and a line in `BUILT_IN`, or a class outside the package
 (docs/extending/car-model.md).
 """
 
@@ -17,12 +17,15 @@ from dubins_traffic.cars.body import DUBINS, Car
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import Seam
 
-BUILT_IN: Mapping[str, str] = {DUBINS: "dubins_traffic.cars.dynamics:Dubins"}
+BUILT_IN: Mapping[str, str] = {
+    DUBINS: "dubins_traffic.cars.dynamics:Dubins",
+    "bicycle": "dubins_traffic.cars.bicycle:Bicycle",
+}
 """The models of this package by name, ``module:Class``."""
 GROUP: Final = "dubins_traffic.car_models"
-"""Entry points of other packages."""
+"""Group of the entry points by which other packages offer models."""
 MOST_ARCS: Final = 256
-"""Most arcs of one car in a tick."""
+"""Most arcs that a model may return for one tick."""
 _SEAM = Seam(
     "car.model",
     "car model",
@@ -32,54 +35,54 @@ _SEAM = Seam(
 )
 
 Arc: TypeAlias = tuple[float, float, float]
-"""Speed, m/s, and yaw rate, rad/s, and for how many seconds they hold."""
+"""Speed (m/s), yaw rate (rad/s), and how long both hold (s)."""
 
 
 class MotionModel(Protocol):
-    """How one car answers its commands; a class without arguments, of which one object moves one car of one trial.
+    """How one car answers its commands. The constructor takes no arguments; one object moves one car of one trial.
 
-    It must do the same again for the same commands. A class attribute `parameters`, a mapping of defaults, says which
-    parameters it takes. A fork of a trial goes on with a deep copy.
+    Its answers must depend on nothing but its parameters and the commands since `begin`. A class attribute
+    `parameters`, a mapping of defaults, names the parameters it takes. A fork of a trial goes on with a deep copy.
     """
 
     def begin(self, car: Car, period: float, parameters: Mapping[str, Any]) -> None:
-        """A trial begins, in which the car stands; `period` is the length of a tick, s."""
+        """Begin a trial, in which the car stands at first; `period` is the length of a tick, s."""
         ...
 
     def clip(self, speed: float, yaw_rate: float) -> tuple[float, float]:
-        """Return the command that is taken for the coming tick, m/s and rad/s: what stands in records.
+        """Return the command that takes effect in the coming tick, (m/s, rad/s); it is what records hold.
 
-        What it returns it must take as it is when that is asked for in its place, so that records can be run again.
-        The car's bounds are kept by the simulator.
+        A command that `clip` has returned must be returned unchanged when it is given instead, so that records can be
+        run again. The simulator clips to the car's bounds as well.
         """
         ...
 
     def advance(self, speed: float, yaw_rate: float) -> Sequence[Arc]:
-        """Return the arcs that the car drives in the coming tick with the command taken; together they last the tick.
+        """Return the arcs that the car drives in the coming tick, given the clipped command; together they last a tick.
 
-        They, too, are clipped to the car's bounds.
+        The simulator clips the arcs to the car's bounds.
         """
         ...
 
 
 @runtime_checkable
 class Stops(Protocol):
-    """A car model that wants to know when a contact has fixed its car."""
+    """A car model that is told when a contact has fixed its car."""
 
     def stop(self) -> None:
-        """A contact has fixed the car in the tick that has just ended: it stands."""
+        """Take note that a contact in the tick just ended has fixed the car: it stands."""
         ...
 
 
 class Dubins:
-    """The Dubins car: what is asked for holds at once and for the whole tick."""
+    """The Dubins car: a command holds at once and for the whole tick."""
 
     def begin(self, car: Car, period: float, parameters: Mapping[str, Any]) -> None:  # noqa: ARG002
-        """Take the length of a tick."""
+        """Keep the length of a tick."""
         self._period = period
 
     def clip(self, speed: float, yaw_rate: float) -> tuple[float, float]:
-        """Return the command; the bounds are kept by the simulator."""
+        """Return the command unchanged; the simulator clips it to the car's bounds."""
         return speed, yaw_rate
 
     def advance(self, speed: float, yaw_rate: float) -> Sequence[Arc]:
@@ -94,7 +97,7 @@ def names() -> Mapping[str, str]:
 
 
 def check_name(spec: str) -> None:
-    """Refuse what neither is the name of a model nor says where a class is; nothing is loaded.
+    """Refuse a text that is neither the name of a model nor of the form ``module:Class``; nothing is imported.
 
     Raises
     ------
@@ -109,7 +112,7 @@ def check_name(spec: str) -> None:
 
 
 def begun(car: Car, period: float) -> MotionModel:
-    """Return the model of a car at the beginning of a trial.
+    """Return a new object of a car's model, begun.
 
     Raises
     ------
@@ -123,6 +126,8 @@ def begun(car: Car, period: float) -> MotionModel:
     parameters = outside.parameters_of(model, car.parameters, "car.parameters")
     try:
         model.begin(car, period, parameters)
+    except InputError:
+        raise
     except Exception as error:
         problem = f"{type(model).__name__} raised {outside.plainly(error)} in begin"
         raise _SEAM.refuse(problem, spec, "a car model that can begin") from error
@@ -130,7 +135,7 @@ def begun(car: Car, period: float) -> MotionModel:
 
 
 def require_dubins(car: Car, who: str) -> None:
-    """Refuse another car for `who`, what is known to be right for the Dubins car alone.
+    """Refuse a car of another model on behalf of `who`, the part of the package that supports the Dubins car only.
 
     Raises
     ------
@@ -149,5 +154,5 @@ def _others() -> Mapping[str, Callable[[], Any]]:
 
 
 def forget() -> None:
-    """Look for the models of other packages anew when next they are asked for."""
+    """Forget the models of other packages, so that the next call looks for them again."""
     _others.cache_clear()

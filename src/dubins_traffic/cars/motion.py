@@ -8,8 +8,16 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from dubins_traffic.cars.near import FEW, candidates
-from dubins_traffic.cars.partners import PARTNERS, VACANT, Meeting, Workspace, part
-from dubins_traffic.cars.rows import TOGETHER, Rows, any_near, clip, look, move, move_fours
+from dubins_traffic.cars.partners import PARTNERS, VACANT, Meeting, Workspace, forget_parted
+from dubins_traffic.cars.rows import (
+    TOGETHER,
+    MotionConstants,
+    any_near,
+    clip,
+    find_close,
+    move,
+    move_together,
+)
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -23,41 +31,45 @@ from dubins_traffic.kernels.boxes import (
     held,
     separation,
 )
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
 
 class _Outcome(NamedTuple):
-    """What became of a trial in a tick."""
+    """What `step_trial` and `step_part` return."""
 
     MOVED: int = 0
-    """It has moved."""
+    """The trial has moved."""
     FULL: int = 1
-    """There is no room for its contacts."""
+    """The buffer of contacts is too small; the trial has not moved."""
     CROWDED: int = 2
-    """There is none for its pairs."""
+    """The buffer of pairs is too small; the trial has not moved."""
 
 
 OUTCOME: Final = _Outcome()
 
 
 class Motion(Tables):
-    """All that moving takes; while a tick is moved, `State.speed` and `State.yaw_rate` are the clipped commands."""
+    """All tables that moving cars takes.
+
+    During a tick `State.speed` and `State.yaw_rate` hold the clipped commands.
+    """
 
     state: State
     obstacles: ObstacleTable
     cars: CarTable
-    rows: Rows
+    rows: MotionConstants
     work: Workspace
 
 
 @jit
 def step(first: int, dt: float, commands: Floats, motion: Motion) -> int:
-    """Clip the commands in place and move trials `first` (index)... for one tick.
+    """Clip the commands in place and move the trials from `first` (index) on for one tick.
 
-    Returns the number of trials B when all have moved, or the trial before which it stopped because the buffer of
-    contacts is full, or -1 - b if the buffer of pairs is too small for trial b: empty or enlarge it and go on.
+    Returns B, the number of trials, when all have moved. Otherwise it has stopped before a trial b: it returns b if the
+    buffer of contacts is full (the caller empties it), or -1 - b if the buffer of pairs is too small (the caller
+    enlarges it). The caller then calls it again from trial b on.
     """
     state, obstacles, r, work = motion.state, motion.obstacles, motion.rows, motion.work
     work.found[0] = 0
@@ -70,36 +82,34 @@ def step(first: int, dt: float, commands: Floats, motion: Motion) -> int:
         last = b + r.alike[b]
         clip(r, b, asked, speed, yaw, b * n, last * n)
         if n <= FEW:
-            look(r, b, x, y, n, b * n, last * n)
+            find_close(r, b, x, y, n, b * n, last * n)
         begin = b
         for k in range(b, last):
             empty = obstacles.off[k] == obstacles.off[k + 1]
             if n <= FEW and empty and not _any_close(r, k - b, n):
                 continue
             if work.found[0] + n > work.contact.shape[0]:
-                _pass_on(begin, k, dt, motion)
+                _move_freely(begin, k, dt, motion)
                 return k
             pairs = candidates(k, 2.0 * r.far[k], r.far[k], state, obstacles, work.search)
             if pairs > work.search.pair.shape[0]:
-                _pass_on(begin, k, dt, motion)
+                _move_freely(begin, k, dt, motion)
                 return -1 - k
             if pairs > 0:
-                _pass_on(begin, k, dt, motion)
+                _move_freely(begin, k, dt, motion)
                 _resolve(k, pairs, dt, motion)
-                part(state, motion.cars, obstacles, work, k)
+                forget_parted(state, motion.cars, obstacles, work, k)
                 begin = k + 1
-        _pass_on(begin, last, dt, motion)
+        _move_freely(begin, last, dt, motion)
         b = last
     return trials
 
 
 @jit
 def step_trial(b: int, dt: float, least: float, commands: Floats, motion: Motion) -> int:
-    """Clip the commands of trial b in place and move it for one tick; add its contacts to those found.
+    """Clip the commands of trial b in place and move its cars for one tick; append their contacts to those found.
 
-    No two cars are nearer to each other than `least` (m), or nothing is known of that (0).
-    Returns what became of it, an `OUTCOME`. If the buffer of contacts or that of pairs is too small, nothing
-    has moved.
+    `least` (m) is a lower bound on the distance between any two centres, 0 if none is known. Returns an `OUTCOME`.
     """
     state, work = motion.state, motion.work
     if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
@@ -110,10 +120,11 @@ def step_trial(b: int, dt: float, least: float, commands: Floats, motion: Motion
 
 @jit
 def step_part(dt: float, arcs: Floats, stands: Ints, motion: Motion) -> int:
-    """Move trial 0 on arcs for a part of a tick, `dt` (s) long; add its contacts to those found.
+    """Move the cars of trial 0 on arcs for a part of a tick, `dt` (s) long; append their contacts to those found.
 
-    `arcs` (1, N, 2), speed (m/s) and yaw rate (rad/s), are clipped in place; cars of which `stands` (N,) is not 0 have
-    been fixed by a contact before, and stand. `Workspace.until` tells of the cars that one fixes now.
+    `arcs` (1, N, 2), speed (m/s) and yaw rate (rad/s), are clipped in place. A car whose `stands` (N,) is not 0 has
+    been fixed by an earlier contact and stands. Afterwards `Workspace.until` tells when each car was fixed. Returns an
+    `OUTCOME`.
     """
     state, work = motion.state, motion.work
     if work.found[0] + state.x.shape[1] > work.contact.shape[0]:
@@ -129,7 +140,7 @@ def step_part(dt: float, arcs: Floats, stands: Ints, motion: Motion) -> int:
 
 @jit_inline
 def _move_trial(b: int, dt: float, least: float, motion: Motion) -> int:
-    """Move trial b, whose commands are clipped, as `step_trial` does."""
+    """Move the cars of trial b, whose commands are clipped; return an `OUTCOME`."""
     state, obstacles, r, work = motion.state, motion.obstacles, motion.rows, motion.work
     n = state.x.shape[1]
     cars_here = state.count[b]
@@ -143,21 +154,21 @@ def _move_trial(b: int, dt: float, least: float, motion: Motion) -> int:
             return OUTCOME.CROWDED
     if pairs > 0:
         _resolve(b, pairs, dt, motion)
-        part(state, motion.cars, obstacles, work, b)
+        forget_parted(state, motion.cars, obstacles, work, b)
         return OUTCOME.MOVED
     x, y, c, s, speed, yaw = state.x[b], state.y[b], state.c[b], state.s[b], state.speed[b], state.yaw_rate[b]
     if n % TOGETHER == 0:
-        move_fours(x, y, c, s, speed, yaw, dt)
+        move_together(x, y, c, s, speed, yaw, dt)
     else:
         k = cars_here
         move(x[:k], y[:k], c[:k], s[:k], speed[:k], yaw[:k], dt)
     if work.touching[b] > 0:
-        part(state, motion.cars, obstacles, work, b)
+        forget_parted(state, motion.cars, obstacles, work, b)
     return OUTCOME.MOVED
 
 
 @jit
-def _any_close(r: Rows, trial: int, n: int) -> bool:
+def _any_close(r: MotionConstants, trial: int, n: int) -> bool:
     close = 0
     for f in range(trial * n, trial * n + n):
         close += r.close[f]
@@ -165,8 +176,8 @@ def _any_close(r: Rows, trial: int, n: int) -> bool:
 
 
 @jit
-def _pass_on(first: int, last: int, dt: float, motion: Motion) -> None:
-    """Move the trials first..last - 1, in which nothing can meet."""
+def _move_freely(first: int, last: int, dt: float, motion: Motion) -> None:
+    """Move the trials `first` to `last` - 1, in which no two bodies can meet."""
     state, work = motion.state, motion.work
     trials, n = state.x.shape
     total = trials * n
@@ -177,7 +188,7 @@ def _pass_on(first: int, last: int, dt: float, motion: Motion) -> None:
     )  # fmt: skip
     for b in range(first, last):
         if work.touching[b] > 0:
-            part(state, motion.cars, motion.obstacles, work, b)
+            forget_parted(state, motion.cars, motion.obstacles, work, b)
 
 
 @jit_inline
@@ -187,7 +198,7 @@ def _drive(b: int, n: int, until: float, state: State) -> Drive:
 
 @jit
 def _meet(b: int, i: int, j: int, begin: float, dt: float, motion: Motion) -> float:
-    """Return when car i meets j, a car or obstacle part -1 - p, after `begin`; NEVER if not in this tick."""
+    """Return when, after `begin`, car i meets j, a car or obstacle part -1 - p, s; NEVER if not in this tick."""
     state, cars, until = motion.state, motion.cars, motion.work.until
     one, drive = box_at(b, i, state, cars), _drive(b, i, until[i], state)
     if j < 0:
@@ -200,9 +211,13 @@ def _meet(b: int, i: int, j: int, begin: float, dt: float, motion: Motion) -> fl
     return box_contact(one, drive, other, its, begin, dt)
 
 
-@jit
+@jit_rare
 def _resolve(b: int, pairs: int, dt: float, motion: Motion) -> None:
-    """Move trial b with its candidate pairs: fix both cars at the earliest contact, search on, then move all."""
+    """Move trial b, of which `pairs` pairs may meet.
+
+    Contacts are taken in order of time. Each fixes its cars, for which later contacts are then computed anew. When
+    there is none left, all cars move, each until it is fixed.
+    """
     state, work = motion.state, motion.work
     until, when, pair = work.until, work.when, work.search.pair
     for n in range(state.count[b]):
@@ -219,7 +234,7 @@ def _resolve(b: int, pairs: int, dt: float, motion: Motion) -> None:
         now = when[first]
         i = pair[first].one
         j = pair[first].other
-        _note(b, i, j, now, motion)
+        _note_contact(b, i, j, now, motion)
         until[i] = min(until[i], now)
         if j >= 0:
             until[j] = min(until[j], now)
@@ -259,14 +274,14 @@ def _before(work: Workspace, k: int, m: int) -> bool:
 
 @jit_inline
 def _moved(box: Box, drive: Drive) -> int:
-    """Return 1 if a body moves or, being a rectangle, turns, else 0."""
+    """Return 1 if a body moves, or is a rectangle that turns; else 0."""
     turned = drive.yaw_rate != 0.0 and box.half_length > 0.0
     return 1 if drive.speed != 0.0 or turned else 0
 
 
 @jit
-def _enter(b: int, i: int, other: int, work: Workspace) -> bool:
-    """Let car i touch `other`, a car or obstacle -1 - k; tell whether it did not before."""
+def _begin_touching(b: int, i: int, other: int, work: Workspace) -> bool:
+    """Note that car i touches `other`, a car or obstacle -1 - k; tell whether the contact is a new one."""
     free = -1
     for k in range(PARTNERS):
         if work.partner[b, i, k] == other:
@@ -280,11 +295,11 @@ def _enter(b: int, i: int, other: int, work: Workspace) -> bool:
 
 
 @jit
-def _note(b: int, i: int, j: int, now: float, motion: Motion) -> None:
-    """Write down the contact of car i with j (a car, or obstacle part -1 - p), unless they touched already."""
+def _note_contact(b: int, i: int, j: int, now: float, motion: Motion) -> None:
+    """Append the contact of car i with j (a car, or obstacle part -1 - p) at `now`, unless they touched already."""
     state, cars, work = motion.state, motion.cars, motion.work
     other = j if j >= 0 else -1 - motion.obstacles.parts[-1 - j].owner
-    if not _enter(b, i, other, work):
+    if not _begin_touching(b, i, other, work):
         return
     drive = _drive(b, i, work.until[i], state)
     own = driven(box_at(b, i, state, cars), drive, now)
@@ -314,7 +329,7 @@ def _note(b: int, i: int, j: int, now: float, motion: Motion) -> None:
 
 @jit
 def _closing(box: Box, drive: Drive, now: float, row: Meeting) -> float:
-    """Return the speed of a body's point of contact along the normal, m/s."""
+    """Return the speed along the normal of the point of a body that touches, m/s."""
     speed, yaw, _ = held(drive, now)
     turn = yaw if box.half_length > 0.0 else 0.0
     return row.nx * (speed * box.c - turn * (row.py - box.y)) + row.ny * (

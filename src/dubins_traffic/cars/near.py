@@ -9,23 +9,23 @@ import numpy as np
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
 from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 
 FEW = 24
-"""Up to this many cars all pairs are looked at, which is faster."""
+"""Up to this many cars all pairs are compared, which is faster than cells."""
 CELL = 4.0
-"""Side of the cells in which the nearest of more cars is looked for, metres; beyond that it does not matter."""
-EVERY = 8
-"""Ticks after which it is looked anew how far cars are apart."""
-LONG = 1e6
-"""Ticks beyond which it does not matter how many they are."""
+"""Side of the cells in which neighbours are looked for among more cars, metres; larger distances count as this."""
+REFRESH_TICKS = 8
+"""Ticks after which the distances between cars are measured anew."""
+MOST_TICKS = 1e6
+"""Largest number of ticks that `ticks_within` returns."""
 
 
 @record
 class Pair:
-    """Two that may meet: car `one`, and `other`, a car or part -1 - p of an obstacle."""
+    """Two bodies that may meet: car `one`, and `other`, a car or obstacle part -1 - p."""
 
     one: int
     other: int
@@ -33,16 +33,17 @@ class Pair:
 
 @record
 class Place:
-    """The cell (`kx`, `ky`) in which a car is."""
+    """The cell (`kx`, `ky`) that holds a car's centre."""
 
     kx: int
     ky: int
 
 
 class Search(Tables):
-    """Room in which pairs are looked for.
+    """Scratch of the search for pairs.
 
-    `pair` (P,). `head` (H,), H a power of two, `link` (N,) and `cell` (N,): the cars in buckets of cells.
+    `pair` (P,): the pairs found. The cars stand in a hash table of cells with H buckets, a power of two: `head` (H,) is
+    the first car of each bucket, `link` (N,) the next car in the bucket of each, -1 for none, `cell` (N,) its cell.
     """
 
     pair: Rows[Pair]
@@ -51,8 +52,8 @@ class Search(Tables):
     cell: Rows[Place]
 
 
-def search_room(cars: int, pairs: int) -> Search:
-    """Return room in which `pairs` pairs of `cars` cars can be found."""
+def search_tables(cars: int, pairs: int) -> Search:
+    """Return the scratch of a search among `cars` cars, with room for `pairs` pairs."""
     buckets = 64
     while buckets < 2 * cars:
         buckets *= 2
@@ -64,18 +65,18 @@ def search_room(cars: int, pairs: int) -> Search:
     )
 
 
-def widened(search: Search) -> Search:
-    """Return room for four times as many pairs."""
+def widened_search(search: Search) -> Search:
+    """Return scratch with room for four times as many pairs."""
     return search.replace(pair=table(Pair, 4 * len(search.pair)))
 
 
 class Spacing(Tables):
-    """How far apart the cars of a batch are, as of frame `since` (B,) of each trial.
+    """How far apart the cars of a batch were in frame `since` (B,) of each trial.
 
-    `apart` (B, N): distance from each car's centre to the nearest other one's, metres, or less; `least` (B,): the least
-    of these; `drift` (B,): metres
-    that a car can move in a tick. `head` (B, H), `link` (B, N) and `cell` (B, N): the cars in buckets of cells, with
-    H = 0 where there are few or nothing is known; `near` (N,): scratch.
+    `apart` (B, N): lower bound on the distance from each car's centre to any other's, metres; `least` (B,): the least
+    of these; `drift` (B,): metres that a car can move in a tick, 0 if unknown. `head` (B, H), `link` (B, N) and `cell`
+    (B, N): the cars in a hash table of cells as in `Search`, with H = 0 for up to `FEW` cars or unknown motion; `near`
+    (N,): scratch, the cars that `list_near` finds.
     """
 
     apart: Floats
@@ -89,14 +90,14 @@ class Spacing(Tables):
 
 
 def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
-    """Return the spacing of `trials` x `cars`, which move up to `drift` (B,) a tick, before their first frame."""
+    """Return the spacing of `trials` x `cars`, which move up to `drift` (B,) metres a tick, before the first frame."""
     buckets = 0
     if cars > FEW:
         buckets = 1 << (2 * cars - 1).bit_length()
     return Spacing(
         np.zeros((trials, cars)),
         np.zeros(trials),
-        np.full(trials, -EVERY, dtype=np.int64),
+        np.full(trials, -REFRESH_TICKS, dtype=np.int64),
         drift,
         np.zeros((trials, buckets), dtype=np.int64),
         np.zeros((trials, cars), dtype=np.int64),
@@ -105,36 +106,42 @@ def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
     )
 
 
-def unknown(trials: int, cars: int) -> Spacing:
-    """Return the spacing of cars of which nobody knows how they move."""
+def unknown_spacing(trials: int, cars: int) -> Spacing:
+    """Return the spacing of cars whose motion is unknown: any two may be close."""
     own = spacing(trials, cars, np.zeros(trials))
     return own.replace(head=np.zeros((trials, 0), dtype=np.int64))
 
 
 @jit_inline
-def lost(own: Spacing, b: int, tick: int) -> float:
-    """Return how much nearer two cars of trial b may be in frame `tick` than `apart` says, metres."""
+def spacing_loss(own: Spacing, b: int, tick: int) -> float:
+    """Return by how much two cars of trial b may have closed in since `apart` was measured, up to `tick`, metres."""
     return 2.0 * (tick - own.since[b]) * own.drift[b]
 
 
 @jit_inline
 def ticks_within(distance: float, own: Spacing, b: int) -> int:
-    """Return for how many ticks, at least 1, no car of trial b drives `distance` (m); 1 if nothing is known."""
+    """Return how many ticks, at least 1, any car of trial b needs to drive `distance` (m); 1 if that is unknown."""
     if distance <= own.drift[b] or own.drift[b] <= 0.0:
         return 1
-    return int(min(distance / own.drift[b], LONG))
+    return int(min(distance / own.drift[b], MOST_TICKS))
 
 
 @jit_inline
-def keep_apart(state: State, b: int, tick: int, own: Spacing) -> None:
-    """Find how far apart the cars of trial b are in frame `tick`, if that has not been done for a while."""
-    if tick - own.since[b] >= EVERY:
-        _look_round(state, b, tick, own)
+def refresh_spacing(state: State, b: int, tick: int, own: Spacing) -> None:
+    """Measure how far apart the cars of trial b are in frame `tick`, if that was `REFRESH_TICKS` ago or more."""
+    if not _is_known(b, tick, own):
+        _measure_spacing(state, b, tick, own)
+
+
+@jit_look
+def _is_known(b: int, tick: int, own: Spacing) -> bool:
+    """Tell whether the spacing of trial b was measured less than `REFRESH_TICKS` ago."""
+    return tick - own.since[b] < REFRESH_TICKS
 
 
 @jit_inline
 def _distance2(state: State, b: int, i: int, j: int) -> float:
-    """Return the squared distance between the centres of two cars."""
+    """Return the squared distance between the centres of two cars, square metres."""
     dx = state.x[b, j] - state.x[b, i]
     dy = state.y[b, j] - state.y[b, i]
     return dx * dx + dy * dy
@@ -164,7 +171,7 @@ def _enter_cell(n: int, kx: int, ky: int, head: Ints, link: Ints, cell: Rows[Pla
 
 
 @jit
-def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
+def _measure_spacing(state: State, b: int, tick: int, own: Spacing) -> None:
     n = state.count[b]
     apart = own.apart[b]
     own.since[b] = tick
@@ -185,9 +192,9 @@ def _look_round(state: State, b: int, tick: int, own: Spacing) -> None:
     own.least[b] = least
 
 
-@jit
+@jit_rare
 def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Ints, cell: Rows[Place]) -> None:
-    """Lower `apart` (N,) to the squared distances to the nearest cars, where they are less; fill the buckets."""
+    """Lower `apart` (N,) to the squared distance to the nearest car in the neighbouring cells; fill the hash table."""
     size = head.shape[0]
     for k in range(size):
         head[k] = -1
@@ -207,7 +214,7 @@ def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Int
 
 @jit
 def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, own: Spacing) -> int:
-    """Write all cars of trial b that may be within `far` (m) of a point into `own.near`; return how many."""
+    """List in `own.near` all cars of trial b that may be within `far` (m) of a point; return how many are listed."""
     size = own.head.shape[1]
     count = 0
     if size == 0 or far + (tick - own.since[b]) * own.drift[b] > CELL:
@@ -226,15 +233,15 @@ def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, o
     return count
 
 
-@jit
+@jit_rare
 def candidates(
     b: int, distance: float, margin: float, state: State, obstacles: ObstacleTable, search: Search
 ) -> int:
-    """Write the pairs of trial b that may meet into `Search.pair` and return how many there are.
+    """List the pairs of trial b that may meet in `Search.pair` and return how many there are.
 
-    Cars i < j whose centres are nearer than `distance` (m), and (i, -1 - p) for obstacle part p whose reach plus
-    `margin` (m) holds the centre of i. If there are more than there is room for, the surplus is counted but not
-    written.
+    They are cars i < j whose centres are nearer than `distance` (m), and (i, -1 - p) for each obstacle part p of which
+    the centre of i is nearer than its reach plus `margin` (m). Pairs beyond the length of `Search.pair` are counted but
+    not written.
     """
     if state.count[b] <= FEW:
         found = _all_pairs(state, b, distance, search.pair)

@@ -1,30 +1,33 @@
-"""Who touches whom, and the room in which `cars.motion` works."""
+"""Which bodies touch each other, and the workspace of `cars.motion`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.near import Search, search_room, widened
+from dubins_traffic.cars.near import Search, search_tables, widened_search
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, separation
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 
 PARTED = 0.01
 """Two bodies that touched count as touching until they are this far apart, metres."""
 PARTNERS = 12
+"""Most bodies that `Workspace.partner` can hold for a car."""
 VACANT = -(2**62)
+"""In `Workspace.partner`: no body."""
 
 
 @record
 class Meeting:
-    """A contact: of trial `b`, a car and another or obstacle -1 - k, `time` seconds after the tick's beginning.
+    """A contact in trial `b`: of `car` with `other`, a car or obstacle -1 - k, `time` seconds into the tick.
 
-    Its point (`px`, `py`), m, and normal (`nx`, `ny`), a unit vector from `car` to `other`; the speeds at which the two
-    bodies close there, m/s; and whether each had moved in the tick, 0 or 1.
+    (`px`, `py`) is its point, m, and (`nx`, `ny`) its normal, a unit vector from `car` to `other`. `closing` and
+    `other_closing` are the speeds of the two bodies' points there toward each other, m/s; `moved` and `other_moved`
+    tell whether each body moved in the tick, 0 or 1.
     """
 
     b: int
@@ -44,10 +47,10 @@ class Meeting:
 class Workspace(Tables):
     """What `step` needs beside the state, allocated once.
 
-    `partner` (B, N, PARTNERS): whom a car touches since their contact, VACANT where nobody; held by the lower
-    index, obstacle k as -1 - k. `touching` (B,): number of such pairs. `search`: candidate pairs of one trial (P,);
-    `when` (P,): their instants of contact. `until` (N,): when each car was fixed. `contact` (C,). `found` (1,): number
-    of contacts.
+    `partner` (B, N, PARTNERS): the bodies that a car has touched and is still close to, in the row of the car with the
+    lower index, obstacle k as -1 - k, VACANT for none. `touching` (B,): number of such pairs. `search`: candidate pairs
+    of one trial (P,); `when` (P,): their instants of contact, s. `until` (N,): when each car was fixed, s. `contact`
+    (C,): the contacts, of which `found` (1,) are filled.
     """
 
     partner: Ints
@@ -64,12 +67,12 @@ class Workspace(Tables):
 
 
 def workspace(trials: int, cars: int) -> Workspace:
-    """Return a workspace for a batch of `trials` x `cars`."""
+    """Return the workspace of a batch of `trials` x `cars`."""
     pairs = max(64, 8 * cars)
     return Workspace(
         partner=np.full((trials, cars, PARTNERS), VACANT, dtype=np.int64),
         touching=np.zeros(trials, dtype=np.int64),
-        search=search_room(cars, pairs),
+        search=search_tables(cars, pairs),
         when=np.zeros(pairs),
         until=np.zeros(cars),
         contact=table(Meeting, max(1024, 2 * cars)),
@@ -77,9 +80,9 @@ def workspace(trials: int, cars: int) -> Workspace:
     )
 
 
-@jit
-def part(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
-    """Forget the pairs of trial b that are PARTED or more apart."""
+@jit_rare
+def forget_parted(state: State, cars: CarTable, obstacles: ObstacleTable, work: Workspace, b: int) -> None:
+    """Forget the touching pairs of trial b whose bodies are PARTED or more apart by now."""
     for i in range(state.count[b]):
         for k in range(PARTNERS):
             other = work.partner[b, i, k]
@@ -108,5 +111,5 @@ def _gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int,
 
 def enlarged(work: Workspace) -> Workspace:
     """Return the workspace with more room for pairs."""
-    search = widened(work.search)
+    search = widened_search(work.search)
     return work.replace(search=search, when=np.zeros(len(search.pair)))

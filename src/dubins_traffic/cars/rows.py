@@ -1,8 +1,8 @@
-"""The common case of a tick, in loops without branches over the cars of several trials at once.
+"""Clip and move cars that can't meet, in loops without branches over the cars of several trials at once.
 
-Arrays are rows over all cars of a batch, trial after trial (a view of the (B, N) arrays), so that the compiler
-can work on many cars with one instruction. Nothing here knows contacts: `cars.motion` calls `move` for the trials
-in which no two bodies can meet during the tick, which is nearly all of them.
+Arrays are flat over all cars of a batch, trial after trial (views of the (B, N) arrays), so that one instruction of the
+processor works on many cars. Contacts are left to `cars.motion`, which calls `move` for the trials in which no two
+bodies can meet during the tick: nearly all of them.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import advance
 
 RUN = 32
-"""Trials that are looked at together: their rows fit the processor's nearest memory."""
-TOGETHER = 4
-"""Cars of one trial that are moved at once, if it has a multiple of as many places."""
+"""Most trials that are clipped and compared together: their arrays fit the processor's nearest memory."""
+TOGETHER = 8
+"""Cars of one trial that `move_together` moves at once, if the trial has a multiple of as many places."""
 
 
-class Rows(Tables):
-    """Constants of a batch, one value per trial (B,), except `alike`, `mask` and `close`.
+class MotionConstants(Tables):
+    """Constants of a batch from its cars' bounds, one value per trial (B,), except `mask` and `close`.
 
-    `low`, `high`: bounds on the speed; `most`, `slack`, `curvature`: |yaw| <= min(most, slack + curvature |speed|);
-    `far`: how far from its centre a car may reach in one tick; `near`: square of the distance of the centres within
-    which two cars may then meet. `alike` (B,): how many trials
-    from this one on have the same constants, at most RUN; `mask` (N, RUN * N): 1 where the car o places on is of
-    the same trial, else 0; `close` (RUN * N,): scratch; both without columns where there are more than FEW cars.
+    `low`, `high`: bounds on the speed, m/s. `most` (rad/s), `slack` (rad/s), `curvature` (1/m): the yaw rate w at the
+    speed v is bounded by |w| <= min(most, slack + curvature |v|). `far`: how far from its centre at the beginning of a
+    tick a car's body may reach in that tick, m. `near`: squared distance of the centres within which two cars may meet
+    in a tick, m2. `alike`: how many trials from this one on have the same constants, at most RUN. `mask` (N, RUN * N):
+    1 where the car o places on is of the same trial, else 0. `close` (RUN * N,): scratch of `find_close`. `mask` and
+    `close` have no columns if there are more than FEW cars.
     """
 
     low: Floats
@@ -46,7 +47,7 @@ class Rows(Tables):
     close: Ints
 
 
-def rows(cars: CarTable, n: int, dt: float) -> Rows:
+def rows(cars: CarTable, n: int, dt: float) -> MotionConstants:
     """Return the constants of a batch with `n` places for cars per trial and ticks of `dt` seconds."""
     free = cars.turning_radius == 0.0
     fastest = np.maximum(np.abs(cars.speed_low), np.abs(cars.speed_high))
@@ -57,12 +58,12 @@ def rows(cars: CarTable, n: int, dt: float) -> Rows:
     constants = (cars.speed_low, cars.speed_high, cars.yaw_rate, slack, curvature, far, near)
     mask = _mask(n)
     close = np.zeros(mask.shape[1], dtype=np.int64)
-    return Rows(*constants, alike=_alike(np.stack(constants)), mask=mask, close=close)
+    return MotionConstants(*constants, alike=_alike(np.stack(constants)), mask=mask, close=close)
 
 
 @lru_cache(maxsize=FEW)
 def _mask(n: int) -> Floats:
-    """Return `Rows.mask`, which is only read, for `n` places; batches share it."""
+    """Return `MotionConstants.mask`, which is only read, for `n` places; batches share it."""
     place = np.arange(RUN * n if n <= FEW else 0) % n
     return np.array([place + shift < n for shift in range(n)], dtype=np.float64)
 
@@ -75,10 +76,12 @@ def _alike(columns: Floats) -> Ints:
 
 
 @jit
-def clip(r: Rows, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int) -> None:
-    """Clip the commands (B * N, 2) of the cars `first` (index) to before `last` (index), all like those of trial b.
+def clip(
+    r: MotionConstants, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int
+) -> None:
+    """Clip `commands` (B * N, 2) of the cars `first` (index) to `last` (index) - 1, whose bounds are those of trial b.
 
-    In place; the speed is clipped first. Both also go to `speed` (B * N,), m/s, and `yaw` (B * N,), rad/s.
+    They are clipped in place, the speed first, and also written to `speed` (B * N,), m/s, and `yaw` (B * N,), rad/s.
     """
     low, high, most, slack, curvature = r.low[b], r.high[b], r.most[b], r.slack[b], r.curvature[b]
     own, speed, yaw = commands[first:last], speed[first:last], yaw[first:last]
@@ -93,10 +96,10 @@ def clip(r: Rows, b: int, commands: Floats, speed: Floats, yaw: Floats, first: i
 
 
 @jit
-def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -> int:
-    """Set `Rows.close` for each car that may meet a later one of its trial; return how many.
+def find_close(r: MotionConstants, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -> int:
+    """Set `MotionConstants.close` for each car that may meet a later one of its trial; return how many are set.
 
-    The cars are `first` (index) to before `last` (index) of `x` (B * N,) and `y` (B * N,), metres; n to a trial.
+    The cars are `first` (index) to `last` (index) - 1 of `x` (B * N,) and `y` (B * N,), metres; each trial has n.
     """
     count = last - first
     close = r.close[:count]
@@ -119,7 +122,7 @@ def look(r: Rows, b: int, x: Floats, y: Floats, n: int, first: int, last: int) -
 
 @jit
 def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
-    """Tell whether any two of the first `cars` (count) cars are nearer to each other than the root of `near` (m^2).
+    """Tell whether the squared distance of any two of the first `cars` (count) cars is less than `near` (m^2).
 
     `x` (N,) and `y` (N,) are their centres, metres.
     """
@@ -136,38 +139,46 @@ def any_near(x: Floats, y: Floats, cars: int, near: float) -> bool:
 def move(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
     """Move cars along their arcs for `dt` seconds.
 
-    `x` (K,) and `y` (K,) are centres, metres; `c` (K,) and `s` (K,) headings; `speed` (K,), m/s, and `yaw` (K,), rad/s,
-    what they hold.
+    `x` (K,) and `y` (K,) are centres, metres, `c` (K,) and `s` (K,) headings; they are updated in place. `speed` (K,),
+    m/s, and `yaw` (K,), rad/s, are held.
     """
     for f in range(x.shape[0]):
         x[f], y[f], c[f], s[f] = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
 
 
 @jit
-def move_fours(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
-    """Do as `move`, for all places of one trial: `x` (N,), `y` (N,), `c` (N,), `s` (N,), `speed` (N,), `yaw` (N,).
+def move_together(x: Floats, y: Floats, c: Floats, s: Floats, speed: Floats, yaw: Floats, dt: float) -> None:
+    """Do as `move` for all places of one trial: `x` (N,), `y` (N,), `c` (N,), `s` (N,), `speed` (N,), `yaw` (N,).
 
-    Four cars are written out, which become one instruction each; a loop would take more at a time than a trial has.
+    The work on TOGETHER cars is written out without a loop, so that the compiler makes one instruction of it; of a loop
+    it would make instructions on more cars than a trial has. All values are read before any is written.
     """
     for f in range(0, x.shape[0], TOGETHER):
         x0, y0, c0, s0 = advance(x[f], y[f], c[f], s[f], speed[f], yaw[f], dt)
-        g = f + 1
-        x1, y1, c1, s1 = advance(x[g], y[g], c[g], s[g], speed[g], yaw[g], dt)
-        h = f + 2
-        x2, y2, c2, s2 = advance(x[h], y[h], c[h], s[h], speed[h], yaw[h], dt)
-        i = f + 3
-        x3, y3, c3, s3 = advance(x[i], y[i], c[i], s[i], speed[i], yaw[i], dt)
-        x[f], x[g], x[h], x[i] = x0, x1, x2, x3
-        y[f], y[g], y[h], y[i] = y0, y1, y2, y3
-        c[f], c[g], c[h], c[i] = c0, c1, c2, c3
-        s[f], s[g], s[h], s[i] = s0, s1, s2, s3
+        x1, y1, c1, s1 = advance(x[f + 1], y[f + 1], c[f + 1], s[f + 1], speed[f + 1], yaw[f + 1], dt)
+        x2, y2, c2, s2 = advance(x[f + 2], y[f + 2], c[f + 2], s[f + 2], speed[f + 2], yaw[f + 2], dt)
+        x3, y3, c3, s3 = advance(x[f + 3], y[f + 3], c[f + 3], s[f + 3], speed[f + 3], yaw[f + 3], dt)
+        x4, y4, c4, s4 = advance(x[f + 4], y[f + 4], c[f + 4], s[f + 4], speed[f + 4], yaw[f + 4], dt)
+        x5, y5, c5, s5 = advance(x[f + 5], y[f + 5], c[f + 5], s[f + 5], speed[f + 5], yaw[f + 5], dt)
+        x6, y6, c6, s6 = advance(x[f + 6], y[f + 6], c[f + 6], s[f + 6], speed[f + 6], yaw[f + 6], dt)
+        x7, y7, c7, s7 = advance(x[f + 7], y[f + 7], c[f + 7], s[f + 7], speed[f + 7], yaw[f + 7], dt)
+        x[f], x[f + 1], x[f + 2], x[f + 3] = x0, x1, x2, x3
+        x[f + 4], x[f + 5], x[f + 6], x[f + 7] = x4, x5, x6, x7
+        y[f], y[f + 1], y[f + 2], y[f + 3] = y0, y1, y2, y3
+        y[f + 4], y[f + 5], y[f + 6], y[f + 7] = y4, y5, y6, y7
+        c[f], c[f + 1], c[f + 2], c[f + 3] = c0, c1, c2, c3
+        c[f + 4], c[f + 5], c[f + 6], c[f + 7] = c4, c5, c6, c7
+        s[f], s[f + 1], s[f + 2], s[f + 3] = s0, s1, s2, s3
+        s[f + 4], s[f + 5], s[f + 6], s[f + 7] = s4, s5, s6, s7
 
 
 @jit_inline
 def copy_together(source: Floats, n: int, target: Floats, k: int) -> None:
     """Copy TOGETHER numbers of `source` (N,), from number n on, to `target` (M,), from number `k` (number) on.
 
-    All are read before one is written, which is one instruction each.
+    All are read before any is written, so that the compiler makes one instruction of each.
     """
-    one, two, three, four = source[n], source[n + 1], source[n + 2], source[n + 3]
-    target[k], target[k + 1], target[k + 2], target[k + 3] = one, two, three, four
+    a0, a1, a2, a3 = source[n], source[n + 1], source[n + 2], source[n + 3]
+    a4, a5, a6, a7 = source[n + 4], source[n + 5], source[n + 6], source[n + 7]
+    target[k], target[k + 1], target[k + 2], target[k + 3] = a0, a1, a2, a3
+    target[k + 4], target[k + 5], target[k + 6], target[k + 7] = a4, a5, a6, a7

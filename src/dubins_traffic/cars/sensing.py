@@ -1,4 +1,4 @@
-"""What a car perceives: the cars within a radius, with seeded noise, and a laser scan."""
+"""What a car senses: the cars within a radius, with seeded noise, and a laser scan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dubins_traffic.kernels.trig import sincos
 
 @record
 class SeenPose:
-    """A car that is seen: its centre, m, its heading, a unit vector, its speed, m/s, and yaw rate, rad/s."""
+    """Pose and twist of a car that is seen: centre, m, heading, a unit vector, speed, m/s, and yaw rate, rad/s."""
 
     x: float
     y: float
@@ -34,7 +34,7 @@ class SeenPose:
 
 @record
 class SeenLabels:
-    """The same car: its index and its `cars.state.Propositions`; NONE where no car is."""
+    """Index and `cars.state.Propositions` of a car that is seen; `car` is NONE in a row without a car."""
 
     car: int = NONE
     segment: int = NONE
@@ -45,7 +45,7 @@ class SeenLabels:
 
 
 class Seen(Tables):
-    """What a car sees: both tables (N,), a row for each car, itself first."""
+    """The cars that a car sees, itself first: `poses` (N,) and `labels` (N,)."""
 
     poses: Rows[SeenPose]
     labels: Rows[SeenLabels]
@@ -70,7 +70,7 @@ class Ray:
 
 
 class Surroundings(Tables):
-    """What a laser may meet: the cars of a batch, and its obstacles."""
+    """What a laser's ray may meet: the cars of a batch, and its obstacles."""
 
     state: State
     cars: CarTable
@@ -78,12 +78,12 @@ class Surroundings(Tables):
 
 
 def nothing_seen(cars: int) -> Seen:
-    """Return room for what a car sees of up to `cars` cars."""
+    """Return the tables for what a car sees of up to `cars` cars, still empty."""
     return Seen(table(SeenPose, cars), table(SeenLabels, cars))
 
 
 def rays_at(angles: Iterable[float]) -> Rows[Ray]:
-    """Return the rays at some bearings, radians."""
+    """Return the rays at bearings `angles`, radians, left positive, 0 straight ahead."""
     directions = [sincos(float(angle)) for angle in angles]
     rays = table(Ray, len(directions))
     for ray, (c, s) in enumerate(directions):
@@ -94,9 +94,10 @@ def rays_at(angles: Iterable[float]) -> Rows[Ray]:
 
 @jit
 def neighbours(b: int, viewer: int, radius: float, seen: Seen, state: State, labels: Labels) -> int:
-    """Write car `viewer` (index), then the others within `radius` (m), by index, into `seen`; return how many.
+    """Write car `viewer` (index), then the others within `radius` (m) by index, into `seen`; return how many rows.
 
-    The first row that is free has no car. Where the labels were as they are now already, minus the number is returned.
+    In the row after them `SeenLabels.car` is NONE. If the labels in `seen` were the same before, the number of rows is
+    returned negated, so that the caller need not convert them again.
     """
     limit = radius * radius
     x = state.x[b, viewer]
@@ -117,7 +118,7 @@ def neighbours(b: int, viewer: int, radius: float, seen: Seen, state: State, lab
 
 @jit
 def _view(b: int, n: int, row: int, seen: Seen, state: State, labels: Labels) -> int:
-    """Write car n into a row; return 0 if its labels stay as they were."""
+    """Write car n into a row of `seen`; return 0 if the labels in that row were the same before."""
     pose = seen.poses[row]
     pose.x = state.x[b, n]
     pose.y = state.y[b, n]
@@ -140,9 +141,9 @@ def _view(b: int, n: int, row: int, seen: Seen, state: State, labels: Labels) ->
 
 @jit
 def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: float, heading: float) -> None:
-    """Add noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad).
+    """Add normal noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad).
 
-    The first `count` (count) rows of `seen` are those of `neighbours`.
+    `neighbours` has filled the first `count` (count) rows of `seen`.
     """
     for k in range(count):
         pose = seen.poses[k]
@@ -155,7 +156,7 @@ def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: flo
 
 @jit
 def ray_box(px: float, py: float, ex: float, ey: float, box: Box) -> float:
-    """Return how far the ray from (px, py) along a unit vector goes to a rounded box, metres, or NEVER.
+    """Return how far the ray from (px, py) along a unit vector goes until it meets a rounded box, metres, or NEVER.
 
     The vector has the components `ex` (unit) and `ey` (unit). A rounded box is the union of two crossed boxes and four
     discs at the corners. 0 if the ray begins inside.
@@ -219,8 +220,8 @@ def scan(
 ) -> None:
     """Write the laser ranges of car `viewer` (index) in metres into `ranges` (R,).
 
-    As REP 117 of ROS says, of the rays `rays` (R,) one that meets nothing within `longest` (m) reads +inf, and one that
-    meets something nearer than `shortest` (m) reads -inf.
+    As in REP 117 of ROS, of the rays `rays` (R,) one that meets nothing within `longest` (m) reads +inf, and one that
+    meets a body nearer than `shortest` (m) reads -inf.
     """
     state, cars, obstacles = around.state, around.cars, around.obstacles
     own = box_at(b, viewer, state, cars)
@@ -248,7 +249,7 @@ def scan(
 
 @jit
 def _sweep(own: Box, box: Box, rays: Rows[Ray], ranges: Floats) -> None:
-    """Lower the ranges to what one body leaves of them."""
+    """Lower each of the ranges (R,) to the distance at which its ray meets the body `box`, if that is less."""
     for k in range(rays.shape[0]):
         ray = rays[k]
         ex = ray.c * own.c - ray.s * own.s

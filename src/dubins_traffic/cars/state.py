@@ -1,4 +1,4 @@
-"""Values that cross rooms every tick: poses, commands, observations, the state of a batch, frames.
+"""Values that rooms hand to each other in every tick: poses, commands, observations, states, labels, frames.
 
 Small values are named tuples, since thousands of them are made per second of wall clock; arrays over a batch have
 the shape (trials B, cars N), float64, C order. Car 0 of every trial is the ego.
@@ -42,7 +42,7 @@ class Twist(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a driver asks for during one tick: speed in m/s and yaw rate in rad/s."""
+    """What a driver asks for in one tick: speed in m/s and yaw rate in rad/s."""
 
     speed: float
     yaw_rate: float
@@ -64,7 +64,7 @@ class Propositions(NamedTuple):
 
 
 class SensedCar(NamedTuple):
-    """Another car as a driver sees it."""
+    """Another car as a driver senses it."""
 
     name: str
     index: int  # pyright: ignore[reportIncompatibleMethodOverride]  # no tuple is searched here
@@ -93,7 +93,8 @@ class Observation(NamedTuple):
 class State(Tables):
     """State of a batch after a tick. All arrays (B, N) float64, except `count` (B,) int64: cars in each trial.
 
-    `speed` and `yaw_rate` are those in force when the frame was reached: 0 for a car that a contact had fixed.
+    `x`, `y` are centres (m), `c`, `s` headings (unit vectors). `speed` (m/s) and `yaw_rate` (rad/s) are those in force
+    when the frame was reached: 0 for a car that a contact had fixed.
     """
 
     x: Floats
@@ -122,32 +123,32 @@ class Labels(Tables):
 
     @staticmethod
     def zeros(trials: int, cars: int) -> Labels:
-        """Return labels of which nothing holds."""
+        """Return labels of which no proposition holds."""
         segment = np.zeros((trials, cars), dtype=np.int64)
         at, crosses, lane = (np.full((trials, cars), NONE, dtype=np.int64) for _ in range(3))
         return Labels(segment, at, crosses, lane, np.zeros((trials, cars), dtype=np.uint32))
 
 
 def put_observed(state: State, labels: Labels, observation: Observation) -> None:
-    """Write what an ego observes into trial 0 of `state` and `labels` (1, N): itself first, then the others."""
-    state.count[0] = 1 + len(observation.others)
-    seen = [(observation.pose, observation.twist, observation.propositions)]
-    seen += [(car.pose, car.twist, car.propositions) for car in observation.others]
-    for n, (pose, twist, propositions) in enumerate(seen):
-        state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n] = pose
-        state.speed[0, n], state.yaw_rate[0, n] = twist
-        for array, value in zip(labels, propositions, strict=True):
-            array[0, n] = value
+    """Write an ego's observation into trial 0 of `state` and `labels` (1, N): the ego first, then the others."""
+    others = observation.others
+    state.count[0] = 1 + len(others)
+    x, y, c, s, speed, yaw_rate = state[:6]
+    segment, at, crosses, lane, bits = labels
+    for n, own in enumerate((observation, *others)):
+        x[0, n], y[0, n], c[0, n], s[0, n] = own.pose
+        speed[0, n], yaw_rate[0, n] = own.twist
+        segment[0, n], at[0, n], crosses[0, n], lane[0, n], bits[0, n] = own.propositions
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Two bodies touched: `car` and `other`, at `time` seconds, during the tick that ends in frame `tick`.
+    """A contact of `car` and `other`, at `time` seconds, in the tick that ends in frame `tick`.
 
     `other` is a car's index, or -1 - k for obstacle k. (x, y) is the point of contact and (nx, ny) the unit normal
-    from `car` toward `other`. `closing` are the speeds of the two touching points toward each other (m/s, positive:
-    toward), `moved` whether each moved or, being a rectangle, turned in that tick before the contact.
-    `at_fault` is filled in by the labeller: whether `car`, and whether `other`, is at fault.
+    from `car` toward `other`. The pairs are of `car` and of `other`: `closing`, the speed of its touching point toward
+    the other body (m/s); `moved`, whether it moved, or as a rectangle turned, in that tick before the contact;
+    `at_fault`, whether it is at fault, which the labeller fills in.
     """
 
     tick: int
@@ -165,7 +166,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something named that happened at one instant of a trial and is neither a frame nor a contact."""
+    """Something at a tick worth recording that is neither a frame nor a contact: its kind, car and detail."""
 
     tick: int
     kind: str

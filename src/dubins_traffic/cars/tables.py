@@ -1,4 +1,4 @@
-"""Cars and obstacles of a batch as arrays for kernels.
+"""The cars and obstacles of a batch as tables for kernels.
 
 Every body and obstacle part is a *rounded box*: a rectangle (half_length, half_width) grown by `rounding`. A disc
 is a rounded point, a polygon the set of its edges, an edge a box without width.
@@ -21,7 +21,7 @@ from dubins_traffic.kernels.tables import Tables
 
 
 class CarTable(Tables):
-    """The car of each trial; all arrays (B,), metres, m/s, rad/s.
+    """What the cars of each trial are; all arrays (B,), metres, m/s, rad/s.
 
     `half_length`, `half_width` and `rounding` are those of its body (`kernels.boxes.Box`).
     """
@@ -39,7 +39,11 @@ class CarTable(Tables):
 
 @record
 class Part:
-    """A part of a static obstacle: a rounded box, m and a unit vector, that reaches `reach` metres from its centre."""
+    """A part of a static obstacle: a rounded box.
+
+    Centre (`x`, `y`), direction (`c`, `s`), a unit vector, half sizes and `rounding`; `reach` is the distance from its
+    centre to its farthest point, and `owner` the number of the obstacle. Lengths are in metres.
+    """
 
     x: float
     y: float
@@ -54,7 +58,7 @@ class Part:
 
 
 class ObstacleTable(Tables):
-    """The static obstacles of each trial: those of trial b are the parts off[b] to off[b + 1] - 1.
+    """The parts of the static obstacles of each trial: those of trial b are `parts` off[b] to off[b + 1] - 1.
 
     `off` (B + 1,); `parts` (P,).
     """
@@ -69,13 +73,13 @@ _SHAPE = ("x", "y", "c", "s", "half_length", "half_width", "rounding", "reach")
 
 @jit_inline
 def box_of(part: Part) -> Box:
-    """Return the box of an obstacle's part."""
+    """Return an obstacle's part as a rounded box."""
     return Box(part.x, part.y, part.c, part.s, part.half_length, part.half_width, part.rounding)
 
 
 @jit_inline
 def box_at(b: int, n: int, state: State, cars: CarTable) -> Box:
-    """Return the body of car n of trial b where it is."""
+    """Return the body of car n of trial b at its present pose."""
     return Box(
         state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n],
         cars.half_length[b], cars.half_width[b], cars.rounding[b],

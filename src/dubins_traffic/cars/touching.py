@@ -1,4 +1,4 @@
-"""Which bodies touch, told from frames alone, for simulators whose cars are moved elsewhere."""
+"""Finds contacts from frames alone, for simulators that move cars in another process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dubins_traffic.cars.tables import box_of, pack_cars, pack_obstacles
 from dubins_traffic.kernels.boxes import Box, separation
 
 STANDING = 0.02
-"""Speed, m/s, up to which a body counts as standing: poses that are measured always shiver a little."""
+"""Speed, m/s, up to which a body counts as standing: measured poses always vary a little."""
 Separation = tuple[float, float, float, float, float]
 
 
@@ -23,9 +23,9 @@ class Bodies:
     Parameters
     ----------
     car : Car
-        What every car is.
+        The car that all cars of the problem are.
     obstacles : sequence of Obstacle
-        What stands about.
+        The static obstacles.
     """
 
     def __init__(self, car: Car, obstacles: Sequence[Obstacle]) -> None:
@@ -39,7 +39,7 @@ class Bodies:
 
     @property
     def turns(self) -> bool:
-        """Whether a car that turns on the spot moves its body's edge."""
+        """Whether turning in place moves the edge of a car's body: it does not if the body is a disc."""
         return self.box[0] > 0.0
 
     def separation(self, state: State, car: int, other: int) -> Separation:
@@ -51,14 +51,14 @@ class Bodies:
 
 
 class Touching:
-    """Finds the contacts of frames that follow each other: pairs that touch now and did not before.
+    """Finds the contacts in consecutive frames: pairs of bodies that touch in a frame and did not before.
 
     Parameters
     ----------
     car : Car
-        What every car is.
+        The car that all cars of the problem are.
     obstacles : sequence of Obstacle
-        What stands about.
+        The static obstacles.
     period : float
         Seconds between two frames.
     """

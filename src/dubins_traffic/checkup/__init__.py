@@ -1,1 +1,1 @@
-"""What a competition would say of a controller: scenarios, passes over them, verdicts."""
+"""The check of a controller as before a competition: scenarios, passes over them, verdicts."""

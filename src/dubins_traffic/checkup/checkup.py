@@ -1,4 +1,4 @@
-"""What a competition would say of a controller: verdicts on two passes over the course."""
+"""Checks a controller: runs it twice over the course of scenarios and judges the two passes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BINS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at, whether it is well, and what was seen."""
+    """One check: its name, whether it passed, and what was observed."""
 
     check: str
     passed: bool
@@ -30,7 +30,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Checkup:
-    """All that was found; `histogram` holds (upper edge in seconds, None for all above; number of answers)."""
+    """All results; `histogram` holds (upper edge in seconds, None for all above; number of answers)."""
 
     controller: str
     over: str | None
@@ -41,11 +41,11 @@ class Checkup:
 
     @property
     def passed(self) -> bool:
-        """Whether all is well."""
+        """Whether all checks passed."""
         return all(finding.passed for finding in self.findings)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a document."""
+        """Return the results as a JSON object."""
         return {
             "controller": self.controller,
             "over": self.over,

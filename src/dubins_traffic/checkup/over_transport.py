@@ -1,4 +1,4 @@
-"""The course over a transport: the controller is a program, started for each pass."""
+"""The course over a transport: the controller is a program that is started for each pass."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from dubins_traffic.transports.patience import Patience
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """A transport, and the environment in which a program finds it."""
+    """A transport, and the environment variables by which a program finds it."""
 
     transport: Transport
     environment: Mapping[str, str]
 
 
 class NotingLink(Link):
-    """Notes what the ego's driver answers."""
+    """Notes the answers of the ego's driver."""
 
     commands: list[tuple[float, float]]
 
@@ -53,7 +53,7 @@ class NotingLink(Link):
 
     @property
     def answers(self) -> list[float]:
-        """Seconds after which each frame of the trial was answered."""
+        """Time to the answer of each frame of the trial, seconds."""
         return list(self._punctuality.answers[EGO_NAME])
 
 
@@ -105,7 +105,7 @@ def _run(link: NotingLink, maestro: Maestro, words: Sequence[str], environment: 
 
 
 class _Watch:
-    """Ends the course if the program has ended, or asks for no trial for too long."""
+    """Ends the course if the program has ended, or has asked for no trial for too long."""
 
     def __init__(self, program: subprocess.Popen[bytes], inbox: Inbox) -> None:
         self._program, self._inbox = program, inbox
@@ -115,11 +115,11 @@ class _Watch:
         self._thread.start()
 
     def proceed(self) -> None:
-        """A trial has ended: the program has its time again."""
+        """Begin the program's time anew, since a trial has ended."""
         self._waited = Waited(self._program.pid, os.getpid())
 
     def end(self) -> None:
-        """Look no longer."""
+        """Stop watching."""
         self._over.set()
         self._thread.join()
 
@@ -159,7 +159,7 @@ def _start(words: Sequence[str], environment: Mapping[str, str]) -> subprocess.P
 
 
 def _dismiss(program: subprocess.Popen[bytes]) -> str:
-    """End the program as Ctrl-C does, and say what was wrong with its end."""
+    """End the program as Ctrl-C does, and return what was wrong with its end."""
     early = program.poll()
     if early is not None:
         return f"the program {ended(early)} before it was told to"

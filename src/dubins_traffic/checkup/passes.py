@@ -1,4 +1,4 @@
-"""How a controller goes over the course: what it was asked, what it answered, when, and how each trial ended."""
+"""One pass of a controller over the course: observations, answers and their times, and the end of each trial."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from dubins_traffic.protocols import Closes, Controller
 from dubins_traffic.runs.single import Result, run_trial
 
 DEADLINE = 5.0
-"""Seconds for one answer, after which a trial ends."""
+"""Seconds for one answer, after which the trial ends."""
 ERRORS = 2
-"""The file descriptor to which a controller's own output goes: standard output is ours."""
+"""The file descriptor to which a controller's own output goes; standard output is reserved for the results."""
 REHEARSAL = 0.2
 """Simulated seconds that are driven once before the course."""
 PATIENCE = 60.0
-"""Seconds for everything else: to load, to learn a problem, to drive the rest of a trial."""
+"""Seconds for everything else: to load, to start, to drive the rest of a trial."""
 COMPILING = 3600.0
-"""Seconds to load and to compile all that is compiled on a first run."""
+"""Seconds to load and to compile all kernels on a first run."""
 DIED = "died"
-"""The end of a trial whose process ended in it."""
+"""The end of a trial in which its process ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """The course once. `farewell` says what was wrong with the program's end, `lost` what broke the course off."""
+    """One pass over the course; `farewell`: what was wrong with the program's end, `lost`: what broke it off."""
 
     drives: list[Drive] = field(default_factory=list[Drive])
     farewell: str = ""
@@ -63,13 +63,13 @@ class Pass:
 
 
 def driven(name: str, result: Result, answers: list[float], commands: list[tuple[float, float]]) -> Drive:
-    """Return what has been seen of a trial."""
+    """Return what was observed in a trial."""
     ending, begin = result.ending, result.wall.time_to_begin_s
     return Drive(name, ending.end.value, ending.detail, ending.ticks, begin, answers, commands)
 
 
 class Witness:
-    """Passes on to a controller and notes what it answers.
+    """Wraps a controller and notes its answers.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Witness:
         self._begin = perf_counter() - began
 
     def act(self, observation: Observation) -> Command | tuple[float, float] | None:
-        """Pass on and note."""
+        """Return the controller's answer, and note it."""
         self._mark(self._begin, observation.tick)
         began = perf_counter()
         command = self._controller.act(observation)

@@ -1,4 +1,4 @@
-"""All kernels compiled beforehand: moments of all kinds of trials are run, and what they call is asked for."""
+"""Compiles all kernels beforehand, by running a moment of each kind of trial."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from dubins_traffic.verification.contacts import from_poses
 SECONDS = 0.2
 """Simulated seconds of a rehearsal."""
 PAUSE = 0.1
-"""Seconds between two looks for what has been compiled."""
+"""Seconds between two checks of what has been compiled."""
 MANY = 3
-"""Trials of a rehearsal of those that are drawn and run together."""
+"""Number of trials in a rehearsal of trials that are drawn and run together."""
 DRIVERS = ("simple", "lanes", "rules")
 Progress = Callable[[int, int], object]
 
 
 def precompile(*, everything: bool = False, progress: Progress | None = None) -> list[str]:
-    """Compile what trials need, and wait for it; what is in the cache is left as it is.
+    """Compile the kernels that trials need and are not in the cache yet, and wait for them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The course that `check-controller` runs: short trials on instances that programs are seldom tried on."""
+"""The course that `check-controller` runs: short trials on unusual instances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far another process has come in the course, how long it has had for it, and how it ended."""
+"""Watches another process on the course: how far it is, the time it has had, and how it ends."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PLACE = struct.Struct("<qdq")
 
 
 class Place:
-    """The trial that a process has reached, its time to begin (seconds) and tick, -1 before the first; outlives it.
+    """The trial, time to begin (s) and tick that a process has reached, in a file that outlives the process.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Place:
     @classmethod
     @contextmanager
     def made(cls, path: Path) -> Generator[Self]:
-        """Make the file `path` for another process, which has come nowhere yet."""
+        """Make the file `path` for another process, which has not begun yet."""
         path.write_bytes(_PLACE.pack(-1, 0.0, -1))
         with cls.opened(path) as place:
             yield place
@@ -45,7 +45,7 @@ class Place:
             yield cls(memory)
 
     def put(self, trial: int, begin: float, tick: int) -> None:
-        """Say where this process is."""
+        """Write how far this process is."""
         _PLACE.pack_into(self._memory, 0, trial, begin, tick)
 
     @property
@@ -86,12 +86,12 @@ class Waited:
         return elapsed - min(elapsed, max(0.0, self._in_queue() - self._queued))
 
     def _in_queue(self) -> float:
-        """Return the seconds that all threads of the processes have stood in a processor's queue, all together."""
+        """Return the total time that all threads of the processes have waited for a processor, seconds."""
         return sum(map(_queued, self._tasks)) * 1e-9
 
 
 def _queued(tasks: Path) -> int:
-    """Return the nanoseconds that the threads of a process have stood in a queue."""
+    """Return the total time that the threads of a process have waited for a processor, nanoseconds."""
     queued = 0
     try:
         for task in list(tasks.iterdir()):
@@ -102,7 +102,7 @@ def _queued(tasks: Path) -> int:
 
 
 def see_off(pid: int, status: Callable[[], int | None], seconds: float = FAREWELL) -> str:
-    """Wait for the end of a process that is no longer needed, and say what was wrong with it, "" if nothing was."""
+    """Wait for the end of a process that is no longer needed; return what was wrong with it, "" if nothing was."""
     waited = Waited(pid)
     while status() is None:
         if waited.seconds() > seconds:

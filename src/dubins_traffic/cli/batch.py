@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         """Runs the trials of a batch."""
 
         def __call__(self, *, ended: Callable[[Outcome], object]) -> object:
-            """Run them, and tell `ended` what came of each as it ends."""
+            """Run the trials, and call `ended` with the outcome of each when it ends."""
             ...
 
     from dubins_traffic.engine.group import Outcome
@@ -30,26 +30,17 @@ EXAMPLES = options.examples(
     "batch town --trials 200 --threads 2 --keep failures --records out",
 )
 
-ControllerOption = Annotated[
-    str,
-    typer.Option(
-        "--controller",
-        metavar="C",
-        help="A built-in name, module:Class or path/to/file.py:Class; `rules` runs compiled.",
-        autocompletion=options.controllers,
-    ),
-]
-TrialsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
-    ),
-]
 TogetherOption = Annotated[
     int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")
 ]
 ThreadsOption = Annotated[
-    int, typer.Option("--threads", metavar="T", min=1, help="Batches at a time, where all is compiled.")
+    int,
+    typer.Option(
+        "--threads",
+        metavar="T",
+        min=1,
+        help="Groups that run at a time, if all is compiled.",
+    ),
 ]
 KeepOption = Annotated[
     str,
@@ -59,8 +50,8 @@ KeepOption = Annotated[
 
 def batch(
     configuration: options.Config,
-    controller: ControllerOption = "rules",
-    trials: TrialsOption = None,
+    controller: options.Controller = "rules",
+    trials: options.Trials = None,
     seed: options.Seed = 0,
     together: TogetherOption = 64,
     threads: ThreadsOption = 1,
@@ -106,17 +97,17 @@ def batch(
 
 
 def _run(run: Run, count: int, records: str | None, *, json: bool) -> Batch:
-    """Run `count` trials, show the scores of those that have ended, and return what came of them."""
+    """Run `count` trials, show the scores of those that have ended, and return the batch."""
     from dubins_traffic.cli.tables import show
     from dubins_traffic.engine.batch import in_order
 
     done: list[Outcome] = []
     try:
-        with faults.no_silent_end(), progress(count) as tell:
+        with faults.controllers_drive(), progress(count) as tell:
             run(ended=lambda outcome: (done.append(outcome), tell(len(done), count)))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(done)} of {count} trials")
-        raise
+        raise typer.Exit(faults.FAILED) from None
     finally:
         if done:
             show(in_order(done).sheet, json=json)

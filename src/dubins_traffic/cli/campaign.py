@@ -29,43 +29,43 @@ campaign = typer.Typer(
 )
 
 
+FolderOption = Annotated[
+    str,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Folder of the campaign, made if missing.",
+        show_default=False,
+    ),
+]
+RayOption = Annotated[
+    str | None,
+    typer.Option(
+        "--ray",
+        metavar="ADDRESS",
+        help="Run on a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
+    ),
+]
+RecordsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--records",
+        metavar="WHICH",
+        help="Keep the records of none, all, failures or sample:N trials.",
+        show_default="none, or as before",
+    ),
+]
+
+
 @campaign.command("run", epilog=RUN_EXAMPLES)
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE", help="A campaign file, TOML.", show_default=False)],
-    folder: Annotated[
-        str,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Folder of the campaign, made if missing.",
-            show_default=False,
-        ),
-    ],
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
-        ),
-    ] = None,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            "--ray",
-            metavar="ADDRESS",
-            help="Run on a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
-        ),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what has been begun in DIR.")] = False,
-    records: Annotated[
-        str | None,
-        typer.Option(
-            "--records",
-            metavar="WHICH",
-            help="Keep the records of none, all, failures or sample:N trials.",
-            show_default="none, or as before",
-        ),
-    ] = None,
+    folder: FolderOption,
+    workers: options.Workers = None,
+    ray: RayOption = None,
+    resume: options.Resume = False,
+    records: RecordsOption = None,
     sandbox: options.Sandbox = False,
     limits: options.Limits = "",
     trust: options.Trust = False,

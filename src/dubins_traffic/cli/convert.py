@@ -84,6 +84,7 @@ def convert(
         return
     form = None if map_format is None else formats.load(map_format)
     found = load(file, map_format=form)
+    maps.require_outputs(found if isinstance(found, RoadNetwork) else None, losses)
     suffix = Path(output).suffix.lower()
     if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
         write_sdf(found.instance if isinstance(found, Record) else found, output, Version(sdf.value))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.cli.falsify import ControllerOption, WorkersOption
+from dubins_traffic.cli.falsify import WorkersOption
 from dubins_traffic.cli.progress import progress
 
 EXAMPLES = options.examples(
@@ -40,7 +40,7 @@ RunsOption = Annotated[int, typer.Option("--runs", metavar="R", help="Of splitti
 
 def estimate(
     configuration: options.Config,
-    controller: ControllerOption = "rules",
+    controller: options.Controller = "rules",
     event: EventOption = "1.collision",
     below: BelowOption = 0.0,
     method: MethodOption = "monte-carlo",
@@ -57,7 +57,7 @@ def estimate(
     from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.falsification.estimate import estimate as run
 
-    with faults.no_silent_end(), progress(what="trials") as tell:
+    with faults.controllers_drive(), progress(what="trials") as tell:
         found = run(
             configuration, dressed(controller, shield=shield), event=event, below=below, method=method, trials=trials,
             seed=seed, duration=duration, particles=particles, runs=runs, workers=workers,

@@ -21,46 +21,53 @@ EXAMPLES = options.examples(
 )
 
 
+PathArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="PATH",
+        help="A controller.py, a folder, a zip archive or a program that speaks lines.",
+        show_default=False,
+    ),
+]
+CompetitionOption = Annotated[
+    str,
+    typer.Option(
+        "--competition",
+        metavar="FILE|URL",
+        help="A competition file, its folder, or the address of its page.",
+        show_default=False,
+    ),
+]
+PhaseOption = Annotated[
+    str,
+    typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed."),
+]
+OutputOption = Annotated[
+    str | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Where results are kept as they come.",
+        show_default="evaluations/PHASE-DIGEST",
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-submissions", help="Run it too where this machine can't enforce all limits of the box."
+    ),
+]
+
+
 def evaluate(
-    path: Annotated[
-        str,
-        typer.Argument(
-            metavar="PATH",
-            help="A controller.py, a folder, a zip archive or a program that speaks lines.",
-            show_default=False,
-        ),
-    ],
-    competition: Annotated[
-        str,
-        typer.Option(
-            "--competition",
-            metavar="FILE|URL",
-            help="A competition file, its folder, or the address of its page.",
-            show_default=False,
-        ),
-    ],
-    phase: Annotated[
-        str,
-        typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed."),
-    ] = "practice",
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Where results are kept as they come.",
-            show_default="evaluations/PHASE-DIGEST",
-        ),
-    ] = None,
+    path: PathArgument,
+    competition: CompetitionOption,
+    phase: PhaseOption = "practice",
+    output: OutputOption = None,
     workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
     records: Annotated[bool, typer.Option("--records", help="Keep the records of the trials.")] = False,
-    trust: Annotated[
-        bool,
-        typer.Option(
-            "--trust-submissions", help="Run it too where this machine can't enforce all limits of the box."
-        ),
-    ] = False,
+    trust: TrustOption = False,
     json: options.Json = False,
 ) -> None:
     """Run a submission at home as the competition would: the same box, the same limits, the same frames.

@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
+import contextlib
 import json as json_text
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.progress import progress
+from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Generator, Sequence
 
     from dubins_traffic.falsification.coverage import Row
+    from dubins_traffic.falsification.remote import Remote
     from dubins_traffic.falsification.search import Found, Search
 
 EXAMPLES = options.examples(
     "falsify junction --controller lanes --trials 2000 -o found",
     "falsify town --controller my_controller.py:MyController --rule 3.clear --seconds 60 -o found",
     "falsify town --controller rules --trials 100000 --workers 4 -o found --resume",
+    "falsify junction --over lines,port=7411 --trials 256 -o found",
 )
 SHRINK_EXAMPLES = options.examples("shrink found/cases/3.clear-left-4.json -o small.json")
 REGRESS_EXAMPLES = options.examples("regress found --controller my_controller.py:MyController")
 
-ControllerOption = Annotated[
-    str,
-    typer.Option(
-        "--controller",
-        metavar="C",
-        help="A built-in name, module:Class or path/to/file.py:Class; `rules` runs compiled.",
-        autocompletion=options.controllers,
-    ),
-]
 RulesOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--rule", metavar="R", help="A rule that is asked for, such as 3.clear; may be given several times.",
-        show_default="all",
+        "--rule", metavar="R", show_default="all but 1.goal",
+        help="A rule that is asked for, such as 3.clear, or 1.goal: a goal is not visited for too long; may be given "
+        "several times.",
     ),
 ]  # fmt: skip
 FormulaOption = Annotated[
@@ -70,12 +65,20 @@ WorkersOption = Annotated[int, typer.Option("--workers", metavar="W", min=1, hel
 FolderOption = Annotated[
     str, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is found, made if missing.")
 ]
+OverOption = Annotated[
+    str | None,
+    typer.Option(
+        "--over", metavar="TRANSPORT",
+        help="A program elsewhere drives, in lockstep: ros1, ros2, lcm, lines or stdio, with the options of its "
+        "sessions, as in lines,port=7411.", show_default=False,
+    ),
+]  # fmt: skip
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with the search that DIR holds.")]
 
 
 def falsify(
     configuration: options.Config,
-    controller: ControllerOption = "rules",
+    controller: options.Controller = "rules",
     rule: RulesOption = None,
     formula: FormulaOption = None,
     least_score: LeastOption = False,
@@ -88,6 +91,7 @@ def falsify(
     ray: RayOption = None,
     output: FolderOption = "falsified",
     resume: ResumeOption = False,
+    over: OverOption = None,
     shield: options.Shield = False,
     sandbox: options.Sandbox = False,
     limits: options.Limits = "",
@@ -99,13 +103,16 @@ def falsify(
     Each kind of failure is judged afresh and kept once, as an instance that [b]run[/b] replays. Ctrl-C keeps what has
     been found, and --resume goes on.
     """
-    from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.falsification.search import falsify as search
 
-    driver = dressed(controller, shield=shield, sandbox=options.boxes(sandbox, limits, trust))
     seen: list[Search] = []
+    boxes = options.boxes(sandbox, limits, trust)
     try:
-        with faults.no_silent_end(), progress(trials) as tell:
+        with (
+            faults.controllers_drive(),
+            driven(controller, over, shield=shield, sandbox=boxes) as driver,
+            progress(trials) as tell,
+        ):
 
             def heard(own: Search) -> None:
                 seen[:] = [own]
@@ -118,9 +125,27 @@ def falsify(
             )  # fmt: skip
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {seen[0].counts.trials if seen else 0} trials; --resume goes on")
-        raise
+        raise typer.Exit(faults.FAILED) from None
     _show(found, json=json)
-    options.tell(output)
+    options.tell(output, str(found.page))
+
+
+@contextlib.contextmanager
+def driven(
+    controller: str, over: str | None, *, shield: bool, sandbox: str | None = None
+) -> Generator[str | Remote]:
+    """Yield who drives: a controller by its name, or a program elsewhere over a transport."""
+    from dubins_traffic.controllers.registry import dressed
+
+    if over is None:
+        yield dressed(controller, shield=shield, sandbox=sandbox)
+        return
+    from dubins_traffic.falsification.remote import Remote
+
+    if sandbox is not None:
+        raise InputError("both at once", file="--over, --sandbox", expected="one of them")
+    with Remote(over, shield=shield, say=faults.tell) as remote:
+        yield remote
 
 
 def shrink(
@@ -137,16 +162,26 @@ def shrink(
             "--output", "-o", metavar="FILE.json", help="The small case.", show_default="CASE.small.json"
         ),
     ] = None,
+    over: OverOption = None,
+    shield: options.Shield = False,
 ) -> None:
     """Take away from a case what its failure does not need; write what is left, with its replay page."""
+    from pathlib import Path
+
     from dubins_traffic.falsification.pages import write_page
     from dubins_traffic.falsification.shrink import shrink as smaller
+    from dubins_traffic.files import require_place
 
     target = output or options.beside(case, ".small.json")
-    page = str(Path(target).with_suffix(".html"))
-    found = smaller(case, controller, progress=lambda what: faults.tell(f"without {what}"))
-    found.write(target)
-    write_page(found, page, controller)
+    require_place(Path(target))
+    page = options.beside(target, ".html")
+    with contextlib.ExitStack() as held:
+        driver: str | Remote | None = None
+        if controller is not None or over is not None:
+            driver = held.enter_context(driven(controller or "", over, shield=shield))
+        found = smaller(case, driver, progress=lambda what: faults.tell(f"without {what}"))
+        found.write(target)
+        write_page(found, page, driver)
     print(found.story.sentence)
     options.tell(target, page)
 
@@ -155,15 +190,16 @@ def regress(
     folder: Annotated[
         str, typer.Argument(metavar="DIR", help="A folder of cases, or of a search.", show_default=False)
     ],
-    controller: ControllerOption = "rules",
+    controller: options.Controller = "rules",
+    over: OverOption = None,
     shield: options.Shield = False,
     json: options.Json = False,
 ) -> None:
     """Run a folder of cases with a controller; exit with status 1 if it breaks a rule in any of them."""
-    from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.falsification.regress import regress as run
 
-    found = run(folder, dressed(controller, shield=shield))
+    with driven(controller, over, shield=shield) as driver:
+        found = run(folder, driver)
     if json:
         print(json_text.dumps([own.to_json() for own in found], indent=2))
     else:
@@ -175,6 +211,7 @@ def regress(
 
 
 def _show(found: Found, *, json: bool) -> None:
+    _warn(found.coverage)
     if json:
         document = {
             "trials": found.trials,
@@ -202,11 +239,14 @@ def _table(rows: Sequence[Row]) -> None:
 
     table = Table("rule", "manoeuvre", "roads", "tested", "broken", box=None, pad_edge=False)
     for row in rows:
-        empty = not row.tested and not row.broken
-        tested = "[bold yellow]never[/]" if empty else str(row.tested)
+        tested = "[bold yellow]never[/]" if row.empty else str(row.tested)
         name = row.cell.manoeuvre.name.lower()
         table.add_row(row.cell.rule, name, str(row.cell.degree), tested, str(row.broken or "-"))
     Console().print(table)
-    missing = sum(not row.tested and not row.broken for row in rows)
+
+
+def _warn(rows: Sequence[Row]) -> None:
+    """Say on standard error of which cells nothing is known."""
+    missing = sum(row.empty for row in rows)
     if missing:
         faults.tell(f"{missing} of {len(rows)} cells were never put to the test")

@@ -15,6 +15,7 @@ import typer
 
 from dubins_traffic.controllers.blame import DEBUG
 from dubins_traffic.errors import DubinsTrafficError, InputError, WorkerLostError, shown
+from dubins_traffic.outside import put_back
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -94,6 +95,13 @@ def _hang_up() -> int:
     return OK
 
 
+def open_streams() -> None:
+    """Let the standard streams of this process that were closed when it began lead nowhere."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # the lowest free descriptor, so that no file of ours takes its place
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
+
+
 @contextlib.contextmanager
 def debugging(wanted: bool) -> Generator[None]:
     """Let whole tracebacks of controllers be shown in the body, if `wanted`, also by processes that begin in it."""
@@ -108,7 +116,18 @@ def debugging(wanted: bool) -> Generator[None]:
 
 
 @contextlib.contextmanager
-def no_silent_end() -> Generator[None]:
+def controllers_drive() -> Generator[None]:
+    """Let controllers drive in the body: what they do to this process does not outlast it.
+
+    What they print goes to standard error, since results go to standard output; `os._exit` ends a trial; the current
+    folder and the standard streams are put back.
+    """
+    with put_back(), contextlib.redirect_stdout(sys.stderr), _no_silent_end():
+        yield
+
+
+@contextlib.contextmanager
+def _no_silent_end() -> Generator[None]:
     """Let `os._exit` in this thread raise SystemExit: a controller that calls it ends its trial, not the program.
 
     Elsewhere, in other threads and in processes that were forked, it does what it always does.

@@ -45,7 +45,7 @@ def install(prefix: Prefix = None) -> None:
             installer.install(folder, progress)
     except KeyboardInterrupt:
         faults.tell("interrupted; the same command goes on where it stopped")
-        raise
+        raise typer.Exit(faults.FAILED) from None
     print("Gazebo works; use it with --simulator gazebo")
 
 

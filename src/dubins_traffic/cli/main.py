@@ -1,124 +1,23 @@
-"""The command `dubins-traffic`."""
+"""The program `dubins-traffic`: one line and an exit status, whatever happens, and whenever Ctrl-C comes.
+
+Nothing is loaded here before Ctrl-C is heard; `cli.commands` loads the rest.
+"""
 
 from __future__ import annotations
 
+import gc
+import signal
 import sys
 from collections.abc import Sequence
-from typing import Annotated
 
-import typer
+from dubins_traffic.cli.signals import hear_no_more, heard_again, interrupt
+from dubins_traffic.runs.left_threads import end_despite_threads
 
-from dubins_traffic.cli import (
-    batch,
-    campaign,
-    check,
-    check_controller,
-    competition,
-    convert,
-    estimate,
-    evaluate,
-    falsify,
-    faults,
-    gazebo,
-    instance,
-    listing,
-    messages,
-    network,
-    plot,
-    replay,
-    run,
-    sandbox,
-    score,
-    serve,
-    session,
-    spec,
-    submit,
-    suite,
-    synth,
-    template,
-    verify,
-    warm,
-    worker,
-)
-from dubins_traffic.sessions.registry import TRANSPORTS
-
-app = typer.Typer(
-    name=faults.PROGRAM,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit status: 0 all went well; 1 a trial ended by a fault, or something unexpected; 2 wrong input.",
-)
-
-
-@app.callback(invoke_without_command=True)
-def _options(  # pyright: ignore[reportUnusedFunction]
-    context: typer.Context,
-    version: Annotated[
-        bool, typer.Option("--version", help="Print version, commit and a hash of the sources, and leave.")
-    ] = False,
-    debug: Annotated[  # noqa: ARG001
-        bool, typer.Option("--debug", help="Show the traceback of an error. Stands before the command.")
-    ] = False,
-) -> None:
-    """The benchmark [b]Traffic network of Dubins cars[/b]: draw problems, run trials, score and show them.
-
-    CONFIG may be a file or the name of a shipped configuration, such as [b]demo[/b]; `-` reads standard input.
-    """
-    if version:
-        from dubins_traffic.release import release
-
-        found = release()
-        print(f"{faults.PROGRAM} {found.version}")
-        print(f"commit {found.commit or 'unknown'}")
-        print(f"sources sha256 {found.sources}")
-        raise typer.Exit
-    if context.invoked_subcommand is None:
-        print(context.get_help())
-        raise typer.Exit(faults.WRONG_INPUT)
-
-
-app.command("network", epilog=network.EXAMPLES)(network.network)
-app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
-app.command("run", epilog=run.EXAMPLES)(run.run)
-app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
-app.command("score", epilog=score.EXAMPLES)(score.score)
-app.command("check", epilog=check.EXAMPLES)(check.check)
-app.command("verify", epilog=verify.EXAMPLES)(verify.verify)
-app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
-app.command("spec", epilog=spec.EXAMPLES)(spec.spec)
-app.command("synth", epilog=synth.EXAMPLES)(synth.synth)
-app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
-app.command("replay", epilog=replay.EXAMPLES)(replay.replay)
-app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
-app.add_typer(campaign.campaign, name="campaign")
-app.command("falsify", epilog=falsify.EXAMPLES)(falsify.falsify)
-app.command("shrink", epilog=falsify.SHRINK_EXAMPLES)(falsify.shrink)
-app.command("estimate", epilog=estimate.EXAMPLES)(estimate.estimate)
-app.command("regress", epilog=falsify.REGRESS_EXAMPLES)(falsify.regress)
-app.add_typer(competition.competition, name="competition")
-app.add_typer(suite.suite, name="suite")
-app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
-app.command("template", epilog=template.EXAMPLES)(template.template)
-transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items()}
-transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
-transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)
-app.add_typer(gazebo.app, name="gazebo")
-app.add_typer(sandbox.app, name="sandbox")
-for name, transport in transports.items():
-    app.add_typer(transport, name=name)
-app.command("submit", epilog=submit.EXAMPLES)(submit.submit)
-app.command("status", epilog=submit.STATUS_EXAMPLES)(submit.status)
-app.command("logs", epilog=submit.LOGS_EXAMPLES)(submit.logs)
-app.command("cancel", epilog=submit.CANCEL_EXAMPLES)(submit.cancel)
-app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
-app.command("worker", epilog=worker.EXAMPLES)(worker.worker)
-app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
-app.command("list", epilog=listing.EXAMPLES)(listing.listing)
-
-
+FAILED = 1
+COLLECT_AFTER = 50_000
+"""New objects between two garbage collections: a program that begins makes very many, and nearly all of them stay."""
 INTERRUPTED = 130
-"""What the library returns after Ctrl-C; our commands have failed then, like any that did not finish."""
+"""What the library returns after Ctrl-C of which no command has told."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,15 +26,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        What follows the program's name; without it, those of this process.
+        What follows the program's name; without it, those of this process. SIGTERM is then heard as Ctrl-C is, and
+        when this returns neither is heard any more: all that is left to do is to end.
     """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments is not None:
+        return _run(arguments)
+    signal.signal(signal.SIGTERM, interrupt)
+    status = FAILED
+    gc.set_threshold(COLLECT_AFTER)
     try:
+        status = _run(sys.argv[1:])
+        hear_no_more()
+    except KeyboardInterrupt:
+        hear_no_more()
+        status = _interrupted()
+    # If Ctrl-C ended code that `exec` ran, Python notes it and would end by the signal in place of `status`;
+    # a further `exec` resets that note.
+    exec("")
+    end_despite_threads(status)
+    return status
+
+
+def _run(arguments: Sequence[str]) -> int:
+    try:
+        with heard_again():
+            return _concluded(list(arguments))
+    except KeyboardInterrupt:
+        return _interrupted()
+
+
+def _concluded(arguments: list[str]) -> int:
+    """Run a command and tell of what it raised; return its exit status."""
+    from dubins_traffic.cli import faults
+
+    faults.open_streams()
+    try:
+        from dubins_traffic.cli.commands import app
+
         with faults.debugging("--debug" in arguments):
             status = app(arguments, prog_name=faults.PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except SystemExit as error:
         return faults.conclude_exit(error, arguments)
     except Exception as error:
-        return faults.conclude(error, arguments)
-    return faults.FAILED if status == INTERRUPTED else int(status or faults.OK)
+        return _interrupted() if _is_interrupt(error) else faults.conclude(error, arguments)
+    return _interrupted() if status == INTERRUPTED else int(status or faults.OK)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Tell whether an error is Ctrl-C in other words, as Python says of one that comes while it makes a class."""
+    return isinstance(error, KeyboardInterrupt) or (error is not None and _is_interrupt(error.__cause__))
+
+
+def _interrupted() -> int:
+    """Tell that Ctrl-C came while there was nothing to keep; return the exit status."""
+    print("dubins-traffic: interrupted", file=sys.stderr)
+    return FAILED

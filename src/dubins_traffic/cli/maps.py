@@ -13,6 +13,7 @@ from dubins_traffic.cli import options
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
+    from dubins_traffic.roads.maps.losses import Losses
     from dubins_traffic.roads.network import RoadNetwork
 
 LossesOption = Annotated[
@@ -25,23 +26,55 @@ LossesOption = Annotated[
 ]
 
 
-def imported(file: str, scale: float | None, w: float, tolerance: float) -> RoadNetwork:
-    """Return the network that a file holds, of whatever format; InputError if it holds none, or nothing can be held."""
+def imported(file: str, scale: float | None, w: float | None, tolerance: float) -> RoadNetwork:
+    """Return the network that a file holds, of whatever format; InputError if it holds none, or nothing can be held.
+
+    Where a scale is given and `w` is not, that is half a lane of the map at the scale.
+    """
     from dubins_traffic.files import read_text
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.formats.foreign import ForeignFormat
-    from dubins_traffic.roads.maps.settings import ImportSettings
+    from dubins_traffic.roads.maps.settings import ImportSettings, W
     from dubins_traffic.roads.network import RoadNetwork
 
     text = read_text(file)
     form = formats.of_text(text)
     if not isinstance(form, ForeignFormat):
+        require_no_scale(file, scale, w)
         return RoadNetwork.from_text(text, file, form)
-    settings = ImportSettings(w=w, scale=scale, tolerance=tolerance)
-    document, losses = form.reduced(text, file, settings)
+    settings = ImportSettings(w=W if w is None else w, scale=scale, tolerance=tolerance)
+    own = scale is not None and w is None
+    document, losses = form.reduced(text, file, settings, own_lanes=own)
     network = RoadNetwork.from_document(document, file)
     network.known[formats.LOSSES] = losses
     return network
+
+
+def require_no_scale(source: str | None, scale: float | None, w: float | None) -> None:
+    """Refuse a scale and a `w` where the network in `source` comes from no map of another program."""
+    for name, given in (("--scale", scale), ("--w", w)):
+        if given is not None:
+            raise InputError(
+                "nothing to reduce", file=name, value=source, expected="--from a map of another program"
+            )
+
+
+def require_outputs(network: RoadNetwork | None, outputs: list[str] | None) -> None:
+    """Refuse files to which what was lost can't be written, before anything is: as `report` would."""
+    if not outputs:
+        return
+
+    from dubins_traffic.files import require_place
+    from dubins_traffic.viewer.plot import require_picture
+
+    if _losses(network) is None:
+        raise InputError(
+            "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
+        )
+    for output in outputs:
+        if not _is_json(output):
+            require_picture(Path(output))
+        require_place(Path(output))
 
 
 def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> None:
@@ -50,23 +83,30 @@ def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> Non
     Nothing is told of networks that come from no map of another program, and where there is none (None).
     """
     from dubins_traffic.files import write_text
-    from dubins_traffic.roads.formats import registry as formats
-    from dubins_traffic.roads.maps.losses import Losses
 
-    losses = None if network is None else network.known.get(formats.LOSSES)
-    if not isinstance(losses, Losses):
-        if outputs:
-            raise InputError(
-                "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
-            )
+    losses = _losses(network)
+    if losses is None:
         return
     for line in losses.lines():
         print(line, file=sys.stderr)
     for output in outputs or []:
-        if Path(output).suffix.lower() == ".json":
+        if _is_json(output):
             write_text(output, json.dumps(losses.document(), indent=1) + "\n")
         else:
             from dubins_traffic.viewer.losses import write_losses
 
             write_losses(output, losses)
         options.tell(output)
+
+
+def _losses(network: RoadNetwork | None) -> Losses | None:
+    """Return what was lost of the map from which a network comes, None where it comes from none."""
+    from dubins_traffic.roads.formats import registry as formats
+    from dubins_traffic.roads.maps.losses import Losses
+
+    found = None if network is None else network.known.get(formats.LOSSES)
+    return found if isinstance(found, Losses) else None
+
+
+def _is_json(output: str) -> bool:
+    return Path(output).suffix.lower() == ".json"

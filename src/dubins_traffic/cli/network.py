@@ -25,42 +25,67 @@ class Format(StrEnum):
     TEXT = "text"
 
 
+IntersectionsOption = Annotated[
+    int | None,
+    typer.Option("--intersections", metavar="N", help="Draw a random network of N intersections"),
+]
+SegmentsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--segments", metavar="M", help="With --intersections: M segments, N-1 up to floor(2N - 2 sqrt N)."
+    ),
+]
+GridOption = Annotated[
+    tuple[int, int] | None,
+    typer.Option("--grid", metavar="ROWS COLS", help="The complete grid.", show_default="3 4"),
+]
+BentOption = Annotated[
+    float,
+    typer.Option(
+        "--bent",
+        metavar="SHARE",
+        min=0.0,
+        max=1.0,
+        help="With --intersections: about so many of the segments bend, 0 to 1.",
+    ),
+]
+SourceOption = Annotated[
+    str | None,
+    typer.Option("--from", metavar="FILE", help="The network that a map of another program holds."),
+]
+ScaleOption = Annotated[
+    float | None,
+    typer.Option(
+        "--scale",
+        metavar="K",
+        help="Metres of it for a metre of the map.",
+        show_default="a lane is 2w wide",
+    ),
+]
+WidthOption = Annotated[
+    float | None,
+    typer.Option(
+        "--w",
+        metavar="W",
+        help="Half the width of its lanes, metres.",
+        show_default="0.3; with --scale half a lane of the map",
+    ),
+]
+ToleranceOption = Annotated[
+    float,
+    typer.Option("--tolerance", metavar="D", help="How far a road may be from the map's, metres of the map."),
+]
+
+
 def network(
-    intersections: Annotated[
-        int | None,
-        typer.Option("--intersections", metavar="N", help="Draw a random network of N intersections"),
-    ] = None,
-    segments: Annotated[
-        int | None,
-        typer.Option("--segments", metavar="M", help="and M segments, N-1 up to floor(2N - 2 sqrt N)."),
-    ] = None,
-    grid: Annotated[
-        tuple[int, int] | None,
-        typer.Option("--grid", metavar="ROWS COLS", help="The complete grid.", show_default="3 4"),
-    ] = None,
-    bent: Annotated[
-        float, typer.Option("--bent", metavar="SHARE", min=0.0, max=1.0, help="of which about a SHARE bend.")
-    ] = 0.0,
-    source: Annotated[
-        str | None,
-        typer.Option("--from", metavar="FILE", help="The network that a map of another program holds."),
-    ] = None,
-    scale: Annotated[
-        float | None,
-        typer.Option(
-            "--scale",
-            metavar="K",
-            help="Metres of it for a metre of the map.",
-            show_default="a lane is 2w wide",
-        ),
-    ] = None,
-    w: Annotated[float, typer.Option("--w", metavar="W", help="Half the width of its lanes, metres.")] = 0.3,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            "--tolerance", metavar="D", help="How far a road may be from the map's, metres of the map."
-        ),
-    ] = 0.1,
+    intersections: IntersectionsOption = None,
+    segments: SegmentsOption = None,
+    grid: GridOption = None,
+    bent: BentOption = 0.0,
+    source: SourceOption = None,
+    scale: ScaleOption = None,
+    w: WidthOption = None,
+    tolerance: ToleranceOption = 0.1,
     losses: maps.LossesOption = None,
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
@@ -70,6 +95,8 @@ def network(
     from dubins_traffic.roads.generate import generate
     from dubins_traffic.roads.network import RoadNetwork
 
+    if source is None:
+        maps.require_no_scale(None, scale, w)
     if source is not None:
         if (intersections, segments, grid) != (None, None, None):
             raise InputError(
@@ -88,5 +115,6 @@ def network(
         raise InputError("missing", file=missing, expected="both --intersections and --segments")
     else:
         made = generate(intersections, segments, seed, bent=bent)
+    maps.require_outputs(made, losses)
     options.write(made.to_json() if format is Format.JSON else made.to_text(), output)
     maps.report(made, losses)

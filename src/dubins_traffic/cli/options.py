@@ -13,7 +13,7 @@ from dubins_traffic.errors import InputError, shown
 
 
 def examples(*lines: str) -> str:
-    """Return the foot of a help text: `lines` as commands, each on its own line."""
+    """Return the section of examples of a help text: `lines` as commands, each on its own line."""
     keep_line_breaks = "\b"
     return "\n".join([keep_line_breaks, "[b]Examples[/b]", *(f"$ dubins-traffic {line}" for line in lines)])
 
@@ -55,7 +55,22 @@ Config = Annotated[
         autocompletion=shipped,
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", metavar="S", min=0, help="What all random numbers follow from.")]
+Trials = Annotated[
+    int | None,
+    typer.Option(
+        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
+    ),
+]
+Controller = Annotated[
+    str,
+    typer.Option(
+        "--controller",
+        metavar="C",
+        help="A built-in name, module:Class or path/to/file.py:Class; `rules` runs compiled.",
+        autocompletion=controllers,
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", metavar="S", min=0, help="Seed of all random numbers.")]
 Output = Annotated[
     str | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
@@ -70,7 +85,7 @@ Sandbox = Annotated[
     bool,
     typer.Option(
         "--sandbox",
-        help="The controller drives in a box (docs/sandbox.md), and nothing of it is loaded here.",
+        help="Run the controller in a box (docs/sandbox.md); none of its code is loaded here.",
     ),
 ]
 Limits = Annotated[
@@ -78,13 +93,13 @@ Limits = Annotated[
     typer.Option(
         "--limits",
         metavar="LIMITS",
-        help="What it may use there, as memory=512M,decision_seconds=0.1; implies --sandbox.",
+        help="Limits of the box, as memory=512M,decision_seconds=0.1; implies --sandbox.",
         show_default="as `sandbox check` shows",
     ),
 ]
 Trust = Annotated[
     bool,
-    typer.Option("--trust-submissions", help="Also where this machine can't enforce all limits."),
+    typer.Option("--trust-submissions", help="Run it even if this machine can't enforce all limits."),
 ]
 Metrics = Annotated[
     list[str] | None,
@@ -95,6 +110,13 @@ Metrics = Annotated[
         autocompletion=metrics,
     ),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
+    ),
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run that was begun in DIR.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 Data = Annotated[
     str | None,
@@ -112,20 +134,23 @@ DataOver = Annotated[
     ),
 ]
 Network = Annotated[
-    str | None, typer.Option("--rnd", metavar="FILE", help="A road network instead of the configuration's.")
+    str | None,
+    typer.Option("--rnd", metavar="FILE", help="A road network that replaces the configuration's."),
 ]
 Records = Annotated[
     str | None, typer.Option("--records", metavar="DIR", help="Folder for the records, made if missing.")
 ]
 Overwrite = Annotated[
     bool,
-    typer.Option("--overwrite", help="Remove the records that are in DIR before; else they are refused."),
+    typer.Option(
+        "--overwrite", help="Remove the records that DIR holds first; by default such a DIR is refused."
+    ),
 ]
 Append = Annotated[
     bool,
     typer.Option(
         "--append",
-        help="Leave the records in DIR that are of the same run, and run the trials that have none.",
+        help="Keep the records in DIR, which must be of the same run, and run the trials that have none.",
     ),
 ]
 Source = Annotated[
@@ -141,12 +166,12 @@ Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap
 
 
 def boxes(sandbox: bool, limits: str, trust: bool) -> str | None:
-    """Return what ends the names of controllers that drive in boxes (`controllers.registry.sandboxed`), None for none.
+    """Return the limits of the box in which controllers drive (`controllers.registry.sandboxed`), None without a box.
 
     Raises
     ------
     InputError
-        If there are no such limits, or it is to trust what is not in a box.
+        If the limits can't be read, or `trust` is given without a box.
     """
     if not sandbox and not limits:
         if trust:
@@ -172,7 +197,7 @@ def trial_data(data: str | None, data_over: str | None) -> str | None:
 
 
 def write(text: str, output: str | None) -> None:
-    """Print `text`, or write it to the file `output`, whole or not at all, and say so."""
+    """Print `text`, or write it to the file `output`, whole or not at all, and name the file on standard error."""
     if output is None or output == "-":
         sys.stdout.write(text)
         return
@@ -183,19 +208,19 @@ def write(text: str, output: str | None) -> None:
 
 
 def beside(file: str, suffix: str) -> str:
-    """Return the name of an output that was not given: `file` with another suffix.
+    """Return the default name of an output: `file` with another suffix.
 
     Raises
     ------
     InputError
-        If `file` is standard input, which has no name.
+        If `file` is standard input or a folder such as ``.``, which have no name.
     """
-    if file == "-":
+    if file == "-" or not Path(file).name:
         raise InputError("missing", file="--output", expected=f"a file to write, such as out{suffix}")
     return str(Path(file).with_suffix(suffix))
 
 
 def tell(*outputs: str) -> None:
-    """Say which files have been written, a line each on standard error: standard output is for what was asked."""
+    """Name the files that have been written on standard error, a line each; standard output is for results."""
     for output in outputs:
         print(shown(output), file=sys.stderr)

@@ -34,14 +34,8 @@ ControllerOption = Annotated[
         autocompletion=options.controllers,
     ),
 ]
-TrialsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
-    ),
-]
 RepeatOption = Annotated[
-    int, typer.Option("--repeat", metavar="N", min=1, help="How many times each trial is run.")
+    int, typer.Option("--repeat", metavar="N", min=1, help="Number of times that each trial is run.")
 ]
 SeedOption = Annotated[
     int | None,
@@ -49,7 +43,7 @@ SeedOption = Annotated[
         "--seed",
         metavar="S",
         min=0,
-        help="What all random numbers follow from.",
+        help="Seed of all random numbers.",
         show_default="0",
     ),
 ]
@@ -76,7 +70,7 @@ GuiOption = Annotated[
 def run(
     source: options.Source,
     controller: ControllerOption = None,
-    trials: TrialsOption = None,
+    trials: options.Trials = None,
     repeat: RepeatOption = 1,
     seed: SeedOption = None,
     jobs: JobsOption = 1,
@@ -133,7 +127,7 @@ def run(
 def _run(
     todo: Plan, jobs: int, records: str | None, *, json: bool, hidden: bool
 ) -> tuple[list[Result], WorkerLostError | None]:
-    """Run what is to do and show its scores; return the results, and what is said of a worker that was lost."""
+    """Run the jobs of a plan and show the scores; return the results, and the error if a worker was lost."""
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
     from dubins_traffic.runs.jobs import run_trials
@@ -141,13 +135,13 @@ def _run(
     results: list[Result] = []
     lost: WorkerLostError | None = None
     try:
-        with faults.no_silent_end(), progress(len(todo.jobs), hidden=hidden) as tell:
+        with faults.controllers_drive(), progress(len(todo.jobs), hidden=hidden) as tell:
             for result in run_trials(todo.jobs, jobs):
                 results.append(result)
                 tell(len(results), len(todo.jobs))
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
-        raise
+        raise typer.Exit(faults.FAILED) from None
     except WorkerLostError as error:
         lost = error
     finally:

@@ -16,38 +16,45 @@ EXAMPLES = options.examples(
 )
 
 
+WorkersOption = Annotated[
+    int, typer.Option("--workers", metavar="N", min=0, help="Workers beside the server, on this machine.")
+]
+PortOption = Annotated[
+    int, typer.Option("--port", metavar="P", min=0, max=65535, help="Port; 0: any that is free.")
+]
+CompetitionOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--competition",
+        metavar="PATH",
+        help="A competition file, or the folder of one, made unless it is there; may be given several times.",
+    ),
+]
+KeyFileOption = Annotated[
+    str | None,
+    typer.Option(
+        "--key-file",
+        metavar="FILE",
+        help="Key of secret seeds, outside DIR; drawn if missing.",
+        show_default="in your configuration folder",
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
+    ),
+]
+
+
 def serve(
     folder: Annotated[str, typer.Argument(metavar="DIR", help="The folder of the service, made if missing.")],
-    workers: Annotated[
-        int, typer.Option("--workers", metavar="N", min=0, help="Workers beside the server, on this machine.")
-    ] = 1,
+    workers: WorkersOption = 1,
     host: Annotated[str, typer.Option("--host", metavar="H", help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[
-        int, typer.Option("--port", metavar="P", min=0, max=65535, help="Port; 0: any that is free.")
-    ] = 8000,
-    competition: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--competition",
-            metavar="PATH",
-            help="A competition file, or the folder of one, made unless it is there; may be given several times.",
-        ),
-    ] = None,
-    key_file: Annotated[
-        str | None,
-        typer.Option(
-            "--key-file",
-            metavar="FILE",
-            help="Key of secret seeds, outside DIR; drawn if missing.",
-            show_default="in your configuration folder",
-        ),
-    ] = None,
-    trust: Annotated[
-        bool,
-        typer.Option(
-            "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
-        ),
-    ] = False,
+    port: PortOption = 8000,
+    competition: CompetitionOption = None,
+    key_file: KeyFileOption = None,
+    trust: TrustOption = False,
 ) -> None:
     """Serve competitions on the web: accounts, a queue, workers that judge, tables, replays.
 

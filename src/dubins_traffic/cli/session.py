@@ -1,12 +1,10 @@
-"""What the commands that run trials over a transport share: their options, and how they go."""
+"""The commands that run trials over a transport: their common options, and how they run a session."""
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from inspect import Parameter, Signature, signature
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
@@ -33,34 +31,36 @@ Remote = Annotated[
     list[str] | None,
     typer.Option("--remote", metavar="NAME", help="An e-agent that is driven elsewhere; may be repeated."),
 ]
-Trials = Annotated[
-    int | None,
-    typer.Option("--trials", metavar="N", min=1, help="How many.", show_default="as the configuration says"),
-]
 Endless = Annotated[bool, typer.Option("--endless", help="Run trials until interrupted.")]
 Lockstep = Annotated[
-    bool, typer.Option("--lockstep", help="Wait for a command of every remote car each tick.")
+    bool, typer.Option("--lockstep", help="Wait for a command of every remote car in each tick.")
 ]
 Factor = Annotated[
-    float, typer.Option("--factor", metavar="F", help="How many times as fast as the wall clock.")
+    float, typer.Option("--factor", metavar="F", help="Speed of simulated time relative to the wall clock.")
 ]
-Deadline = Annotated[float, typer.Option("--deadline", metavar="SECONDS", help="For a command, in lockstep.")]
+Deadline = Annotated[
+    float, typer.Option("--deadline", metavar="SECONDS", help="Longest wait for a command, in lockstep.")
+]
 Begin = Annotated[
-    float, typer.Option("--begin", metavar="SECONDS", help="For the first command after the instance.")
+    float,
+    typer.Option(
+        "--begin", metavar="SECONDS", help="Longest wait for the first command after the announcement."
+    ),
 ]
 Silence = Annotated[
-    float, typer.Option("--silence", metavar="SECONDS", help="Without any command, in real time.")
+    float,
+    typer.Option("--silence", metavar="SECONDS", help="Longest time without any command, in real time."),
 ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionOptions:
-    """What the options say that all of these commands share."""
+    """The values of the options that all of these commands share."""
 
     source: options.Source
     controller: Controller = None
     remote: Remote = None
-    trials: Trials = None
+    trials: options.Trials = None
     endless: Endless = False
     lockstep: Lockstep = False
     factor: Factor = 1.0
@@ -78,7 +78,7 @@ class SessionOptions:
     json: options.Json = False
 
     def session_plan(self) -> SessionPlan:
-        """Return what the session shall run."""
+        """Return the plan of the session."""
         from dubins_traffic.sessions.plan import session_plan
 
         todo = session_plan(
@@ -90,7 +90,7 @@ class SessionOptions:
         return replace(todo, say=faults.tell)
 
     def pace(self) -> Pace:
-        """Return how drivers are waited for."""
+        """Return the pace of the session: its clock, and how long drivers are waited for."""
         from dubins_traffic.sessions.plan import Pace
         from dubins_traffic.transports.patience import Patience
 
@@ -111,7 +111,7 @@ def app(name: str, entry: TransportEntry) -> typer.Typer:
 def command(name: str, entry: TransportEntry) -> Callable[..., None]:
     """Return the function that runs a session over a transport, with its own options and those of `SessionOptions`.
 
-    The library reads options off a signature, so this makes one.
+    Typer reads options off a signature, so this function makes one.
     """
 
     def run(**given: Any) -> None:
@@ -134,7 +134,7 @@ def command(name: str, entry: TransportEntry) -> Callable[..., None]:
 
 
 def _parameter(own: Option) -> Parameter:
-    """Return an option of a transport as the library wants it."""
+    """Return an option of a transport as a parameter for Typer."""
     kind: Any = own.kind if own.default is not None else own.kind | None
     shown: Any = {} if own.shown is None else {"show_default": own.shown}
     said = typer.Option(own.flag, metavar=own.metavar, min=own.low, max=own.high, help=own.help, **shown)
@@ -153,12 +153,11 @@ def _check_remappings(name: str, arguments: list[str]) -> None:
 
 
 def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> None:
-    """Run a session's trials, say how each ended and show the scores; SIGTERM ends it as Ctrl-C does."""
+    """Run a session's trials, say how each ended and show the scores."""
     from dubins_traffic.cli.tables import show
     from dubins_traffic.record.sink import FAULTS
 
     results: list[Result] = []
-    signal.signal(signal.SIGTERM, _interrupt)
     try:
         for result in session:
             results.append(result)
@@ -166,13 +165,9 @@ def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> 
             faults.tell(f"trial {result.instance.trial}: {ending}")
     except KeyboardInterrupt:
         faults.tell(f"interrupted after {len(results)} trials")
-        raise
+        raise typer.Exit(faults.FAILED) from None
     finally:
         if results:
             show(todo.conclude(results), json=json)
     if any(result.ending.end in FAULTS for result in results):
         raise typer.Exit(faults.FAILED)
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt

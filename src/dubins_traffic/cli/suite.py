@@ -90,52 +90,54 @@ def _values(found: Suite, factor: str) -> list[str]:
     return list(dict.fromkeys(str(cell.values[factor]) for cell in cells))
 
 
+FolderOption = Annotated[
+    str,
+    typer.Option("--output", "-o", metavar="DIR", help="Folder, made if missing.", show_default=False),
+]
+ControllersOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--controller",
+        metavar="C",
+        help="A controller, as `run` takes it; may be given several times.",
+        show_default="those of the suite's page: built-in ones, with and without the shield",
+        autocompletion=options.controllers,
+    ),
+]
+TrialsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--trials",
+        metavar="N",
+        min=1,
+        help="Only the first N trials of each combination: no results of the whole suite.",
+    ),
+]
+SolverOption = Annotated[
+    str | None,
+    typer.Option(
+        "--solver",
+        metavar="COMMAND",
+        help="Who solves the games of a suite: a command with a word {game} for the exported game.",
+        show_default="dubins-traffic itself",
+    ),
+]
+SecondsOption = Annotated[
+    float,
+    typer.Option("--seconds", metavar="S", min=0.001, help="Longest time of that command for one game."),
+]
+
+
 @suite.command("run", epilog=RUN_EXAMPLES)
 def run(
     name: Name,
-    folder: Annotated[
-        str,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder, made if missing.", show_default=False),
-    ],
-    controllers: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--controller",
-            metavar="C",
-            help="A controller, as `run` takes it; may be given several times.",
-            show_default="those of the suite's page: built-in ones, with and without the shield",
-            autocompletion=options.controllers,
-        ),
-    ] = None,
-    trials: Annotated[
-        int | None,
-        typer.Option(
-            "--trials",
-            metavar="N",
-            min=1,
-            help="Only the first N trials of each combination: no results of the whole suite.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
-        ),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what has been begun in DIR.")] = False,
-    solver: Annotated[
-        str | None,
-        typer.Option(
-            "--solver",
-            metavar="COMMAND",
-            help="Who solves the games of a suite: a command with a word {game} for the exported game.",
-            show_default="dubins-traffic itself",
-        ),
-    ] = None,
-    seconds: Annotated[
-        float,
-        typer.Option("--seconds", metavar="S", min=0.001, help="Longest time of that command for one game."),
-    ] = 600.0,
+    folder: FolderOption,
+    controllers: ControllersOption = None,
+    trials: TrialsOption = None,
+    workers: options.Workers = None,
+    resume: options.Resume = False,
+    solver: SolverOption = None,
+    seconds: SecondsOption = 600.0,
 ) -> None:
     """Run a suite, or what is left of it; write a file of results to send, and a page. What is finished is kept."""
     from dubins_traffic.suites.comparing import open_sources
@@ -248,16 +250,20 @@ def compare(
     ] = None,
 ) -> None:
     """Compare results of one suite: a table here, and a page. Results of different hashes are refused."""
-    from dubins_traffic.suites.comparing import open_sources
-    from dubins_traffic.suites.suite import load_suite
+    from dubins_traffic.suites.comparing import made_by, open_sources
+    from dubins_traffic.suites.suite import load_suite, shipped_suites
     from dubins_traffic.suites.writing import PAGE, TABLE, results, write_results
 
     sources = open_sources(places)
-    found = load_suite(name or sources[0].found.suite)
+    first = sources[0].found.suite
+    if name is None and first not in shipped_suites():
+        file, expected = str(sources[0].path), "its file, by --suite"
+        raise InputError("results of a suite that is not shipped", file=file, value=first, expected=expected)
+    found = load_suite(name or first)
     if output is None:
         print(results(found, sources)[TABLE], end="")
     else:
         print(write_results(found, sources, Path(output)), end="")
         options.tell(str(Path(output) / PAGE))
     if len({source.found.code for source in sources}) > 1:
-        faults.tell("these results were made by different versions of the code")
+        faults.tell(made_by(sources))

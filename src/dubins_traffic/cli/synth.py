@@ -201,4 +201,4 @@ def _progress() -> Generator[Callable[[str, float], object]]:
             yield lambda what, share: progress.update(task, description=what, completed=share)
         except KeyboardInterrupt:
             faults.tell("interrupted: the game is not solved")
-            raise
+            raise typer.Exit(faults.FAILED) from None

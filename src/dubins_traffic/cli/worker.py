@@ -17,53 +17,59 @@ EXAMPLES = options.examples(
 )
 
 
+TokenFileOption = Annotated[
+    str | None,
+    typer.Option(
+        "--token-file",
+        metavar="FILE",
+        help="The token that the organiser's desk gave for this worker.",
+        show_default="DUBINS_TRAFFIC_TOKEN of the environment",
+    ),
+]
+NameOption = Annotated[
+    str | None,
+    typer.Option("--name", metavar="NAME", help="What the service calls it.", show_default="this machine's"),
+]
+FolderOption = Annotated[
+    str | None,
+    typer.Option(
+        "--folder", metavar="DIR", help="For submissions, unpacked.", show_default="in your cache folder"
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
+    ),
+]
+RayOption = Annotated[
+    str | None,
+    typer.Option(
+        "--ray",
+        metavar="ADDRESS",
+        help="Be carried by a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
+    ),
+]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        metavar="N",
+        min=1,
+        help="Workers on the Ray cluster.",
+        show_default="one for each of its processors",
+    ),
+]
+
+
 def worker(
     url: Annotated[str, typer.Argument(metavar="URL", help="Address of the service.")],
-    token_file: Annotated[
-        str | None,
-        typer.Option(
-            "--token-file",
-            metavar="FILE",
-            help="The token that the organiser's desk gave for this worker.",
-            show_default="DUBINS_TRAFFIC_TOKEN of the environment",
-        ),
-    ] = None,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            "--name", metavar="NAME", help="What the service calls it.", show_default="this machine's"
-        ),
-    ] = None,
-    folder: Annotated[
-        str | None,
-        typer.Option(
-            "--folder", metavar="DIR", help="For submissions, unpacked.", show_default="in your cache folder"
-        ),
-    ] = None,
-    trust: Annotated[
-        bool,
-        typer.Option(
-            "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
-        ),
-    ] = False,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            "--ray",
-            metavar="ADDRESS",
-            help="Be carried by a Ray cluster: host:port, ray://host:port, auto, or local for one of its own.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers",
-            metavar="N",
-            min=1,
-            help="Workers on the Ray cluster.",
-            show_default="one for each of its processors",
-        ),
-    ] = None,
+    token_file: TokenFileOption = None,
+    name: NameOption = None,
+    folder: FolderOption = None,
+    trust: TrustOption = False,
+    ray: RayOption = None,
+    workers: WorkersOption = None,
     with_parent: Annotated[bool, typer.Option("--with-parent", hidden=True)] = False,
 ) -> None:
     """Judge trials for a service, which may be on another machine; start as many as there are cores to spare.

@@ -23,6 +23,7 @@ from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.files import locked, read_text, replace_file
 from dubins_traffic.runs.jobs import deaf_to_interrupts
+from dubins_traffic.runs.parent_watch import prepare_worker
 
 RESULTS = "results.jsonl"
 
@@ -220,6 +221,7 @@ _works: list[_Work] = []
 
 def _begin(work: _Work) -> None:
     _works[:] = [work]
+    prepare_worker()
 
 
 def _judged(number: int) -> Judged:

@@ -1,7 +1,7 @@
-"""What is said of an exception that a controller raised: in one line, with the lines of its own that led there.
+"""The text about an exception that a controller raised: one line, with the controller's own lines that led there.
 
-The line stands in records, whose bytes are the same on every machine: files go by their bare names, and where on this
-machine something lies is left out.
+The text stands in records, whose bytes must be the same on every machine: files are given by their bare names, and
+folders and addresses are left out.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from types import TracebackType
 from dubins_traffic.errors import DubinsTrafficError, shown
 
 DEBUG = "DUBINS_TRAFFIC_DEBUG"
-"""Name of the environment variable that has all tracebacks of controllers printed; `--debug` sets it."""
+"""Environment variable that makes whole tracebacks of controllers be printed; `--debug` sets it."""
 LINES = 3
-"""So many lines of a traceback are told, the last ones."""
+"""Number of lines of a traceback that the text has, the last ones."""
 LONGEST = 300
 """Most characters of a message."""
 LONGEST_LINE = 80
@@ -35,7 +35,7 @@ _CELL = re.compile(r"ipykernel_\d+[\\/]|^<ipython-input")
 
 
 def error_text(error: BaseException, tick: int | None = None) -> str:
-    """Return kind and message of what a controller raised, when, and the last lines of its own that led there.
+    """Return kind and message of an error that a controller raised, its tick, and the controller's last lines.
 
     Examples
     --------
@@ -43,17 +43,17 @@ def error_text(error: BaseException, tick: int | None = None) -> str:
     'ValueError: lost at tick 7'
     """
     when = "" if tick is None else f" at tick {tick}"
-    lines = [] if isinstance(error, DubinsTrafficError) else list(_own_lines(error.__traceback__))[-LINES:]
+    lines = [] if isinstance(error, DubinsTrafficError) else list(_own_lines(_frames(error)))[-LINES:]
     return f"{_named(error)}{when}{_lines_text(lines)}"
 
 
 def value_text(value: object, limit: int = LONGEST) -> str:
-    """Return what `value` is as a line of text, whatever its `repr` does."""
+    """Return `value` as a line of text, even if its `repr` raises."""
     return _clean(_text(repr, value), limit)
 
 
 def show(error: BaseException) -> None:
-    """Print the whole traceback of what a controller raised, if that is asked for."""
+    """Print the whole traceback of an error that a controller raised, if `DEBUG` asks for it."""
     if os.environ.get(DEBUG):
         traceback.print_exception(error)
 
@@ -63,22 +63,32 @@ def _lines_text(lines: list[str]) -> str:
 
 
 def _named(error: BaseException) -> str:
-    message = _clean(_text(str, error), LONGEST)
-    return f"{type(error).__name__}: {message}" if message else type(error).__name__
+    message, name = _clean(_text(str, error), LONGEST), _type_name(error)
+    return f"{name}: {message}" if message else name
+
+
+def _type_name(value: object) -> str:
+    """Return the name of a value's type, whatever its metaclass makes of that."""
+    return type.__dict__["__name__"].__get__(type(value))
+
+
+def _frames(error: BaseException) -> TracebackType | None:
+    """Return the traceback of an exception, whatever its class makes of that."""
+    return BaseException.__dict__["__traceback__"].__get__(error)
 
 
 def _text(make: Callable[[object], str], value: object) -> str:
-    """Return str or repr of something of a controller's, which may itself raise."""
+    """Return ``make(value)``, which is str or repr of a controller's object and may raise."""
     try:
         return make(value)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # what can't even be printed
-        return f"<{type(value).__name__} that raises {type(error).__name__} when it is printed>"
+    except BaseException as error:  # str or repr of a user's object may raise anything
+        return f"<{_type_name(value)} that raises {_type_name(error)} when it is printed>"
 
 
 def _clean(text: str, limit: int) -> str:
-    """Return `text` as one line without what differs from machine to machine: addresses, folders."""
+    """Return `text` as one line without addresses and folders, which differ between machines."""
     text = _LABEL.sub(r"\1", _ADDRESS.sub("", text))
     if os.sep in text:
         for folder in sorted(_folders(), key=len, reverse=True):
@@ -88,11 +98,10 @@ def _clean(text: str, limit: int) -> str:
 
 def _folders() -> set[str]:
     """Return the folders, each with a separator at its end, that mean something on this machine only."""
-    found = {str(Path(place).absolute()) for place in sys.path if place}
-    with contextlib.suppress(
-        OSError, RuntimeError
-    ):  # the current folder may have been removed, a home be unknown
-        found |= {str(Path.cwd()), str(Path.home())}
+    found: set[str] = set()
+    for make in (*(Path(place).absolute for place in sys.path if place), Path.cwd, Path.home):
+        with contextlib.suppress(OSError, RuntimeError):  # the current folder was removed, a home is unknown
+            found.add(str(make()))
     return {place.rstrip(os.sep) + os.sep for place in found} - {os.sep}
 
 

@@ -16,11 +16,11 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Problem
 
 SPEED_STEP, YAW_STEP = 0.1, 0.3
-"""What one press of a key changes, m/s and rad/s."""
+"""Change of speed and yaw rate by one press of a key, m/s and rad/s."""
 DRAWINGS = 15.0
-"""Drawings a second, at most."""
+"""Most drawings per second."""
 WAKING = 0.25
-"""Seconds after which it is drawn anew while the first key is waited for: the window may have changed."""
+"""Seconds between drawings before the first key is pressed: the window may have changed."""
 MARGIN = 1.0
 """Metres shown around the network."""
 ARROWS = "→↗↑↖←↙↓↘"
@@ -29,11 +29,11 @@ HELP = "up, down: speed   left, right: turn   space: stop   q: give up"
 LEGEND = f"{ARROWS[0]} you   o ' another car and its front   1, 2, ... goals   · roads"
 WAITING = "press a key of the last line to start"
 ENTER, LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
-"""To another screen without cursor, and back."""
+"""Escape sequences: to the alternate screen without cursor, and back."""
 
 
 class Keyboard:
-    """Drives as the keys say, in real time; the map goes to standard error.
+    """Drives by keys, in real time; the map is drawn on standard error.
 
     Raises
     ------
@@ -49,7 +49,7 @@ class Keyboard:
         self._before: list[object] | None = None
 
     def start(self, problem: Problem) -> None:
-        """Take the terminal."""
+        """Set the terminal to read single keys."""
         self._problem = problem
         self._map = Map(problem)
         self._speed = self._yaw_rate = 0.0
@@ -61,7 +61,7 @@ class Keyboard:
         _write(ENTER)
 
     def act(self, observation: Observation) -> Command | None:
-        """Wait until the tick is due, look at the keys, draw; before the first tick, wait for the first key."""
+        """Wait until the tick is due, read keys, draw; before the first tick wait for a first key."""
         if self._waits:
             self._wait_for_a_key(observation)
         self._next += self._problem.period
@@ -69,7 +69,7 @@ class Keyboard:
         if self._next > now:
             sleep(self._next - now)
         else:
-            self._next = now  # what is late is not hurried after
+            self._next = now  # lost time is not caught up with
         self._press(_typed())
         if self._next - self._drawn >= 1.0 / DRAWINGS:
             self._drawn = self._next
@@ -77,7 +77,7 @@ class Keyboard:
         return None if self._given_up else Command(self._speed, self._yaw_rate)
 
     def _wait_for_a_key(self, observation: Observation) -> None:
-        """Show where everything is until a key of ours is pressed; time begins then."""
+        """Draw the map until one of the known keys is pressed; time begins then."""
         self._waits = False
         typed = ""
         while not any(key in typed for key in KEYS):
@@ -87,7 +87,7 @@ class Keyboard:
         self._next = self._drawn = monotonic()
 
     def close(self) -> None:
-        """Give the terminal back as it was."""
+        """Restore the terminal's settings."""
         before, self._before = self._before, None
         if before is not None:
             _write(LEAVE)
@@ -113,7 +113,7 @@ class Keyboard:
                 case "quit":
                     self._given_up = True
                 case _:
-                    pass  # no key of ours
+                    pass  # an unknown key
         self._speed = min(bounds.speed, max(bounds.speed_low, self._speed))
         self._yaw_rate = min(bounds.yaw_rate, max(-bounds.yaw_rate, self._yaw_rate))
 
@@ -135,7 +135,7 @@ class Map:
     Parameters
     ----------
     problem : Problem
-        Whose network.
+        The problem with the roads and goals to draw.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -147,7 +147,7 @@ class Map:
         self._width, self._height = max(xs) + MARGIN - self._left, max(ys) + MARGIN - self._bottom
 
     def draw(self, observation: Observation, columns: int, rows: int) -> list[str]:
-        """Return the map in so many columns and rows; a character counts as twice as high as wide."""
+        """Return the map as `rows` lines of `columns` characters; a character counts as twice as high as wide."""
         columns, rows = max(1, columns), max(1, rows)
         scale = min(columns / self._width, 2.0 * rows / self._height)
         cells = [[" "] * columns for _ in range(rows)]
@@ -185,7 +185,7 @@ def _ahead(pose: Pose, distance: float) -> tuple[float, float]:
 
 
 def _typed(patience: float = 0.0) -> str:
-    """Return what has been typed, at the latest after so many seconds."""
+    """Return what has been typed, waiting at most `patience` seconds."""
     file = sys.stdin.fileno()
     if not select([file], [], [], patience)[0]:
         return ""

@@ -10,13 +10,13 @@ from math import hypot, inf
 
 import numpy as np
 
-from dubins_traffic.cars.state import Command, Observation, Pose
+from dubins_traffic.cars.state import EGO, Command, Observation, Pose, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.lanes.knowledge import NOBODY, Follower, Knowledge, Manner, Sample, SeenCar
 from dubins_traffic.policies.lanes.paths import PathMaker, PathRow
-from dubins_traffic.policies.lanes.policy import decide
+from dubins_traffic.policies.lanes.policy import decide, decide_in
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.policies.rules.tables import vehicles_of
 from dubins_traffic.problem.instance import Problem
@@ -26,14 +26,14 @@ from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 FOLLOW = 1.3
 """Gap kept behind cars, centre to centre, metres: the e-agent of 2016 stands while the ego is within 1 m."""
 DETOUR = 80.0
-"""How many metres a detour may be longer than the way past a place that was found blocked."""
+"""Cost, metres, of a way past a place that was found blocked: a detour may be that much longer."""
 FORGET = 60.0
 """Seconds after which a blocked place is tried again."""
 TURN_ROUND = 15.0
-"""What turning round on the road counts, metres, when the way is blocked; at the start it counts as BREACH."""
+"""Cost of turning round on the road when the way is blocked, metres; at the start it costs BREACH."""
 BREACH = 1e3
 SAMPLES = 46
-"""At so many places the path ahead is looked at."""
+"""Number of samples of the path ahead."""
 
 
 class Lanes:
@@ -59,7 +59,7 @@ class Lanes:
         self._known: Knowledge | None = None
 
     def start(self, problem: Problem) -> None:
-        """Find the round."""
+        """Find the round through the goals."""
         self._problem = problem
         self._network = problem.network
         self._maker = PathMaker(problem)
@@ -71,22 +71,32 @@ class Lanes:
         self._known = None
 
     def act(self, observation: Observation) -> Command:
-        """Drive on."""
+        """Return the command of the compiled policy; find another route if that asks for one."""
         if self._round is None:
             return Command(0.0, 0.0)
-        known = self._known
-        if known is None:
-            known = self._known = self._furnish(observation.pose)
-            self._decide = bound(decide)
-        elif self._blocked or self._closed:
-            known = self._known = self._remember(known, observation)
-        ego, tick = known.follower, observation.tick
-        others = np.asarray(known.other)  # to write all of a row at once
+        known, tick = self._known, observation.tick
+        if known is None or self._blocked or self._closed:
+            known = self._known = self._prepared(known, tick, observation.pose)
+        others = np.asarray(known.other)  # as a plain array, of which a whole row is assigned at once
         for car in observation.others:
             others[car.index - 1] = (*car.pose, *car.twist, tick)
         self._decide(tick, *observation.pose, known, self._roads)
+        ego = known.follower
         if ego.blocker != NOBODY:
-            self._detour(observation, ego.blocker)
+            self._detour(tick, observation.pose, ego.blocker)
+        return Command(ego.speed, ego.yaw_rate)
+
+    def act_in(self, b: int, tick: int, radius: float, state: State) -> Command:
+        """Drive on as the ego of trial b of a batch, which sees the cars within `radius` (m): what `act` does."""
+        if self._round is None:
+            return Command(0.0, 0.0)
+        known = self._known
+        if known is None or self._blocked or self._closed:
+            known = self._known = self._prepared(known, tick, _pose_in(b, state))
+        self._decide_in(b, tick, radius, state, known, self._roads)
+        ego = known.follower
+        if ego.blocker != NOBODY:
+            self._detour(tick, _pose_in(b, state), ego.blocker)
         return Command(ego.speed, ego.yaw_rate)
 
     def _find_round(self) -> Round | None:
@@ -98,6 +108,13 @@ class Lanes:
         lengths = {goal: found.length if found is not None else inf for goal, found in alone.items()}
         found = find_round(self._graph, [goal for goal in goals if lengths[goal] < IMPOSSIBLE])
         return found if found is not None and found.length < IMPOSSIBLE else None
+
+    def _prepared(self, known: Knowledge | None, tick: int, pose: Pose) -> Knowledge:
+        """Return what is known, now that the car is at a pose: all that there is to know, or with less blocked."""
+        if known is not None:
+            return self._remember(known, tick, pose)
+        self._decide, self._decide_in = bound(decide), bound(decide_in)
+        return self._furnish(pose)
 
     def _furnish(self, pose: Pose) -> Knowledge:
         problem = self._problem
@@ -119,7 +136,7 @@ class Lanes:
         return self._plan(known, pose)
 
     def _plan(self, known: Knowledge, pose: Pose) -> Knowledge:
-        """Return the known with the cheapest way from `pose` to the round as its path."""
+        """Return `known` with the cheapest path from `pose` to the round and along it."""
         tours = self._round
         assert tours is not None
         best = (inf, 0, 0.0, 0.0, -1)
@@ -145,7 +162,7 @@ class Lanes:
         return known.replace(path=path.rows, follower=follower)
 
     def _entries(self, pose: Pose) -> list[tuple[int, float, float, float]]:
-        """Return (lane, progress, metres left of the right lane's middle, cost) of lanes to begin with."""
+        """Return the lanes to begin with: (lane, progress, metres left of the right lane's middle, cost)."""
         network, w = self._network, self._problem.car.w
         point = np.array((pose.x, pose.y))
         segment = int(network.nearest_segment(point)[0])
@@ -160,8 +177,8 @@ class Lanes:
         for lane, out in lanes.items():
             s, left = (float(value) for value in network.lane_coordinates(lane, point))
             length = self._graph.length[lane]
-            tx, ty = network.tangents[lane >> 1].tolist()
-            along = (pose.c * tx + pose.s * ty) * (-1.0 if lane & 1 else 1.0)
+            tx, ty = network.lane_places(lane, np.array([s]))[1][0].tolist()
+            along = pose.c * tx + pose.s * ty
             cost = length - s + (0.0 if along > 0.3 or out else turning)
             cost += DETOUR if lane in self._blocked else 0.0
             if not out and length - s < self._longest_turn(lane):
@@ -175,7 +192,7 @@ class Lanes:
         return max(self._maker.turn(lane, other).before for other in self._network.successors(lane))
 
     def _cost(self, lane: int, other: int) -> float:
-        """Return the cost of a turn, with what keeps the route off places found blocked."""
+        """Return the cost of a turn, metres, with that of places found blocked."""
         cost = self._maker.turn_cost(lane, other)
         if other in self._blocked:
             cost += DETOUR
@@ -184,42 +201,44 @@ class Lanes:
         return cost
 
     def _reroute(self, known: Knowledge, pose: Pose) -> Knowledge:
-        """Find the round again, with regard for what is blocked now, and return the known with the way to it."""
+        """Find the round again, with regard for places that are blocked now; return `known` with the path to it."""
         before = self._round
         self._graph = LaneGraph(self._network, self._cost)
         self._round = self._find_round() or before
         return self._plan(known, pose)
 
-    def _remember(self, known: Knowledge, observation: Observation) -> Knowledge:
-        """Forget blocked places in time; the known has a new path if one was forgotten and this is a place to
-        change.
-        """
-        time = observation.time
+    def _remember(self, known: Knowledge, tick: int, pose: Pose) -> Knowledge:
+        """Forget blocked places after FORGET seconds; return `known`, with a new path if that is possible here."""
+        time = tick / self._problem.rate
         old = [place for places in (self._blocked, self._closed) for place in places if places[place] <= time]
         row = known.path[known.follower.row]
         if not old or row.lane < 0 or known.follower.sigma > 0.3 * row.length:
             return known
         self._blocked = {lane: until for lane, until in self._blocked.items() if until > time}
         self._closed = {vertex: until for vertex, until in self._closed.items() if until > time}
-        return self._reroute(known, observation.pose)
+        return self._reroute(known, pose)
 
-    def _detour(self, observation: Observation, blocker: int) -> None:
-        """Note where the way is blocked, and plan again."""
+    def _detour(self, tick: int, pose: Pose, blocker: int) -> None:
+        """Note where the way is blocked, and find another route."""
         known = self._known
         assert known is not None
         body = known.other[blocker] if blocker >= 0 else known.obstacles.parts[-1 - blocker]
         point = np.array((body.x, body.y))
-        until = observation.time + FORGET
+        until = tick / self._problem.rate + FORGET
         vertex, far = self._network.nearest_intersection(point)
-        pose = observation.pose
         if float(far) < self._problem.intersection_radius + self._problem.car.body.reach:
             self._closed[int(vertex)] = until
         else:
             segment = int(self._network.nearest_segment(point)[0])
-            tx, ty = self._network.tangents[segment].tolist()
-            _, left = self._network.lane_coordinates(2 * segment, point)
-            ahead = (point[0] - pose.x) * tx + (point[1] - pose.y) * ty
+            place, left = self._network.lane_coordinates(2 * segment, point)
+            here, _ = self._network.lane_coordinates(2 * segment, (pose.x, pose.y))
+            ahead = float(place) - float(here)
             self._blocked[2 * segment + (1 if float(left) > 0.0 else 0)] = until
             if hypot(point[0] - pose.x, point[1] - pose.y) < 3.0:
                 self._blocked[2 * segment + (0 if ahead > 0.0 else 1)] = until
         self._known = self._reroute(known, pose)
+
+
+def _pose_in(b: int, state: State) -> Pose:
+    """Return the pose of the ego of trial b of a batch."""
+    return Pose(*(float(array[b, EGO]) for array in (state.x, state.y, state.c, state.s)))

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
 FORMAT: Final = "dubins-traffic policy"
-"""What the array `format` of a policy's file says."""
+"""Value of the array `format` in a policy's file."""
 MOST: Final = 1 << 24
 """Most bytes of such a file."""
 _DAMAGED: Final = (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error)
-"""What NumPy raises for files that are not what they claim."""
+"""Errors that NumPy raises for files that it can't read."""
 _ARRAYS: Final = ("names", "cars", "frame_skip", "hidden", "hidden_bias", "out", "out_bias")
 
 
@@ -37,7 +37,7 @@ class Policy:
     Attributes
     ----------
     names : tuple of str
-        The numbers of the flat observation that it is shown, v, by their names (`observations.flat.Layout`).
+        Names of the numbers of the flat observation that make up the input v (`observations.flat.Layout`).
     cars : int
         Other cars that the flat observation shows.
     frame_skip : int
@@ -67,7 +67,7 @@ class Policy:
             raise InputError("not a policy", field="frame_skip", value=self.frame_skip, expected=">= 1")
 
     def act(self, seen: npt.NDArray[Any]) -> Floats:
-        """Return the action, shares of speed and yaw rate, for what is seen, (V,)."""
+        """Return the action, shares (-1 to 1) of the largest speed and yaw rate, (2,), for the input `seen`, (V,)."""
         return np.tanh(self.out @ np.tanh(self.hidden @ seen + self.hidden_bias) + self.out_bias)
 
     def save(self, path: str | Path) -> None:
@@ -82,7 +82,7 @@ class Policy:
 
 
 def is_policy(path: str | Path) -> bool:
-    """Tell whether the file at `path` says that it is a policy."""
+    """Tell whether the file at `path` has the format of a policy."""
     return _format(path) == FORMAT
 
 
@@ -123,24 +123,24 @@ def _format(path: str | Path) -> str:
 
 
 class Learned:
-    """Drives as a policy says.
+    """Drives by a learned policy.
 
     Parameters
     ----------
     policy : Policy
-        What says it.
+        The policy.
     """
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
 
     def start(self, problem: Problem) -> None:
-        """Look up what the policy is shown.
+        """Look up the policy's inputs in the flat observation of the problem.
 
         Raises
         ------
         InputError
-            If the problem's observations lack something of it.
+            If the problem's flat observation lacks one of the inputs.
         """
         self._observe = FlatObserver(problem, self._policy.cars)
         places = {name: k for k, name in enumerate(self._observe.layout.names)}
@@ -157,7 +157,7 @@ class Learned:
         self._command = Command(0.0, 0.0)
 
     def act(self, observation: Observation) -> Command:
-        """Decide, or hold what has been decided."""
+        """Return the policy's action as a command, or hold the last one within `frame_skip` ticks."""
         seen = self._observe(observation)
         if observation.tick % self._policy.frame_skip == 0:
             speed, turn = self._policy.act(seen[self._places]).tolist()

@@ -33,11 +33,11 @@ BUILT_IN: Final = {
 }
 """Class and description of each controller that comes with the package, by the name of its module."""
 SANDBOXED: Final = "+sandbox"
-"""What ends the name of a controller that drives in a box (`dubins_traffic.sandbox`), before that of a shield; behind
-it there may be limits, as in ``my.py:Mine+sandbox,memory=512M``."""
+"""Suffix of the name of a controller that drives in a box (`dubins_traffic.sandbox`); it precedes that of a shield,
+and limits may follow it, as in ``my.py:Mine+sandbox,memory=512M``."""
 SANDBOX: Final = re.compile(re.escape(SANDBOXED) + r"(?P<limits>(?:,[\w=.+-]*)*)$")
 CLASS_FIRST: Final = b"class TulipStrategy"
-"""What a strategy that TuLiP has written in Python begins with; it is read, not run."""
+"""Text by which a strategy that TuLiP has written in Python is known; the file is parsed, not run."""
 _SEAM = Seam(
     "--controller",
     "controller",
@@ -49,7 +49,7 @@ _EXPECTED = "a built-in name ({}), module:Class or path/to/file.py:Class"
 
 
 def load(spec: str) -> Controller:
-    """Return a new controller, as `controllers.registry.load` does for names that end in no shield."""
+    """Return a new controller, as `controllers.registry.load` does for names without a shield."""
     boxed = SANDBOX.search(spec)
     if boxed is not None:
         module = importlib.import_module("dubins_traffic.sandbox.controller")

@@ -1,4 +1,4 @@
-"""Ego controllers by name, under the shield or without."""
+"""Finds ego controllers by name, with or without shield and box."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ if TYPE_CHECKING:
     from dubins_traffic.shield.tables import Overtakes
 
 COMPILED = "rules"
-"""The controller that is compiled: in a batch no Python runs between two ticks of its trials."""
+"""The compiled controller: in a batch no Python runs between two ticks of its trials."""
 SHIELDED = "+shield"
-"""What ends the name of a controller that drives under the shield (`controllers.shield`); behind it there may be a
-colon and when the ego may overtake, as in ``lanes+shield:never``."""
+"""Suffix of the name of a controller that drives under the shield (`controllers.shield`); a colon and when the ego may
+overtake may follow it, as in ``lanes+shield:never``."""
 _SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
 
 
 class Unmade:
-    """In place of a controller that could not be made: its trial ends as the fault that this was."""
+    """Stands for a controller that could not be made: its trial ends with that error as its fault."""
 
     def __init__(self, cause: BaseException) -> None:
         self._cause = cause
 
     def start(self, problem: Problem) -> None:  # noqa: ARG002  # it never comes to drive
-        """Raise what making the controller raised."""
+        """Raise the error of making the controller."""
         raise self._cause
 
     def act(self, observation: Observation) -> None:
-        """Give up; no trial comes as far as this."""
+        """Give up; never called, since `start` raises."""
 
 
 def made(make: Callable[[], Controller]) -> Controller:
-    """Return the controller that `make` makes, for one trial; if that raises, one whose trial ends as its fault.
+    """Return the controller that `make` returns; if it raises, an `Unmade` whose trial ends with that fault.
 
     Raises
     ------
     InputError
-        If there is no such controller, which is no trial's fault.
+        If there is no such controller: that is not a fault in one trial.
     """
     try:
         return make()
@@ -70,19 +70,19 @@ def load(spec: str) -> Controller:
     ----------
     spec : str
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``. Modules are also looked up in the current
-        directory; a file may import its neighbours. Of a record, ``NAME.mcap``, the ego's commands are played again; a
-        strategy that `dubins-traffic synth` has saved, ``NAME.npz``, is played by `synthesized`; a policy of
-        `controllers.learned`, ``NAME.npz`` too, drives. A strategy of another tool (`synthesis.foreign`), told by the
-        content of its file, is played by `synthesized`. Followed by
-        ``+shield``: the same under the shield; by ``+shield:law`` or ``+shield:never`` under one that overtakes
-        otherwise (`controllers.shield.Shield`). Followed by ``+sandbox``: the same in a box (`dubins_traffic.sandbox`).
+        directory; a file may import its neighbours. A record, ``NAME.mcap``, replays the ego's commands. A strategy
+        that `dubins-traffic synth` has saved, ``NAME.npz``, or one of another tool (`synthesis.foreign`), told by the
+        content of its file, is played by `synthesized`. A policy of `controllers.learned`, ``NAME.npz``, drives. With
+        the suffix ``+shield`` it drives under the shield, with ``+shield:law`` or ``+shield:never`` under one with
+        another rule for overtaking (`controllers.shield.Shield`); with ``+sandbox`` it drives in a box
+        (`dubins_traffic.sandbox`).
 
     Raises
     ------
     InputError
-        If there is no such name, module, file or class, if the code raises while it is loaded or constructed (then a
-        `ConstructionError`), or if the object lacks a method of `dubins_traffic.protocols.Controller`. Whatever it
-        raises counts, `SystemExit` too; only Ctrl-C goes through.
+        If there is no such name, module, file or class; if the code raises anything, even SystemExit, while it is
+        loaded or constructed (then a `ConstructionError`); or if the object lacks a method of
+        `dubins_traffic.protocols.Controller`. Only Ctrl-C passes through.
     """
     if is_shielded(spec):
         return under_shield(load(_SHIELD.sub("", spec)), spec)
@@ -94,20 +94,28 @@ def is_shielded(spec: str) -> bool:
     return _SHIELD.search(spec) is not None
 
 
+def shield_of(spec: str) -> tuple[str, str] | None:
+    """Return the name of the controller under the shield, and when that overtakes, "" if it is not said; None if there
+    is no shield.
+    """
+    found = _SHIELD.search(spec)
+    return None if found is None else (spec[: found.start()], found["overtakes"] or "")
+
+
 def shielded(spec: str) -> str:
     """Return the name of a controller under the shield."""
     return spec if is_shielded(spec) else spec + SHIELDED
 
 
 def sandboxed(spec: str, limits: str = "") -> str:
-    """Return the name of a controller in a box, which is inside its shield if it has one.
+    """Return the name of the same controller in a box; a shield stays outside the box.
 
     Parameters
     ----------
     spec : str
-        Its name.
+        Name of the controller.
     limits : str
-        What it may use, as ``memory=512M,bank_seconds=10``.
+        Limits of the box, as ``memory=512M,bank_seconds=10``.
     """
     shield = _SHIELD.search(spec)
     bare, ending = (spec, "") if shield is None else (spec[: shield.start()], shield[0])
@@ -123,7 +131,7 @@ def dressed(spec: str, *, shield: bool = False, sandbox: str | None = None) -> s
 
 
 def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
-    """Return a controller that drives as `controller` does under the shield that a name `spec` ends in.
+    """Return `controller` under the shield that the suffix of the name `spec` describes.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class Rules:
         self._decide = bound(decide)
 
     def start(self, problem: Problem) -> None:
-        """Find the round; InputError if the car can't keep the rules."""
+        """Find the round through the goals; InputError if the car can't keep the rules."""
         check_fit(problem, owes=False)
         cars = 1 + len(problem.e_agents)
         stage, distance = stages(problem)
@@ -53,7 +53,7 @@ class Rules:
         self._command = np.zeros((1, cars, 2))
         self._roads: RoadTable = pack([problem.network], [problem.car.lane_width])
         self._obstacles: ObstacleTable = pack_obstacles([problem.obstacles])
-        self._scratch: Scratch = scratch(cars, len(problem.network.segments))
+        self._scratch: Scratch = scratch(cars, len(problem.network.segments), self._obstacles)
         if not len(stage):
             return
         rows = table(Driver, (1, cars))
@@ -75,7 +75,7 @@ class Rules:
         )
 
     def act(self, observation: Observation) -> Command:
-        """Drive on."""
+        """Return the command of the law of the road."""
         drivers = self._drivers
         if drivers is None:
             return Command(0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The ego's commands of a trial, played again."""
+"""Replays given commands of the ego, such as those of a record."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dubins_traffic.record.reader import Record, read
 
 
 class Scripted:
-    """Plays one command a tick, whatever happens, and gives up after the last.
+    """Plays one command per tick, whatever happens, and gives up after the last.
 
     Parameters
     ----------
@@ -24,13 +24,13 @@ class Scripted:
 
     @staticmethod
     def of(record: Record) -> Scripted:
-        """Return the commands of the ego in `record`; on its instance they make its frames again."""
+        """Return a controller that plays the ego's commands in `record`; on its instance they reproduce its frames."""
         frames = record.frames
         columns = frames.command_speed[1:, EGO], frames.command_yaw_rate[1:, EGO]
         return Scripted(np.stack(columns, axis=1))
 
     def start(self, problem: Problem) -> None:
-        """Nothing of the problem matters."""
+        """Do nothing: the commands do not depend on the problem."""
 
     def act(self, observation: Observation) -> Command | None:
         """Return the command of this tick, None after the last."""
@@ -40,5 +40,5 @@ class Scripted:
 
 
 def replay(path: str) -> Scripted:
-    """Return the ego's commands in the record at `path`; RecordError if there is none."""
+    """Return a controller that plays the ego's commands in the record at `path`; RecordError if there is none."""
     return Scripted.of(read(path))

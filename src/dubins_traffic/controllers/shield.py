@@ -1,9 +1,9 @@
-"""The shield as a controller about another controller."""
+"""The shield as a controller that wraps another controller."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.controllers import named
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 class Shield:
-    """Another controller, whose commands are changed as little as needed for the ego to break none of rules 1 to 3.
+    """Wraps a controller and changes its commands as little as needed so that the ego breaks none of rules 1 to 3.
 
     Parameters
     ----------
     controller : Controller or str
-        Whatever drives; by name as `controllers.named.load` takes it, without a shield.
+        The controller that drives; by name as `controllers.named.load` takes it, without a shield.
     overtakes : {"sure", "law", "never"}
         When the ego may cross the centre line to pass what stands: only where it is sure to be back in time whatever
         the others do, by default; wherever the law of the road would, as the controller `rules` does; or never.
@@ -35,12 +35,12 @@ class Shield:
     Attributes
     ----------
     shield_filter : ShieldFilter
-        What keeps the ego within the rules, and counts how often it had to.
+        Changes the commands, and counts how often it does.
 
     Notes
     -----
-    What the other raises, and that it gives up, is passed on: these end a trial as they do without a shield. Numbers
-    that are not finite are taken for (0, 0). Every tick in which the shield steps in becomes an event `shield`.
+    If the wrapped controller raises or gives up, the trial ends as it would without a shield. Numbers that are not
+    finite count as (0, 0). Every tick in which the shield steps in becomes an event `shield`.
 
     Examples
     --------
@@ -54,6 +54,7 @@ class Shield:
         self._controller = named.load(controller) if isinstance(controller, str) else controller
         self.shield_filter = ShieldFilter(overtakes=overtakes)
         self._events: list[tuple[str, str]] = []
+        self._reports = isinstance(self._controller, Reports)
 
     def start(self, problem: Problem) -> None:
         """Start the other controller; InputError if the car can't keep the rules."""
@@ -62,7 +63,7 @@ class Shield:
         self._controller.start(problem)
 
     def act(self, observation: Observation) -> Command | None:
-        """Ask the other controller, and let its command through if it breaks nothing."""
+        """Return the wrapped controller's command if it breaks no rule, else the nearest one found that breaks none."""
         asked = self._controller.act(observation)
         if asked is None:
             return None
@@ -75,11 +76,11 @@ class Shield:
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what has happened since the last call: kind and detail of each event."""
         found, self._events = self._events, []
-        inner = self._controller.report() if isinstance(self._controller, Reports) else ()
+        inner = cast(Reports, self._controller).report() if self._reports else ()
         return [*inner, *found]
 
     def close(self) -> None:
-        """Close the other controller if it wants to be closed."""
+        """Close the wrapped controller if it has a method `close`."""
         if isinstance(self._controller, Closes):
             self._controller.close()
 

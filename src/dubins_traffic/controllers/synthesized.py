@@ -39,22 +39,22 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
 NO_GOAL: Final = -2
-"""The vertex of the only stage that the law is given: it is at no intersection, since the strategy seeks the goals."""
+"""Stands for the vertex of the only stage in the law's tables: none, since the strategy seeks the goals."""
 NO_STAGE: Final = -1
 SECOND_BEST: Final = 2.5
-"""What an exit counts for each that the strategy likes better, metres: it is taken for want of room, in time."""
+"""Cost, metres, of an exit for each exit that the strategy prefers: the law takes it if there is no room elsewhere."""
 HURRY: Final = 0.6
-"""So long before it would lose its place in the order an ego that the strategy lets wait enters, seconds."""
+"""An ego that the strategy makes wait enters this long before it would lose its place in the order, seconds."""
 LOOK: Final = 1.0
-"""Seconds after which it is asked again where unseen cars may be."""
+"""Seconds after which the play considers anew where unseen cars may be."""
 STRATEGY_LEFT: Final = "strategy_left"
 STRATEGY_RESUMED: Final = "strategy_resumed"
-"""Kinds of events: the position is one from which the strategy does not win, or is no longer."""
+"""Kinds of events: the position has become one from which the strategy does not win, or wins again."""
 
 
 @dataclass
 class _Pursuit:
-    """What the ego seeks, and what it is told.
+    """The goals that the ego seeks, and the play that says what to do.
 
     `ways` (M, L) are the metres from each lane to the goal of each stage, at that goal already to the next; `goals` are
     the goals of the stages, by their places in the arena, and `vertices` their intersections.
@@ -72,19 +72,19 @@ class _Pursuit:
 
 
 class Synthesized(Rules):
-    """Chooses exits, and when to wait, by a winning strategy, and drives as `rules` does.
+    """Chooses exits and when to wait by a winning strategy; otherwise drives as the controller `rules`.
 
     Parameters
     ----------
     strategy : Strategy or Machine, optional
-        What to play, ours or another tool's; found when the trial starts, if not given.
+        The strategy to play, of this package or another tool; by default the game is solved when the trial starts.
 
     Notes
     -----
-    The strategy is asked whenever something has changed in the game while the ego is in a lane. Where it has nothing to
-    say, since the ego is behind another car, the ego goes on as `rules` does. So it does where the strategy does not
-    win, as when the others have broken their assumption; then under the shield, until the strategy wins again. That
-    shield overtakes as `rules` does: a car that is parked for good is often what has broken the assumption.
+    The strategy is asked whenever the game's position has changed while the ego is in a lane. Where it says nothing,
+    since the ego is behind another car, the ego goes on as `rules` does. Where the strategy does not win, for instance
+    since the others have broken their assumption, the ego drives as `rules` under the shield until the strategy wins
+    again. That shield overtakes as `rules` does: often a car that is parked for good has broken the assumption.
     """
 
     def __init__(self, strategy: Strategy | Machine | None = None) -> None:
@@ -94,7 +94,7 @@ class Synthesized(Rules):
         self._shield_filter = ShieldFilter(overtakes="law")
 
     def start(self, problem: Problem) -> None:
-        """Solve the game unless there is a strategy; InputError if it is too large, or the strategy another one's."""
+        """Solve the game if no strategy was given; InputError if it is too large, or the strategy does not fit."""
         super().start(problem)
         self._pursuit = None
         drivers = self._drivers
@@ -123,7 +123,7 @@ class Synthesized(Rules):
         self._points: list[list[float]] = problem.network.points.tolist()
 
     def act(self, observation: Observation) -> Command:
-        """Drive on."""
+        """Return the command of the law, with the exit and the waiting that the strategy chooses."""
         pursuit = self._pursuit
         if pursuit is None:
             return super().act(observation)
@@ -139,14 +139,14 @@ class Synthesized(Rules):
         return None if self._pursuit is None else self._pursuit.play
 
     def report(self) -> Sequence[tuple[str, str]]:
-        """Return what the play has come upon since the last call."""
+        """Return the events of the play since the last call."""
         if self._pursuit is None or not self._pursuit.reports:
             return ()
         found, self._pursuit.reports = self._pursuit.reports, []
         return found
 
     def _follow(self, pursuit: _Pursuit, seen: Observation) -> None:
-        """Bring the play up to date, and ask the strategy if anything has changed."""
+        """Update the play to what is seen, and ask the strategy if the position has changed."""
         cars = [Sighting(EGO, seen.pose, seen.propositions)]
         cars += [Sighting(car.index, car.pose, car.propositions) for car in seen.others]
         changed = pursuit.play.follow(seen.tick, cars)
@@ -162,7 +162,7 @@ class Synthesized(Rules):
         self._ask(pursuit, seen)
 
     def _ask(self, pursuit: _Pursuit, seen: Observation) -> None:
-        """Ask the strategy, and let the law take the way that it likes best."""
+        """Ask the strategy, and set the law's costs so that it takes the exit that the strategy prefers."""
         drivers = self._drivers
         assert drivers is not None
         stages = len(pursuit.goals)
@@ -191,7 +191,7 @@ class Synthesized(Rules):
             pursuit.reports.append((STRATEGY_RESUMED if wins else STRATEGY_LEFT, ""))
 
     def _guarded(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
-        """Return what the shield makes of a command."""
+        """Return a command as the shield changes it."""
         given = self._shield_filter.filter(seen, command)
         found = self._shield_filter.intervention
         if found is not None:
@@ -199,7 +199,7 @@ class Synthesized(Rules):
         return given
 
     def _waiting(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
-        """Return the command of an ego that waits before the disc ahead, if it is told to and keeps its place."""
+        """Return `command`, or the command to wait before the disc if the strategy says so and the place is kept."""
         drivers, advice = self._drivers, pursuit.advice
         if advice is None or advice.enter or seen.propositions.crosses >= 0 or drivers is None:
             return command
@@ -223,7 +223,7 @@ def foreign_player(file: str) -> Synthesized:
 
 
 def _liked(free: Sequence[int], exits: Sequence[int], distance: Floats) -> list[int]:
-    """Return exits, the best first: those that are free in the game, then the others by distance."""
+    """Return the exits, the preferred first: those that are free in the game, then the others by distance."""
     return [*free, *sorted(set(exits) - set(free), key=lambda lane: (distance[lane], lane))]
 
 
@@ -244,7 +244,7 @@ def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
 
 
 def _adviser(strategy: Strategy | Machine | None, problem: Problem) -> Adviser:
-    """Return who says what to do in a trial; InputError if the game is too large, or the strategy another one's."""
+    """Return the adviser for a trial; InputError if the game is too large, or the strategy of another problem."""
     if strategy is None:
         return Ranked(_solved(problem))
     if isinstance(strategy, Strategy):
@@ -258,13 +258,13 @@ def _adviser(strategy: Strategy | Machine | None, problem: Problem) -> Adviser:
 
 
 def _solved(problem: Problem) -> Strategy:
-    """Return the strategy for a problem, which wins from nowhere if the game is lost; InputError if it is too large."""
+    """Return the strategy for a problem; if the game is lost it wins nowhere. InputError if the game is too large."""
     board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
     return Strategy.of(solve(build(board)))
 
 
 def _fitting(strategy: Strategy, problem: Problem) -> Strategy:
-    """Return a strategy; InputError if it is one of another problem."""
+    """Return `strategy`; InputError if it is for another problem."""
     own, wanted = strategy.board.arena, arena_of(problem)
     differences = {
         "network": own.network.to_document() != wanted.network.to_document(),

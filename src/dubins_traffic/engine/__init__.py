@@ -1,1 +1,1 @@
-"""Batches: many trials stepped together in one compiled pass, judged and scored."""
+"""Batches: many trials stepped together by compiled kernels, judged and scored."""

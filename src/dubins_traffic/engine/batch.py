@@ -1,4 +1,4 @@
-"""Many trials at once: drawn, run together, judged and scored, the same numbers as one by one."""
+"""Runs many trials: draws, steps, judges and scores them; the results are those of trials run one by one."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
+from dubins_traffic.engine.asking import ask
 from dubins_traffic.engine.batch_records import chosen, folder_of
-from dubins_traffic.engine.controlled import Maker, ask, grouped
+from dubins_traffic.engine.controlled import Maker, grouped
 from dubins_traffic.engine.group import Group, Outcome
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
+from dubins_traffic.outside import put_back
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
+from dubins_traffic.protocols import Controller
 from dubins_traffic.runs.record_folder import claim
 from dubins_traffic.runs.record_folder import name as record_name
 from dubins_traffic.runs.single import run_trial
@@ -36,17 +39,17 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 ASKED = 16
-"""So many trials of a campaign's chunk run at a time where a controller is asked in every tick."""
+"""Trials of a campaign's chunk that run at a time if a controller is asked in every tick."""
 UNDER_WAY = 3
-"""Groups under way for each thread: while the oldest is waited for, the others go on."""
+"""Groups that are submitted per thread: while the oldest is waited for, the others go on."""
 LEAST = 4
-"""Trials in the smallest of the last groups, which still hide what it costs to begin one."""
+"""Least size of the last groups: smaller ones would take longer to set up than to run."""
 Progress = Callable[[int], object]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Batch(Sheeted):
-    """What came of the trials of a batch, by their numbers; of trials that have a record their scores name it."""
+    """The scores and verdicts of the trials of a batch, by trial number; a score names its record if there is one."""
 
     outcomes: tuple[Outcome, ...]
 
@@ -81,7 +84,7 @@ def run_batch(
     Parameters
     ----------
     configuration : Configuration, path or name
-        What to draw the trials from.
+        The configuration from which trials are drawn.
     controller : str or callable
         `rules` runs compiled. Others, by name, as ``module:Class`` or ``path/to/file.py:Class``, or as a callable that
         makes one, are asked every tick: one object for each trial, or one for all if it also has the methods
@@ -89,11 +92,11 @@ def run_batch(
     trials, first : int
         Trials `first` to ``first + trials - 1``; by default as many as the configuration says, from 0.
     seed : int
-        What all random numbers follow from.
+        Seed of all random numbers.
     batch : int
-        Trials that are stepped together; when one ends another takes its place.
+        Most trials that are stepped together; when one ends another takes its place.
     threads : int
-        Batches that run at a time, where the controller is compiled.
+        Groups that run at the same time, if the controller is compiled.
     keep : str
         Of which trials a record is kept: ``none``, ``all``, ``failures`` (a rule broken and not excused, a fault, or in
         trials that are not judged a collision), or ``sample:K``: K of them, evenly spaced. These trials are run once
@@ -102,13 +105,14 @@ def run_batch(
     records : path
         Folder for the records, made if missing; one that holds records is refused, unless one of the following.
     overwrite : bool
-        Whether records that the folder holds are removed before.
+        Whether to remove the records that the folder holds first.
     append : bool
-        Whether they stay, and are not made again; they must be of the same controller and instances.
+        Whether to keep the records that the folder holds and make only the missing ones; they must be of the same
+        controller and instances.
     progress : callable, optional
-        Told how many trials have ended, each time.
+        Called with the number of ended trials each time one ends.
     ended : callable, optional
-        Told what came of each trial as it ends, in whatever order they do.
+        Called with the outcome of each trial when it ends; trials may end in any order.
     metrics : sequence of str or callable
         Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md). They
         are shown every frame, so that no trial runs for several ticks without Python.
@@ -116,7 +120,7 @@ def run_batch(
     Raises
     ------
     InputError
-        If anything of this is wrong, or an instance can't be drawn.
+        If an argument is wrong, or an instance can't be drawn.
     """
     if not isinstance(configuration, Configuration):
         configuration = load_config(configuration)
@@ -145,12 +149,12 @@ def run_batch(
 
 
 def in_order(found: Iterable[Outcome]) -> Batch:
-    """Return what came of some trials as a batch."""
+    """Return outcomes as a Batch, sorted by trial number."""
     return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
 
 
 def called(controller: str | Maker) -> str:
-    """Return what a controller is called that is given by name, or by what makes one."""
+    """Return the name of a controller that is given by its name or as a callable that makes it."""
     return controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
 
 
@@ -162,10 +166,10 @@ def outcomes(
     threads: int = 1,
     metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
-    """Run trials of instances, `batch` at a time, and yield what came of each as it ends.
+    """Run trials of instances, `batch` at a time, and yield the outcome of each when it ends.
 
-    The parameters are those of `run_batch`. Instances are drawn from their iterator as they are needed. Trials that
-    can't be stepped with others (another simulator, formulas of the user's) run by themselves.
+    The parameters are those of `run_batch`. Instances are taken from their iterator when they are needed. Trials that
+    can't be batched (another simulator, formulas of the user's) run by themselves.
     """
     name = called(controller)
     make = _maker(controller)
@@ -192,11 +196,21 @@ def outcomes(
 
 
 def _maker(controller: str | Maker) -> Maker:
-    return partial(controllers.load, controller) if isinstance(controller, str) else controller
+    """Return what makes a controller; by name from the present folder, wherever those before it have gone."""
+    if not isinstance(controller, str):
+        return controller
+    here = Path.cwd()
+
+    def make() -> Controller:
+        with put_back():
+            os.chdir(here)
+            return controllers.load(controller)
+
+    return make
 
 
 def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[list[Instance]]:
-    """Cut instances into groups of `batch`; several threads get smaller ones in the end, to end together."""
+    """Yield instances in groups of `batch`; with several threads the last ones are smaller, to end together."""
     ahead: deque[Instance] = deque()
     while True:
         ahead.extend(islice(source, batch * (threads + 1) - len(ahead)))
@@ -213,19 +227,19 @@ def run_together(
     cancelled: Callable[[], bool],
     metrics: Sequence[MetricMaker] = (),
 ) -> Iterator[Outcome]:
-    """Run the trials of those instances that can be stepped together, and yield what came of each.
+    """Run trials of instances, as many as possible stepped together, and yield the outcome of each.
 
     Raises
     ------
     KeyboardInterrupt
-        When `cancelled`, which is asked every now and then.
+        When `cancelled`, which is called now and then, returns true.
     """
     fit = fitness()
     able = [own for own in instances if can_share(own) and (controller != COMPILED or fit(own))]
     if controller == COMPILED:
         yield from _compiled(able, cancelled, metrics)
     else:
-        yield from ask(able, partial(controllers.load, controller), controller, ASKED, cancelled, metrics)
+        yield from ask(able, _maker(controller), controller, ASKED, cancelled, metrics)
     if cancelled():
         raise KeyboardInterrupt
 
@@ -233,7 +247,7 @@ def run_together(
 def _compiled_or_alone(
     instances: Sequence[Instance], cancelled: Event, metrics: Sequence[MetricMaker]
 ) -> list[Outcome]:
-    """Run the trials of instances whose egos keep the rules."""
+    """Run trials whose egos the compiled controller `rules` drives; those that can't be batched run by themselves."""
     fit = fitness()
     able = [can_share(instance) and fit(instance) for instance in instances]
     alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
@@ -254,8 +268,7 @@ def _compiled(
             yield from group.outcomes(range(len(own)), COMPILED)
     asked = [instance for instance in instances if not undisturbed(instance)]
     if asked:
-        make = partial(controllers.load, COMPILED)
-        yield from ask(asked, make, COMPILED, len(asked), cancelled, metrics)
+        yield from ask(asked, _maker(COMPILED), COMPILED, len(asked), cancelled, metrics)
 
 
 def _apart(
@@ -265,7 +278,7 @@ def _apart(
     metrics: Sequence[MetricMaker],
     run: Callable[[Iterator[Instance]], Iterator[Outcome]],
 ) -> Iterator[Outcome]:
-    """Run the trials that can't be stepped with others, and hand on the rest."""
+    """Run the trials that can't be batched by themselves, and pass all others to `run`; yield all outcomes."""
     done: list[Outcome] = []
 
     def rest() -> Iterator[Instance]:
@@ -295,18 +308,20 @@ def _recorded(
     controller: str | Maker,
     metrics: Sequence[MetricMaker],
 ) -> Iterator[Outcome]:
-    """Run the trials that are kept once more for their records, but those whose records are `there`."""
+    """Yield outcomes; run each trial whose record is to be kept once more for it, unless its record is `there`."""
+    place, make = folder.absolute(), _maker(controller)  # controllers may go to other folders
     with locked(folder):
         for outcome in each:
-            record = folder / record_name(outcome.instance.trial)
+            record = place / record_name(outcome.instance.trial)
+            told = str(folder / record.name)
             if not is_kept(outcome):
                 yield outcome
             elif record.name in there:
-                yield replace(outcome, score=replace(outcome.score, record=str(record)))
+                yield replace(outcome, score=replace(outcome.score, record=told))
             else:
-                driver = controllers.made(_maker(controller))
+                driver = controllers.made(make)
                 result = run_trial(
                     outcome.instance, driver, record=record, overwrite=record.exists(),
                     name=called(controller), metrics=metrics,
                 )  # fmt: skip
-                yield replace(outcome, ending=result.ending, score=result.score)
+                yield replace(outcome, ending=result.ending, score=replace(result.score, record=told))

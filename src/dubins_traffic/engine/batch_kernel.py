@@ -1,4 +1,4 @@
-"""The tick of a batch, compiled: drivers, motion, labels, referee and metrics of one trial after another.
+"""Steps the trials of a batch (compiled): drivers, motion, labels, referee and metrics, trial after trial.
 
 A trial runs for many ticks before the next one is taken up, so that all it needs stays in the processor's nearest
 memory. The order of events in a tick is that of `docs/semantics.md`.
@@ -14,10 +14,10 @@ from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.nudge import nudge_trial
 from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import OUTCOME, Motion, step_trial
-from dubins_traffic.cars.near import keep_apart, lost
+from dubins_traffic.cars.near import refresh_spacing, spacing_loss
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare, jit_wide
 from dubins_traffic.kernels.records import Rows as TableOf
 from dubins_traffic.kernels.records import record
 from dubins_traffic.kernels.tables import Tables
@@ -33,24 +33,24 @@ from dubins_traffic.scoring.tally_tables import Counted
 
 
 class _Status(NamedTuple):
-    """Why a trial stands still, `Progress.status`."""
+    """Whether a trial goes on, or why it waits for its group: values of `TrialProgress.status`."""
 
     RUNNING: int = 0
-    """It does not."""
+    """The trial goes on."""
     ENDED: int = 1
-    """Its time is up."""
+    """Its duration is over."""
     COLLIDED: int = 2
     """The ego collided."""
     FAULTY: int = 3
     """An e-agent asked for a command that is not finite."""
     NO_CONTACTS: int = 4
-    """There is no room for contacts."""
+    """The buffer of contacts is full."""
     NO_PAIRS: int = 5
-    """There is none for pairs that may meet."""
+    """The buffer of pairs that may meet is too small."""
     NO_SIGHT: int = 6
-    """There is none for pairs that may see each other."""
+    """The buffer of pairs that may see each other is too small."""
     NO_BREACHES: int = 7
-    """There is none for breaches."""
+    """The breach log is full."""
 
 
 STATUS: Final = _Status()
@@ -58,7 +58,7 @@ STATUS: Final = _Status()
 
 @record
 class TrialProgress:
-    """How far a trial is."""
+    """How far a trial has come."""
 
     tick: int = -1
     """The present frame, -1 before the first."""
@@ -82,7 +82,7 @@ class TrialProgress:
 
 @record
 class ContactNote:
-    """What is noted of a contact."""
+    """Tick and flags of a contact, beside the `cars.partners.Meeting`."""
 
     tick: int
     """The frame in which its tick ends."""
@@ -98,7 +98,7 @@ class ContactNote:
 
 @record
 class BreachPlace:
-    """Where the car of a breach was, metres."""
+    """Centre of the car of a breach in its frame, metres."""
 
     x: float
     y: float
@@ -106,9 +106,9 @@ class BreachPlace:
 
 
 class Progress(Tables):
-    """The trials of a batch on their way, and what is noted beside the contacts and breaches found.
+    """How far the trials of a batch have come, and notes on the contacts and breaches found.
 
-    `trial` (B,); `contact` (C,), of each contact; `place` (K,), of each breach.
+    `trial` (B,); `contact` (C,), one for each contact; `place` (K,), one for each breach.
     """
 
     trial: TableOf[TrialProgress]
@@ -132,20 +132,20 @@ class World(Scene, Traffic, Motion, Counted):
 
 @jit_wide
 def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: World) -> None:
-    """Run each of the trials `active` for up to `most` ticks, as far as it goes.
+    """Step each of the trials `active` for up to `most` ticks, or until it ends or a buffer is too small.
 
     Parameters
     ----------
     active : (K,)
-        Trials.
+        Numbers of the trials.
     most : int
-        Ticks.
+        Most ticks for each trial.
     dt : float
         Seconds of a tick.
     commands : (B, N, 2)
-        Speed and yaw rate of every car; those of cars that no built-in driver drives are held.
-    world
-        The tables of the batch.
+        Speed, m/s, and yaw rate, rad/s, of every car; those of cars without a built-in driver are held.
+    world : World
+        The tables of the batch, each with a row for each trial.
     """
     for k in range(active.shape[0]):
         b: int = active[k]
@@ -159,7 +159,7 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
 
 @jit_inline
 def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: World) -> None:
-    """Take trial b from its present frame to the next one, or say why not in `own.status`."""
+    """Step trial b to its next frame, or set `own.status` to the reason why it can't be stepped."""
     tick = own.tick
     if world.breach_log.filled[0] + _room(b, world) > world.breach_log.row.shape[0]:
         own.status = STATUS.NO_BREACHES
@@ -170,7 +170,7 @@ def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: Wor
         if own.status != STATUS.RUNNING:
             return
         before = world.work.found[0]
-        least = world.spacing.least[b] - lost(world.spacing, b, tick)
+        least = world.spacing.least[b] - spacing_loss(world.spacing, b, tick)
         moved = step_trial(b, dt, least, commands, world)
         if moved != OUTCOME.MOVED:
             own.status = STATUS.NO_CONTACTS if moved == OUTCOME.FULL else STATUS.NO_PAIRS
@@ -179,7 +179,7 @@ def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: Wor
         if world.work.found[0] > before:
             ego_hit = _note_contacts(b, tick + 1, before, world)
     own.tick = tick + 1
-    keep_apart(world.state, b, tick + 1, world.spacing)
+    refresh_spacing(world.state, b, tick + 1, world.spacing)
     label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
@@ -210,7 +210,7 @@ def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: Worl
     if own.lawful != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, own.sight2, spacing.apart[b], lost(spacing, b, tick), world, commands
+            b, tick, own.sight2, spacing.apart[b], spacing_loss(spacing, b, tick), world, commands
         )  # fmt: skip
     if own.nudged != 0:
         nudge_trial(b, tick, commands, world.agents)
@@ -219,7 +219,7 @@ def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: Worl
 
 @jit_inline
 def _are_finite(b: int, commands: Floats) -> bool:
-    """Tell whether all commands of trial b are finite: those of the law always are, and those from outside before."""
+    """Tell whether all commands of trial b are finite; the law's always are."""
     finite = True
     for n in range(commands.shape[1]):
         speed, yaw_rate = commands[b, n, 0], commands[b, n, 1]
@@ -227,9 +227,9 @@ def _are_finite(b: int, commands: Floats) -> bool:
     return finite
 
 
-@jit
+@jit_rare
 def _note_contacts(b: int, tick: int, first: int, world: World) -> bool:
-    """Note tick and flags of the contacts found from row `first` on; tell whether one is the ego's."""
+    """Note tick and flags of the contacts from row `first` on; tell whether one of them is the ego's."""
     ego_hit = False
     for k in range(first, world.work.found[0]):
         car = world.work.contact[k].car
@@ -256,7 +256,7 @@ def _is_sensed(b: int, n: int, world: World) -> int:
 
 @jit_inline
 def _observe(b: int, tick: int, world: World) -> None:
-    """Judge and count a frame that has been labelled."""
+    """Judge frame `tick`, which has been labelled, and add it to the metrics."""
     breach_log, tally = world.breach_log, world.tally
     count_frame(b, tick, world)
     if world.terms[b].judged == 0:

@@ -1,4 +1,4 @@
-"""Of which trials of a batch records are kept, and where."""
+"""Which trials of a batch have their records kept, and in which folder."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ KEEP = "none, all, failures or sample:K"
 
 
 def chosen(keep: str, count: int) -> Callable[[int, Outcome], bool]:
-    """Return a function that tells by its place among `count` and what came of it whether a trial is recorded.
+    """Return a function that tells, from a trial's place among `count` and its outcome, whether its record is kept.
 
     Raises
     ------
     InputError
-        If `keep` is no such choice.
+        If `keep` is none of `KEEP`.
     """
     kind, colon, number = keep.partition(":")
     if kind == "sample" and colon and number.isdigit() and int(number) > 0:
@@ -32,14 +32,14 @@ def chosen(keep: str, count: int) -> Callable[[int, Outcome], bool]:
         sample = {k * count // wanted for k in range(wanted)}
         return lambda place, _outcome: place in sample
     if keep not in ("none", "all", "failures"):
-        raise InputError("not a choice of records", file="--keep", value=keep, expected=KEEP)
+        raise InputError("unknown choice of trials to record", file="--keep", value=keep, expected=KEEP)
     if keep == "failures":
         return lambda _place, outcome: failed(outcome)
     return lambda _place, _outcome: keep == "all"
 
 
 def failed(outcome: Outcome) -> bool:
-    """Tell whether a trial counts as failed: a rule broken and not excused, a fault, or, unjudged, a collision."""
+    """Tell whether a trial has failed: a rule broken and not excused, a fault, or, if it is not judged, a collision."""
     if outcome.ending.end not in (End.DURATION, End.COLLISION):
         return True
     verdict = outcome.score.verdict
@@ -47,7 +47,10 @@ def failed(outcome: Outcome) -> bool:
 
 
 def folder_of(keep: str, records: str | os.PathLike[str] | None) -> Path | None:
-    """Return the folder for records, made if missing, None if none are kept; InputError if that can't be."""
+    """Return the folder for records, made if missing, or None if none are kept.
+
+    InputError if `keep` asks for records without a folder, a folder is given without `keep`, or it can't be made.
+    """
     if keep == "none" or records is None:
         if (keep == "none") != (records is None):
             raise InputError(

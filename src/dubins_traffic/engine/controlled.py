@@ -1,12 +1,11 @@
-"""Trials of a batch whose egos are driven by controllers in Python: one for each trial, or one for all at once."""
+"""Batched trials whose egos are driven by controllers in Python: one for each trial, or one for all at once."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -16,9 +15,8 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.controllers import blame
 from dubins_traffic.controllers.registry import made
 from dubins_traffic.engine.group import Group, Outcome
-from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.record.sink import SHIELD
@@ -33,20 +31,20 @@ if TYPE_CHECKING:
 
 
 class BatchView(NamedTuple):
-    """What a vectorised controller is shown of all trials that are running.
+    """What a BatchController is shown of all running trials.
 
     Attributes
     ----------
     trial : (K,) int64
-        Number of each trial, by which `start_batch` has announced it.
+        Number of each trial, as given to `start_batch`.
     tick : (K,) int64
-        Its present frame.
+        Present frame of each trial.
     state : State
         Poses and twists, (K, N): car 0 is the ego. What the ego does not see is NaN.
     labels : Labels
         Propositions, (K, N). Of what the ego does not see: 0 for `segment` and `bits`, else -1.
     seen : (K, N) bool
-        Which places hold the ego or a car within its sensing radius.
+        True where there is the ego or a car within its sensing radius.
     """
 
     trial: Ints
@@ -60,11 +58,11 @@ class BatchView(NamedTuple):
 class BatchController(Controller, Protocol):
     """Drives the egos of many trials at once; one object drives all trials of a batch.
 
-    It has `start` and `act` as well, by which a trial can be run by itself, and must do the same then.
+    It also has `start` and `act`, for trials that run by themselves, and must do the same there.
     """
 
     def start_batch(self, trials: Sequence[int], problems: Sequence[Problem]) -> None:
-        """Learn the problems of trials that are about to begin."""
+        """Prepare for the problems of trials that are about to begin; `trials` are their numbers."""
         ...
 
     def act_batch(self, view: BatchView) -> Floats:
@@ -76,7 +74,7 @@ Maker = Callable[[], Controller]
 
 
 class Controlled:
-    """The trials of one group and the controllers that drive their egos.
+    """A group of trials and the controllers that drive their egos.
 
     Parameters
     ----------
@@ -85,11 +83,11 @@ class Controlled:
     make : callable
         Makes the controller of a trial.
     shared : BatchController, optional
-        Drives the egos of all trials instead.
+        Drives the egos of all trials in place of controllers of their own.
     metrics : sequence of callable
-        What makes further metrics of a trial.
+        Each makes a further metric of a trial.
     numbers : sequence of int, optional
-        By which the shared controller is told of the trials; by default their own, which must differ then.
+        The numbers of the trials for the shared controller; by default their own, which must then differ.
 
     Attributes
     ----------
@@ -109,6 +107,7 @@ class Controlled:
         self._lines = [CommandLine(instance) for instance in instances]
         self._senses = [Senses(instance) for instance in instances] if shared is None else []
         self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
+        self._clear = all(line.clear for line in self._lines)
         self._interventions = [0] * len(instances)
         self._told = np.zeros(len(instances), dtype=bool)
         own = [instance.trial for instance in instances] if numbers is None else numbers
@@ -129,7 +128,7 @@ class Controlled:
                 self._end(b, error)
 
     def _look(self) -> None:
-        """Note what each ego is shown, and who hears what its controller reports."""
+        """Set up what each ego observes, and where the reports of its controller go."""
         trials = range(len(self.group.instances))
         self._views = [self._of_trial(b) for b in trials]
         self._notes = [partial(self._hear, b) for b in trials]
@@ -145,9 +144,7 @@ class Controlled:
             If a controller can't be copied.
         """
         if not self._seats:
-            raise DubinsTrafficError(
-                "a controller of whole batches can't go on twice: it knows trials by number"
-            )
+            raise DubinsTrafficError("trials of a BatchController can't be forked: it knows trials by number")
         twin = copy(self)
         twin.group = self.group.fork(trials, seeds)
         own: list[Any] = []
@@ -162,7 +159,7 @@ class Controlled:
         return twin
 
     def ask_each(self) -> None:
-        """Let each ego's own controller choose its command."""
+        """Ask the controller of each running trial for its command."""
         group = self.group
         active: list[int] = group.active.tolist()
         for b in active:
@@ -175,22 +172,31 @@ class Controlled:
                 self.take(b, seen.tick, command)
 
     def take(self, b: int, tick: int, command: object) -> None:
-        """Let a command take effect, or end the trial if it is none."""
+        """Let a command take effect in trial b, or end the trial if it is not two finite numbers."""
         try:
             self.group.commands[b, EGO] = self._lines[b].take(tick, command)
         except ControllerError as error:
             self._end(b, error)
 
+    def take_all(self, ticks: Ints, commands: Floats) -> None:
+        """Let the commands of all running trials take effect, (K, 2); one that is not finite ends its trial."""
+        group = self.group
+        if self._clear and np.isfinite(commands).all():
+            group.commands[group.active, EGO] = commands
+            return
+        for b, tick, command in zip(group.active.tolist(), ticks.tolist(), commands.tolist(), strict=True):
+            self.take(b, tick, command)
+
     def _end(self, b: int, error: ControllerError) -> None:
         self.group.end(b, End(error.reason), error.detail)
 
     def _hear(self, b: int, kind: str, detail: str) -> None:
-        """Count how often a shield has stepped in, and tell the metrics of what a controller reports."""
+        """Pass the report of a controller to the metrics of trial b, and count the interventions of a shield."""
         self._interventions[b] += kind == SHIELD
         self.group.note(b, kind, detail)
 
     def view(self, places: int) -> BatchView:
-        """Return what a vectorised controller is shown of these trials, with `places` for cars."""
+        """Return what a BatchController is shown of these trials, with `places` columns for cars."""
         group = self.group
         b = group.active
         missing = places - group.state.x.shape[1]
@@ -210,12 +216,12 @@ class Controlled:
         return BatchView(self._trials[b], group.ticks[b], state, labels, seen)
 
     def fail(self, error: BaseException) -> None:
-        """End all trials as a fault of their controller."""
+        """End all trials with a fault of their controller."""
         for b in self.group.active.tolist():
             self._end(b, fault(error, int(self.group.ticks[b])))
 
     def step(self, controller: str) -> Iterator[Outcome]:
-        """Take all trials to their next frame; yield what came of those that have ended."""
+        """Step all trials by a tick; yield the outcomes of those that have ended."""
         self.group.advance()
         ended: list[int] = np.flatnonzero(
             ~self._told & [ending is not None for ending in self.group.endings]
@@ -233,117 +239,17 @@ class Controlled:
             )
 
     def _of_trial(self, b: int) -> tuple[State, Labels]:
-        """Return the state and labels of trial b alone; they follow those of the group."""
+        """Return views of the state and labels of trial b, (1, N)."""
         group, cars = self.group, len(self.group.instances[b].starts)
         reals: list[Any] = [array[b : b + 1, :cars] for array in group.state[:6]]
         whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
         return State(*reals, count=group.state.count[b : b + 1]), Labels(*whole)
 
 
-def ask(
-    instances: Iterable[Instance],
-    make: Maker,
-    controller: str,
-    batch: int,
-    cancelled: Callable[[], bool] = lambda: False,
-    metrics: Sequence[MetricMaker] = (),
-) -> Iterator[Outcome]:
-    """Run trials, `batch` at a time, and yield what came of each as it ends; another one then takes its place.
-
-    When `cancelled`, which is asked in every tick, it raises KeyboardInterrupt.
-
-    Parameters
-    ----------
-    instances
-        One a trial.
-    make
-        Makes the controller: one for each trial, or one for all if it is a `BatchController`.
-    controller
-        Its name.
-    batch
-        How many trials run at a time.
-    metrics
-        What makes further metrics for a trial.
-    """
-    made = make()
-    shared = made if isinstance(made, BatchController) else None
-    waiting = iter(instances)
-    seats: list[Controlled] = []
-    while True:
-        if cancelled():
-            raise KeyboardInterrupt
-        free = batch - sum(len(own.group.active) for own in seats)
-        taken = list(islice(waiting, free)) if 8 * free >= batch else []
-        for own in grouped(taken):
-            if shared is not None:
-                check_clear(own)
-            seats.append(Controlled(own, make, shared, metrics))
-        if not seats:
-            return
-        if shared is None:
-            for own in seats:
-                own.ask_each()
-        else:
-            ask_all(seats, shared)
-        for own in seats:
-            yield from own.step(controller)
-        seats = [own for own in seats if len(own.group.active)]
-
-
 def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
-    """Return instances in groups that can be stepped together: of one control rate, width, and reach of memory."""
+    """Return instances in groups that can be stepped together: of one control rate, width and length of trails."""
     groups: dict[tuple[float, float, float], list[Instance]] = {}
     for instance in instances:
         gap = max((agent.driver.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
         groups.setdefault((instance.problem.rate, instance.problem.car.w, gap), []).append(instance)
     return list(groups.values())
-
-
-def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
-    """Let one controller choose the commands of all egos."""
-    seats = [own for own in seats if len(own.group.active)]
-    if not seats:
-        return
-    places = max(own.group.state.x.shape[1] for own in seats)
-    views = [own.view(places) for own in seats]
-    whole = BatchView(
-        np.concatenate([view.trial for view in views]),
-        np.concatenate([view.tick for view in views]),
-        State(*_joined([view.state for view in views])),
-        Labels(*_joined([view.labels for view in views])),
-        np.concatenate([view.seen for view in views]),
-    )
-    try:
-        answer = np.asarray(controller.act_batch(whole), dtype=np.float64)
-        if answer.shape != (len(whole.trial), 2):
-            raise TypeError(f"act_batch returned {answer.shape}, not {(len(whole.trial), 2)}")
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        blame.show(error)
-        for own in seats:
-            own.fail(error)
-        return
-    row = 0
-    for own, view in zip(seats, views, strict=True):
-        for b, tick in zip(own.group.active.tolist(), view.tick.tolist(), strict=True):
-            own.take(b, tick, answer[row].tolist())
-            row += 1
-
-
-def _joined(tables: Sequence[Tables]) -> list[Any]:
-    """Return the arrays of several tables, one after another, column by column."""
-    return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
-
-
-def check_clear(instances: Sequence[Instance]) -> None:
-    """Refuse instances with noise in observations, which a controller of whole batches is not shown."""
-    for instance in instances:
-        noise = instance.disturbances
-        if noise.position_noise > 0.0 or noise.heading_noise > 0.0:
-            raise InputError(
-                "a controller of whole batches is shown poses without noise",
-                field="disturbances",
-                value=noise,
-                expected="no noise, or a controller with start and act",
-            )

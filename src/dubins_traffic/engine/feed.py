@@ -1,4 +1,4 @@
-"""The frames of trials that are stepped together, for metrics that are not compiled: kept tick by tick."""
+"""Collects the frames of batched trials, tick by tick, for metrics that are not compiled."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Feed:
-    """Shows the frames of each trial to metrics of its own, a second at a time.
+    """Hands the frames of each batched trial to its metrics in Python, in blocks of one second.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Feed:
     cars : int
         Places for cars, N.
     metrics : sequence of callable
-        What makes the metrics of a trial.
+        Each makes a metric of a trial.
     """
 
     def __init__(self, instances: Sequence[Instance], cars: int, metrics: Sequence[Maker]) -> None:
@@ -100,7 +100,7 @@ class Feed:
         self._events[b].append(event)
 
     def result(self, b: int, ending: Ending, contacts: Sequence[Contact]) -> tuple[Measured, ...]:
-        """Return what the metrics of trial b tell, which has ended."""
+        """Return the values of the metrics of trial b, which has ended."""
         self._flush(b, contacts)
         self._sinks[b].end(ending)
         return self._sinks[b].result()

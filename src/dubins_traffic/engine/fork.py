@@ -1,7 +1,7 @@
-"""Forks of some trials of a batch: the rows of these trials out of all its tables, as many times as they are wanted.
+"""Forks of trials of a batch: copies of these trials' rows out of all tables.
 
-Tables hold one row per trial, but for three sorts of arrays: goals and obstacles stand one trial after another, with
-offsets; the ego's path, for each car that follows, stands where the car says; and what no trial changes (roads, lanes
+Tables hold one row per trial, with three exceptions. Goals and obstacles stand one trial after another, with offsets.
+The ego's path, for each car that follows it, stands in the row that the car names. What no trial changes (roads, lanes
 of loops, scripts, stages) is shared by the batch and its forks.
 """
 
@@ -34,18 +34,18 @@ class Ragged(NamedTuple):
 
 
 def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt: float) -> World:
-    """Return the tables of forks of some trials, one of which may be named more than once.
+    """Return the tables of forks of some trials; a trial may be named more than once.
 
     The batch and its forks share nothing that changes.
 
     Parameters
     ----------
     world : World
-        The tables of the batch, of whose breaches and contacts none is still to be taken over.
+        The tables of the batch, whose breaches and contacts have all been taken over.
     trials : (K,)
         Numbers of trials of the batch.
     seeds : (K,) uint64, optional
-        From which each fork draws from here on; by default from its own.
+        Seed of each fork from here on; by default that of its trial.
     dt : float
         Seconds of a tick.
     """
@@ -100,14 +100,14 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
 
 
 def rows_of(table: Table, trials: Ints, **other: Any) -> Table:
-    """Return a table of which each array has the rows of `trials`, but for the arrays in `other`."""
+    """Return a copy of a table with the rows `trials` of each array, except for the arrays given in `other`."""
     names = table.field_names
     own = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
     return type(table)(*own)
 
 
 def ragged(off: Ints, trials: Ints) -> Ragged:
-    """Return the rows of `trials` out of rows with the offsets `off` (B + 1,), and their offsets (K + 1,)."""
+    """Return the offsets (K + 1,) and row numbers (R,) of `trials` in arrays whose offsets are `off` (B + 1,)."""
     first, count = off[trials], np.diff(off)[trials]
     ends = np.append(0, count.cumsum())
     rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(first - ends[:-1], count)
@@ -124,7 +124,7 @@ def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
 
 
 def _goals(terms: Rows[RefereeParameters]) -> Ints:
-    """Return the rows of the goals of forks, which are theirs from here on, one fork's after the other's."""
+    """Return the rows of the forks' goals, one fork's after another's; set `goals_begin` and `goals_end` to match."""
     begin, end = terms["goals_begin"].copy(), terms["goals_end"].copy()
     ends = np.append(0, (end - begin).cumsum())
     terms["goals_begin"] = ends[:-1]
@@ -146,7 +146,7 @@ def _tally(tally: Tally, trials: Ints) -> Tally:
 
 
 def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:
-    """Return the e-agents of forks; each car that follows or is nudged has a memory of its own."""
+    """Return the e-agents of forks; each car that follows the ego or is nudged gets a memory of its own."""
     team, cars = agents.team[trials], agents.agent[trials]
     if seeds is not None:
         team["seed"] = seeds

@@ -1,4 +1,4 @@
-"""Trials that are stepped together: their tables, the compiled tick, and what came of each."""
+"""A group of trials that are stepped together: their tables, steps and outcomes."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import find_all, stages
 from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeTables
 from dubins_traffic.rules.fault import with_fault_by
-from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee import Breach, breach_of, running, terms_of
+from dubins_traffic.rules.referee import Breach, breach_of, pending_of, terms_of
 from dubins_traffic.scoring.margins_kernel import margin_rules
 from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.outcome import BatchScores
@@ -57,14 +57,14 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 FRAMES = 16
-"""For how many frames of any trial in which all goes wrong there is room in the breach_log."""
+"""Frames, each with all breaches that are possible, for which the breach log has rows."""
 WORK = 500_000
-"""Steps of cars in one call of the kernel, about: so Ctrl-C is heard within some tenths of a second."""
+"""About how many cars are moved, tick by tick, in one call of the kernel: so Ctrl-C waits some tenths of a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a trial of a group; `act_s` sums up the latencies of its controller's `act`, where there is one."""
+    """The outcome of a trial: score, verdict, ending; `act_s` is the summary of its controller's latencies, if any."""
 
     instance: Instance
     ending: Ending
@@ -76,27 +76,27 @@ class Outcome:
 
 
 class Group:
-    """Some trials of one control rate on their way.
+    """Trials of one control rate that are stepped together.
 
     Parameters
     ----------
     instances : sequence of Instance
-        One a trial; with the embedded simulator, without formulas of the user's and without remote cars.
+        One for each trial; with the embedded simulator, without formulas of the user's and without remote cars.
     keeps_rules : bool
-        Whether the controller `rules` drives the egos, compiled; else `commands` says what they do.
+        Whether the compiled controller `rules` drives the egos; otherwise `commands` holds their commands.
     metrics : sequence of callable
-        What makes further metrics; they are shown every frame, so the trials are taken tick by tick.
+        Each makes a further metric; they see every frame, so trials are then stepped tick by tick.
 
     Attributes
     ----------
     state, labels : State, Labels
         The present frame of each trial, (B, N).
     commands : (B, N, 2)
-        Speed and yaw rate of each car; those of the egos may be written between the ticks.
+        Speed, m/s, and yaw rate, rad/s, of each car; those of the egos may be written between ticks.
     endings : list of Ending or None
         How each trial has ended, None while it runs.
     contacts, breaches : list of list
-        Those of each trial so far.
+        Those of each trial up to its present frame.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class Group:
         self._world = World(
             state=self.state, cars=cars, obstacles=obstacles, rows=rows, work=work, roads=roads, beside=beside,
             rules=rules, terms=terms, labels=labeller.labels, memory=labeller.memory, breach_log=breach_log,
-            drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments),
+            drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments, obstacles),
             agents=pack_agents(instances, places, net), space=workspace(places, PAIRS, 2 * segments),
             tally=new_tally(instances, net, places), progress=self._progress(len(work.contact), len(breach_log.row)),
             spacing=apart, labelling=labelling, judging=judging,
@@ -147,23 +147,23 @@ class Group:
         self._aim()
 
     def _note_rules(self) -> None:
-        """Note the parameters of the rules, and what the margins follow from."""
-        kinds, index = kinds_of([instance.problem for instance in self.instances])
+        """Set the parameters of the rules and of the margins."""
+        kinds, index = distinct_problems([instance.problem for instance in self.instances])
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
         self._margins = margin_rules(rules, [kind.period for kind in kinds], index)
         numbers: list[int] = index.tolist()
         self._rules = [rules[k] for k in numbers]
 
     def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Group:
-        """Return a group of forks of some trials, each of which goes on from its present frame by itself.
+        """Return a group of independent copies of some trials at their present frames.
 
         Parameters
         ----------
         trials : sequence of int
             Numbers of trials of this group that have not ended. A trial may be named several times.
         seeds : sequence of int, optional
-            From which each fork draws from here on; by default as its trial does, and then what comes of a fork equals
-            what comes of its trial, bit for bit.
+            Seed of each fork from here on; by default that of its trial, and then the outcomes of a fork and of its
+            trial are equal, bit for bit.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class Group:
         """
         ended = [b for b in trials if not self._going[b]]
         if ended:
-            raise DubinsTrafficError(f"trial {ended[0]} of the group has ended: nothing goes on")
+            raise DubinsTrafficError(f"trial {ended[0]} of the group has ended and can't be forked")
         taken = np.array(trials, dtype=np.int64)
         drawn = None if seeds is None else np.array(seeds, dtype=np.uint64)
         twin = copy(self)
@@ -213,35 +213,35 @@ class Group:
         return np.flatnonzero(self._going)
 
     def advance(self, most: int = 1) -> None:
-        """Take each trial that has not ended up to `most` ticks farther."""
+        """Step each trial that has not ended by up to `most` ticks."""
         if len(active := self.active):
             self._run(active, most)
 
     def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
-        """Run all trials to their ends, about `WORK` steps of cars at a time; stop in between when `cancelled`.
+        """Run all trials to their ends, in calls of about `WORK` moves of cars; stop between calls when `cancelled`.
 
-        Interpreted it is a hundredth of that at a time, and between two times kernels may go over to machine code.
+        Interpreted, a call does a hundredth of that; between two calls kernels may be replaced by compiled ones.
         """
         while len(active := self.active) and not cancelled():
             work = WORK if is_quick(run_trials) else WORK // 100
             self._run(active, max(1, work // (len(active) * self.state.x.shape[1])))
 
     def end(self, b: int, end: End, detail: str = "") -> None:
-        """End trial b for a reason of its driver's."""
+        """End trial b for a reason that its ego's driver gave."""
         self.endings[b] = Ending(end, int(self.ticks[b]), detail)
         if end is not End.DURATION:
             self.note(b, end.value, detail)
         self._going[b] = False
 
     def note(self, b: int, kind: str, detail: str) -> None:
-        """Tell the metrics of trial b of an event of the ego's, at its present tick."""
+        """Hand an event of the ego, at the present tick of trial b, to its metrics."""
         if self._feed is not None:
             self._feed.note(b, Event(int(self.ticks[b]), kind, EGO, detail))
 
     def outcomes(
         self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
     ) -> list[Outcome]:
-        """Return what came of some trials, which have ended; `begin` tells their times to begin, where measured."""
+        """Return the outcomes of trials that have ended; `begin` has their times to begin, seconds, where measured."""
         if not trials:
             return []
         world, begin, name = self._world, begin or {}, bare_name(controller)
@@ -250,7 +250,7 @@ class Group:
         find_all([own for b in trials if (own := self.instances[b].problem).rules])
         scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
         found: list[Outcome] = []
-        pending = running(rows, world.terms, world.breach_log)
+        pending = pending_of(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
             score = scores.score(
                 self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging,
@@ -275,7 +275,7 @@ class Group:
         return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))
 
     def _aim(self) -> None:
-        """Let the egos that keep the rules begin with the goal nearest to where they start."""
+        """Set the first goal of the egos that keep the rules: the nearest to their start."""
         world = self._world
         drivers, labels = world.drivers, world.labels
         world.progress.trial["lawful"] = drivers.active
@@ -285,7 +285,7 @@ class Group:
             own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
-        """Take trials up to `most` ticks farther, with the metrics that are shown every frame tick by tick."""
+        """Step trials by up to `most` ticks; tick by tick if there are metrics that see every frame."""
         if self._feed is None:
             self._carry(active, most)
             return
@@ -306,12 +306,12 @@ class Group:
             active, goal = active[going], goal[going]
 
     def settle(self, trials: Ints) -> None:
-        """Take over what a pass of `trials` that others have called has found; note which have ended, and make room."""
+        """Take over what a call of the kernel by others has found in `trials`: contacts, breaches and endings."""
         self._drain()
         self._mind(trials)
 
     def _mind(self, active: Ints) -> None:
-        """Enlarge what was too small, and write down how trials ended."""
+        """Enlarge the buffers that were too small, and set the endings of trials that have ended."""
         status = self._world.progress.trial["status"][active]
         if (status == STATUS.NO_PAIRS).any():
             self._world = self._world.replace(work=enlarged(self._world.work))
@@ -328,7 +328,7 @@ class Group:
                 self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))
 
     def _drain(self) -> None:
-        """Take over the contacts and breaches that have been found, and make room."""
+        """Move the contacts and breaches found out of their buffers into `contacts` and `breaches`."""
         world = self._world
         for k, row in enumerate(world.work.meetings()):
             note = world.progress.contact[k]
@@ -344,7 +344,7 @@ class Group:
         world.work.found[0] = world.breach_log.filled[0] = 0
 
     def _is_seen(self, b: int, breach: Breach) -> bool:
-        """Tell whether the car of a breach was within the ego's sensing radius in that frame."""
+        """Tell whether the car of a breach was within the ego's sensing radius in the frame of the breach."""
         ego = self._world.tally.ego[b, breach.tick]
         dx, dy = ego.x - breach.x, ego.y - breach.y
         return bool(dx * dx + dy * dy <= self._world.progress.trial[b].sight2)

@@ -1,4 +1,4 @@
-"""Which trials can be stepped together with others, and which run by themselves."""
+"""Which trials can be batched, and which have to run by themselves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def fitness() -> Callable[[Instance], bool]:
-    """Return a function that does as `_is_fit`, and looks at trials that are alike in this once."""
+    """Return a function that does as `_is_fit` and remembers its answer for trials that are alike."""
     known: dict[tuple[float, ...], bool] = {}
 
     def fit(instance: Instance) -> bool:
@@ -30,14 +30,14 @@ def fitness() -> Callable[[Instance], bool]:
 
 
 def can_share(instance: Instance) -> bool:
-    """Tell whether a trial can be stepped with others, whatever drives its ego."""
+    """Tell whether a trial can be batched, whatever drives its ego."""
     apart = any(agent.kind in ALONE for agent in instance.e_agents)
     plain = instance.simulator == "embedded" and instance.problem.car.model == DUBINS
     return plain and not instance.problem.formulas and not apart
 
 
 def _is_fit(instance: Instance) -> bool:
-    """Tell whether the cars can keep the rules; what is said where they can't is said of a trial by itself."""
+    """Tell whether the cars can keep the rules; for those that can't, the trial run by itself raises the error."""
     lawful = any(agent.driver.kind in KEEP_RULES for agent in instance.e_agents)
     try:
         check_fit(instance.problem, owes=False)
@@ -49,7 +49,7 @@ def _is_fit(instance: Instance) -> bool:
 
 
 def undisturbed(instance: Instance) -> bool:
-    """Tell whether nothing disturbs what the ego sees and asks for."""
+    """Tell whether the ego's observations have no noise and its commands neither delay nor loss."""
     own = instance.disturbances
     noise = own.position_noise > 0.0 or own.heading_noise > 0.0
     return not noise and own.command_delay == 0 and own.command_loss == 0.0

@@ -1,4 +1,4 @@
-"""Environments for learning, Gymnasium's, on the batch engine. Importing this room makes their names known to it."""
+"""Environments for reinforcement learning, on the batch engine; importing this room registers them in Gymnasium."""
 
 from dubins_traffic.envs.registration import register
 

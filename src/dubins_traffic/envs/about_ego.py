@@ -1,4 +1,4 @@
-"""What a car is told of the ego beside what it senses: where it is and goes; and what each car has done."""
+"""What an agent observes of the ego in addition to its senses: its place and goal, and what each car has done."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = (
     "is_ego", "bearing_cos", "bearing_sin", "distance", "heading_cos", "heading_sin", "speed", "yaw_rate",
     "goal_bearing_cos", "goal_bearing_sin", "goal_distance", "route",
 )  # fmt: skip
-"""The numbers told of the ego, in order, each from -1 to 1."""
+"""Names of these numbers, in order; each is from -1 to 1."""
 Flats = npt.NDArray[np.float32]
 
 

@@ -20,7 +20,7 @@ TURNS: Final = (-1.0, -0.25, 0.0, 0.25, 1.0)
 
 
 class ActionMap:
-    """What actions stand for.
+    """The table of the commands that actions stand for.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Trials of episodes that are stepped together: a group of the engine, and what environments ask of it."""
+"""A bank: a group of trials of the engine that environments step, with observations and rewards."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Board:
-    """What a step of all environments gives, in arrays whose rows are environments (`envs.tables.StepTables`).
+    """The results of a step of all environments, arrays with a row per environment (`envs.tables.StepTables`).
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Board:
 
 
 class Bank:
-    """Some trials, of which each waits in its first frame until an environment steps it.
+    """A group of trials, each of which waits in its first frame until an environment steps it.
 
     Parameters
     ----------
@@ -95,12 +95,12 @@ class Bank:
         begin_trials(self.outlook, self.steps)
 
     def observe(self, rows: Ints, envs: Ints) -> None:
-        """Write what the egos of some trials observe as that of the environments `envs`."""
+        """Write the observations of the egos of some trials as those of the environments `envs`."""
         self._observe(rows, envs, self.outlook, self.steps)
         self._look(rows, envs)
 
     def step(self, rows: Ints, envs: Ints, ticks: int) -> bool:
-        """Take some trials up to `ticks` ticks farther, with the actions that stand on the board.
+        """Step some trials by up to `ticks` ticks, with the actions on the board.
 
         Returns
         -------
@@ -134,13 +134,13 @@ class Bank:
         self.watches[row] = FormulaWatch(self.group, row, formulas)
 
     def _look(self, rows: Ints, envs: Ints) -> None:
-        """Let what stands between look at the present frames, and put down what it shows of them."""
+        """Write the observations of the present frames as disturbances change them."""
         for row, env in zip(rows.tolist(), envs.tolist(), strict=True) if self.between else ():
             if row in self.between:
                 self.between[row].look(self.steps.flat[env])
 
     def _pass_on(self, rows: Ints, envs: Ints, *, begins: bool) -> None:
-        """Let the egos do in the coming tick what comes of the actions on their way."""
+        """Replace the egos' commands for the coming tick by what disturbances and shields make of them."""
         self._look(rows, envs)
         for row in rows.tolist():
             own, stride = self.between.get(row), cast(Stride, self.steps.stride[row])

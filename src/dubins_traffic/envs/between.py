@@ -1,4 +1,4 @@
-"""What stands between an environment and its ego: noise, a shield, and commands that come late or not at all.
+"""Disturbances and shield between an environment and its ego: noise, and commands that are delayed, lost or changed.
 
 It is what `run_trial` puts between a controller and its car, in the same order (docs/semantics.md), made of the same
 parts: so an episode stays the trial that it cites.
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Between:
-    """Stands between an environment and the ego of one trial of a group.
+    """Applies disturbances and a shield between an environment and the ego of one trial of a group.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ class Between:
 
     @property
     def interventions(self) -> int:
-        """In how many ticks the shield has changed the command."""
+        """Number of ticks in which the shield has changed the command."""
         return 0 if self._shield is None else self._shield.count
 
     def look(self, flat: npt.NDArray[np.float32]) -> None:
-        """Look at the present frame, unless that has been done; write the flat observation, (F,), if there is noise."""
+        """Observe the present frame, once; if there is noise write the flat observation, (F,)."""
         tick = int(self._group.ticks[self._row])
         if self._seen is None or self._seen.tick != tick:
             self._seen = self._senses.observe(tick, self._state, self._labels)
@@ -83,7 +83,7 @@ class Between:
             flat[:] = self._shows
 
     def command(self, asked: Floats | None) -> tuple[float, float]:
-        """Return what the ego does in the coming tick.
+        """Return the command that takes effect in the coming tick, m/s and rad/s.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Who broke the agreement first: which breaches count, and which are excused.
+"""Decides which breaches count against a car, and which are excused since another car broke its part first.
 
 The rules are an agreement: the e-agents keep E1 to E6, and the ego then keeps rules 1 to 3 (docs/rules.md). Within a
 frame the e-agents move first, as in a verdict.
@@ -17,7 +17,7 @@ from dubins_traffic.scoring.verdict import assumed, assumption_of
 
 
 class Blame:
-    """Tells of the breaches of one trial, as they come, which count.
+    """Decides for the breaches of one trial, as they come, which count.
 
     - A breach by an e-agent counts if the problem assumes the part of E1 to E6 that it breaks, if it is beyond the
       exceptions that are allowed, and if the ego has not violated its own part in an earlier frame.
@@ -47,7 +47,7 @@ class Blame:
         self.first: int | None = None
 
     def of(self, breaches: Sequence[Breach]) -> list[tuple[Breach, str]]:
-        """Return those that count of the breaches found since the last call, each with the part that it breaks.
+        """Return the breaches since the last call that count, each with the part that it breaks.
 
         That is ``E1`` to ``E6`` of an e-agent's, and the rule itself of the ego's.
         """

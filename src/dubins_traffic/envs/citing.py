@@ -1,4 +1,4 @@
-"""Episodes given to `run_trial` again: all cars play the commands that they were given, and the frames are the same."""
+"""Runs episodes again with `run_trial`: all cars play the commands of the episode, which gives the same frames."""
 
 from __future__ import annotations
 

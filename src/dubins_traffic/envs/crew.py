@@ -1,4 +1,4 @@
-"""Trials whose cars learners drive, some or all: stepped together, each car observed, counted and blamed by itself."""
+"""A crew: trials in which learners drive some or all cars, stepped together, with observations and costs per car."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
 LEARNER: Final = "learner/policy"
 """The type of an e-agent that a learner drives."""
 PARTS: Final = (*COSTS, *ASSUMPTIONS)
-"""What can be broken, by number: by the ego a rule, or being at fault; by an e-agent a part of E1 to E6."""
+"""The parts that can be broken, by number: of the ego its rules and fault, of an e-agent E1 to E6."""
 Bools = npt.NDArray[np.bool_]
 
 
 @dataclass
 class Cast:
-    """Who drives what in the trials of a crew.
+    """Which cars learners drive in the trials of a crew.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Crew:
         return found
 
     def step(self, asked: Floats, ticks: int) -> None:
-        """Take all trials that have not ended up to `ticks` ticks farther.
+        """Step all trials that have not ended by up to `ticks` ticks.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class Crew:
         return (trials[:, None] * places + np.arange(self._cars)).reshape(-1)
 
     def _charge(self, trials: Ints) -> None:
-        """Count what has been broken since the last time, where that counts."""
+        """Count the breaches since the last call that count."""
         for b in map(int, trials):
             breaches, contacts = self.group.breaches[b], self.group.contacts[b]
             seen, met = self._known[b]
@@ -198,7 +198,7 @@ class Crew:
 
     @property
     def observed(self) -> npt.NDArray[np.float32]:
-        """What each car observes, (B, N, F)."""
+        """The observation of each car, (B, N, F)."""
         whole = np.concatenate([self._flat, self._told], axis=1)
         return whole.reshape(*self.group.state.x.shape, -1)
 
@@ -213,7 +213,7 @@ def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
 
 
 def _guilty(breach: Breach, contacts: Sequence[Contact]) -> int:
-    """Return in how many contacts of the tick of a collision the ego is at fault."""
+    """Return the number of contacts in the tick of a collision in which the ego is at fault."""
     own = [one for one in contacts if one.tick == breach.tick]
     return sum(
         guilty and car == EGO

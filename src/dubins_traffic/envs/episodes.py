@@ -1,4 +1,4 @@
-"""Which trial each episode of an environment is: a function of a seed, of the environment and of the episode's number.
+"""The trial of each episode: a function of a seed, the environment's number and the episode's number.
 
 Episode k of environment i under the base seed s is trial ``4096 k + i`` of seed s. With a pool of levels its road
 network is that of a level, drawn from the same numbers; all else is drawn as ever.
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 MOST_ENVS: Final = 4096
-"""So many environments have trials of their own under one seed."""
+"""Most environments that have trials of their own under one seed."""
 TEST: Final = 1 << 31
 """Levels to train on are drawn as trials from 0 on, those to test on as trials from here on."""
 LEVEL_DRAW: Final = 260
@@ -60,7 +60,7 @@ class Levels:
 
     @staticmethod
     def of(given: Levels | Mapping[str, Any] | int | None) -> Levels | None:
-        """Return the pool that a number, or a mapping of the parameters, stands for."""
+        """Return the pool given by its size, or by a mapping of its parameters."""
         if given is None or isinstance(given, Levels):
             return given
         if isinstance(given, int):

@@ -1,4 +1,4 @@
-"""Environments that are stepped together, without Gymnasium's names for it: each is in one trial after another."""
+"""Environments that are stepped together, independent of Gymnasium's interface; each runs one trial after another."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dubins_traffic.shield.tables import Overtakes
 
 AHEAD: Final = 4
-"""So many trials wait for each environment, at most."""
+"""Most trials that are drawn ahead for each environment."""
 
 
 class Fleet:
@@ -83,7 +83,7 @@ class Fleet:
         scale.pause = scale.waits = 1
 
     def begin(self, envs: Iterable[int]) -> None:
-        """Put environments into their next trials, and observe the first frames of these."""
+        """Begin the next trials of environments, and observe their first frames."""
         some = list(envs)
         if any(not self._ready[env] for env in some):
             self._fill(some)
@@ -101,7 +101,7 @@ class Fleet:
             bank.observe(rows, places)
 
     def step(self, actions: Any) -> None:
-        """Take all environments whose trials have not ended through a step.
+        """Step all environments whose trials have not ended.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Fleet:
         return bank.group.instances[row]
 
     def states(self, env: int) -> dict[str, Status]:
-        """Return what is said of each formula, in the present frame of an environment's trial."""
+        """Return the verdict on each formula in the present frame of an environment's trial."""
         bank, row = self.seat(env)
         return bank.watches[row].states
 
@@ -153,7 +153,7 @@ class Fleet:
         return int(bank.group.ticks[row])
 
     def between(self, env: int) -> Between:
-        """Return what stands between an environment and its ego, where it is disturbed or under a shield."""
+        """Return the disturbances and shield of an environment's ego, if there are any."""
         bank, row = self.seat(env)
         return bank.between[row]
 
@@ -163,12 +163,12 @@ class Fleet:
         return bank.group.endings[row]
 
     def is_terminal(self, env: int) -> bool:
-        """Tell whether an environment's trial has come to an end of its own, and not to that of its time."""
+        """Tell whether an environment's trial has ended before its time."""
         ending = self.ending(env)
         return ending is not None and ending.end is End.COLLISION
 
     def outcomes(self, envs: Sequence[int]) -> list[Outcome]:
-        """Return what came of the trials of environments, which have ended."""
+        """Return the outcomes of the trials of environments, which have ended."""
         found: dict[int, Outcome] = {}
         for bank, rows, places in self._grouped(envs):
             found.update(zip(places.tolist(), bank.group.outcomes(rows.tolist(), "env"), strict=True))
@@ -188,7 +188,7 @@ class Fleet:
         return [(bank, np.array(rows), np.array(places)) for bank, rows, places in found.values()]
 
     def _fill(self, envs: Sequence[int]) -> None:
-        """Draw trials for environments that have none ahead, and for others while at it.
+        """Draw trials ahead for environments that have none, and for others together with them.
 
         The first time each gets one trial; afterwards all get some, so that few banks are under way at a time.
         """

@@ -1,4 +1,4 @@
-"""States of formulas while a trial runs: what is said of each after every tick, as reward machines want to know."""
+"""The verdicts on formulas after every tick of a running trial, as reward machines need them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class FormulaWatch:
-    """Judges formulas on the frames of one trial of a group, one after another; its instance does not know of them.
+    """Judges formulas, which are not part of the instance, frame by frame on one trial of a group.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a step tells beside its observation: terms of the reward, and costs by rule."""
+"""The info of a step: terms of the reward, and costs by rule."""
 
 from __future__ import annotations
 

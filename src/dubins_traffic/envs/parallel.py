@@ -1,4 +1,4 @@
-"""Traffic for PettingZoo: every car an agent, or adversaries about an ego that others drive, judged by the rules."""
+"""The environment for PettingZoo: every car an agent, or adversaries around an ego with a controller."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Flags = dict[str, bool]
 
 
 class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
-    """The cars of a trial as agents: the ego and e-agents, or e-agents about an ego that a controller drives.
+    """The cars of a trial as agents: the ego and e-agents, or e-agents around an ego that a controller drives.
 
     The agents are ``ego_0`` and ``car_1``, ``car_2`` ..., by the numbers of the cars; `names` has those of records.
     Every episode is a trial of the benchmark; `commands` and ``info["trial"]`` give it to `run_trial` again (see
@@ -216,7 +216,8 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
     def commands(self) -> Floats:
         """The commands of all cars in each tick of this episode so far, (K, N, 2), m/s and rad/s."""
         given = self._begun().given
-        return np.array([own[0] for own in given]).reshape(len(given), len(self._cars), 2)
+        cars = len(self._cars)  # the tables of a batch may have more places than the trial has cars
+        return np.array([own[0, :cars] for own in given]).reshape(len(given), cars, 2)
 
     def _paid(self, crew: Crew, name: str) -> tuple[float, dict[str, Any]]:
         car = self._ids.index(name)

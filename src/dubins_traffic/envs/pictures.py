@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 MODES: Final = ("rgb_array", "human")
 """Ways to see an environment: as an array (H, W, 3) uint8, or in the browser, in real time."""
 SIDE: Final = 400
-"""Pixels of a side, unless another number is asked for."""
+"""Default number of pixels of a side."""
 
 
 class Renderer:
-    """Shows trials.
+    """Draws trials of environments as arrays, or on a page in the browser.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Renderer:
         return None
 
     def _raster(self, problem: Problem, env: int) -> Raster:
-        """Return what draws the trials of a problem, which an environment has been in last, or is in now."""
+        """Return the canvas for the problem of an environment's last or present trial."""
         kept = self._rasters.get(env)
         if kept is None or kept[0] is not problem:
             width, height = self._size

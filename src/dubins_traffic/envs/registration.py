@@ -1,4 +1,4 @@
-"""The names of our environments in Gymnasium's registry."""
+"""Registers the environments in Gymnasium."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ NAMES: Final[dict[str, dict[str, Any]]] = {
     "dubins_traffic/Town-v0": {"config": "town"},
     "dubins_traffic/Junction-v0": {"config": "junction"},
 }
-"""Each with what its environments are made with; `Traffic` takes any configuration."""
+"""Names, each with the arguments of its environments; `Traffic` takes any configuration."""
 
 
 def register() -> None:
-    """Make the environments known to Gymnasium, once."""
+    """Register the environments in Gymnasium, once."""
     for name, given in NAMES.items():
         if name not in gymnasium.registry:
             cast(Any, gymnasium).register(

@@ -1,4 +1,4 @@
-"""What the cars of a trial are paid for: the ego, adversaries that spoil its task, and peers with their own."""
+"""Rewards of the cars of a trial by role: ego, adversaries that spoil its task, peers with tasks of their own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ADVERSARY: Final[Mapping[str, float]] = {
     **dict.fromkeys(ASSUMPTIONS, -1.0),
     "E2": -5.0,
 }
-"""What each term of an adversary's reward counts unless it is said otherwise.
+"""Default weights of the terms of an adversary's reward.
 
 `spoiled`: what the ego's visits, rounds and progress count for it, with the sign turned; `violated`: breaches of the
 ego's that count; and its own breaches that count, by the part of the assumption.
@@ -33,15 +33,15 @@ PEER: Final[Mapping[str, float]] = {
     **dict.fromkeys(ASSUMPTIONS, -1.0),
     "E2": -5.0,
 }
-"""The same of a peer, which goes round the goals as the ego does."""
+"""Default weights of the terms of a peer's reward; a peer goes round the goals as the ego does."""
 ROLES: Final[Mapping[str, Mapping[str, float]]] = {"adversaries": ADVERSARY, "peers": PEER}
-"""What e-agents may be."""
+"""The roles of e-agents."""
 _FIRST: Final = len(COSTS)
 """The first of `PARTS` that an e-agent may break."""
 
 
 class Pay:
-    """Works out what each car of a crew is paid in a step.
+    """Computes the reward of each car of a crew in a step.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Pay:
         return sum(found.values()), {"reward_terms": found, "cost": parts}
 
     def _task(self, crew: Crew, b: int) -> float:
-        """Return what the ego's visits, rounds and progress have counted for it."""
+        """Return the part of the ego's reward from visits, rounds and progress."""
         return float(
             sum(crew.terms[b, EGO, k] * self._ego[k] for k in (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS))
         )

@@ -1,4 +1,4 @@
-"""What an environment is made with: its configuration, observations, actions, terms of the reward."""
+"""The settings of an environment: configuration, observations, actions, terms of the reward."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.engine.sharing import can_share, undisturbed
 from dubins_traffic.envs.actions import ActionMap
 from dubins_traffic.envs.episodes import Episodes, Levels
@@ -23,7 +24,7 @@ OBSERVATIONS: Final = ("flat", "dict", "object")
 
 @dataclass(frozen=True)
 class Settings:
-    """What environments of one kind have in common, checked.
+    """The checked settings that environments of one kind share.
 
     Parameters
     ----------
@@ -76,6 +77,7 @@ class Settings:
         own = self.config if isinstance(self.config, Configuration) else load_config(self.config)
         episodes = Episodes(own, Levels.of(self.levels))
         (sample,) = episodes.draw([(0, 0, 0)])
+        require_dubins(sample.problem.car, "environments move cars together, which is")
         if not can_share(sample):
             expected = "the embedded simulator, no formulas, no remote cars"
             raise InputError(
@@ -95,7 +97,7 @@ class Settings:
 
     @property
     def disturbed(self) -> bool:
-        """Whether something disturbs what the egos see, or what they are asked to do."""
+        """Whether observations have noise, or commands are delayed or lost."""
         return not undisturbed(self.sample)
 
 

@@ -15,7 +15,7 @@ from dubins_traffic.shield.tables import Overtakes
 
 
 class Shielded(BaseParallelWrapper[str, Any, Any]):
-    """An environment some of whose agents are kept within the rules: the ego within 1 to 3, e-agents within E1 and E2.
+    """An environment with shields for some agents: the ego then keeps rules 1 to 3, e-agents keep E1 and E2.
 
     In every tick a command that would break a rule is changed to the nearest one that breaks none; ``interventions``
     in an agent's info is the number of ticks of the step in which that was done.

@@ -13,7 +13,7 @@ from dubins_traffic.shield.tables import Overtakes
 
 
 class ShieldedEgo(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """An environment whose ego is kept within rules 1 to 3, whatever its actions.
+    """An environment whose ego keeps rules 1 to 3 under a shield, whatever its actions.
 
     In every tick a command that would break a rule is changed to the nearest one that breaks none;
     ``info["interventions"]`` is the number of ticks of the step in which that was done, and

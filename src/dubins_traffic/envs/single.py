@@ -1,4 +1,4 @@
-"""One environment, as Gymnasium wants it."""
+"""A single environment with Gymnasium's interface."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class TrafficEnv(gymnasium.Env[Any, Any]):
-    """The ego of a trial among other cars, judged by the rules of the road.
+    """The environment of one ego among other cars, judged by the rules of the road.
 
     Every episode is a trial of the benchmark. ``info["trial"]`` is its instance, with which, and with the commands of
     the actions (`commands`), `run_trial` makes the same record. docs/learning.md has all of it.
@@ -135,7 +135,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
 
     @property
     def given(self) -> Floats:
-        """What the shield has let through in each tick of this episode so far, (K, 2), m/s and rad/s.
+        """The commands that the shield has let through in each tick of this episode so far, (K, 2), m/s and rad/s.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         self._renderer.close()
 
     def _stepped_in(self) -> dict[str, int]:
-        """Return in how many ticks of this step the shield has changed the command, if there is one."""
+        """Return the number of ticks of this step in which the shield, if there is one, has changed the command."""
         if self._interventions is None:
             return {}
         before, self._interventions = self._interventions, self.fleet.between(0).interventions

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ObservationSpace(spaces.Space[Observation]):
-    """What a controller is told: `cars.state.Observation`. Nothing can be sampled from it."""
+    """The space of `cars.state.Observation`; nothing can be sampled from it."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""A step of environments, compiled: ticks, observation, terms of the reward.
+"""A step of environments: ticks, observation, terms of the reward (compiled).
 
 The ticks are those of `engine.batch_kernel`; docs/semantics.md has their order, docs/design/088-envs.md what is
 counted when.
@@ -26,7 +26,7 @@ _in_breach = jit_inline(in_breach)
 
 @jit
 def begin_trials(outlook: OutlookTables, steps: StepTables) -> None:
-    """Look at the first frame of every trial of a bank: what is visited there, what is sought, what the laser meets."""
+    """Prepare the first frame of every trial of a bank: goals visited, goals sought, the laser's scan."""
     for b in range(outlook.trial.shape[0]):
         seek(b, outlook)
         sweep(b, 0, outlook)
@@ -38,7 +38,7 @@ def begin_trials(outlook: OutlookTables, steps: StepTables) -> None:
 
 @jit
 def observe_trials(rows: Ints, envs: Ints, outlook: OutlookTables, steps: StepTables) -> None:
-    """Write what the egos of the trials `rows` (K,) observe as that of the environments `envs` (K,)."""
+    """Write the observations of the egos of the trials `rows` (K,) as those of the environments `envs` (K,)."""
     for k in range(rows.shape[0]):
         write_flat(rows[k], EGO, steps.flat[envs[k]], outlook)
 
@@ -125,7 +125,7 @@ def _fetch(b: int, world: World) -> None:
 
 @jit_inline
 def _begin(rows: Ints, envs: Ints, ticks: int, commands: Floats, steps: StepTables) -> bool:
-    """Begin a step: write down what the actions command, and count from nothing; False if an action is not finite."""
+    """Begin a step: write the commands of the actions, and set all counts to 0; False if an action is not finite."""
     for e in range(steps.asked.shape[0]):
         both = steps.asked[e, 0] + steps.asked[e, 1]
         if both - both != 0.0:
@@ -144,7 +144,7 @@ def _begin(rows: Ints, envs: Ints, ticks: int, commands: Floats, steps: StepTabl
 
 @jit_inline
 def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables, steps: StepTables) -> int:
-    """Take trial b through a tick, and count what it has brought; return why it stands still, if it does."""
+    """Step trial b by a tick and count its results; return its status, which says why it can't go on, if so."""
     period = steps.scale[0].period
     breaches, contacts = world.breach_log.filled[0], world.work.found[0]
     tick = world.progress.trial[b].tick
@@ -159,7 +159,7 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
 
 @jit_inline
 def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
-    """Sum up the reward of a step, and observe."""
+    """Compute the reward of a step, and observe."""
     total = 0.0
     for j in range(steps.weights.shape[0]):
         weighted = steps.weights[j] * steps.terms[e, j]

@@ -1,4 +1,4 @@
-"""What the compiled step of environments reads and writes."""
+"""The tables of the compiled step of environments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @record
 class Stride:
-    """How far a trial is in the present step of its environment, and what the next tick is compared with."""
+    """How far a trial is in the present step of its environment, and values of the last tick to compare with."""
 
     left: int
     """Ticks still to go in this step."""
@@ -46,7 +46,7 @@ class Scale:
 
 
 class StepTables(Tables):
-    """The environments of one bank of trials, and what a step of all environments gives.
+    """The environments of one bank of trials, and the results of a step of all environments.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What rewards are made of: terms by name, with weights; and costs by rule."""
+"""The terms of rewards, with weights, and costs by rule."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AT_FAULT: Final = len(COSTS) - 1
 
 
 class _Term(NamedTuple):
-    """Where each term of the reward stands."""
+    """The number of each term of the reward."""
 
     VISITS: int = 0
     ROUNDS: int = 1
@@ -41,7 +41,7 @@ WEIGHTS: Final[Mapping[str, float]] = {
     **dict.fromkeys(COSTS, -1.0),
     "at_fault": -5.0,
 }
-"""What each term counts unless it is said otherwise.
+"""Default weights of the terms.
 
 `visits` of goals; `rounds` through all of them; `progress` toward the goal that is sought, metres along lanes;
 `comfort`: sum over ticks of the squared changes of speed and yaw rate, as shares of the car's bounds; `time`, seconds;

@@ -1,4 +1,4 @@
-"""Many environments at once, as Gymnasium wants them: a native vector environment on the batch engine."""
+"""Many environments at once with Gymnasium's interface: a native vector environment on the batch engine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ VECTORIZED: Final = ("flat", "dict")
 
 
 class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
-    """As many environments as are wanted, each as `envs.single.TrafficEnv`, stepped by compiled code.
+    """A number of environments, each like `envs.single.TrafficEnv`, stepped by compiled code.
 
     Episode k of environment i under the seed s is trial ``4096 k + i`` of seed s, whatever `num_envs`. Infos are
     arrays, (E,); those that only some environments have come with a mask, (E,), whose name begins with ``_``.
@@ -179,18 +179,18 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         return self._begun(some)
 
     def _begun(self, some: Sequence[int]) -> dict[str, Any]:
-        """Return what is told of episodes that begin."""
+        """Return the infos of episodes that begin."""
         return self._spread(some, "trial", [self.fleet.instance(env) for env in some])
 
     def _states(self) -> dict[str, Any]:
-        """Return what is said of each formula in the environments, (E,) texts by name."""
+        """Return the verdict on each formula in the environments, (E,) texts by name."""
         if not self.settings.formulas:
             return {}
         each = [self.fleet.states(env) for env in range(self.num_envs)]
         return {"formulas": {name: np.array([own[name] for own in each]) for name in self.settings.formulas}}
 
     def _ended(self, some: Sequence[int]) -> dict[str, Any]:
-        """Return what is told of episodes that have ended."""
+        """Return the infos of episodes that have ended."""
         if not some:
             return {}
         outcomes = self._spread(some, "outcome", self.fleet.outcomes(some))

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
-from collections.abc import Generator, Iterator
+from collections.abc import Container, Generator, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.case import Case, read_case
 from dubins_traffic.files import locked, read_text, write_text
+from dubins_traffic.problem.files import parse_json
 
 CASES: Final = "cases"
 """The folder of the cases."""
 REPORT: Final = "search.json"
 """What was searched and what came of it."""
+PAGE: Final = "coverage.html"
+"""What was put to the test and found, to be read."""
 STATE: Final = "state.json"
 """Where the search goes on."""
 
@@ -40,19 +44,38 @@ class Archive:
         self.cases[name] = case
         return path
 
+    def forget_but(self, names: Container[str]) -> None:
+        """Forget all cases but some: what a search that was killed had found after it last wrote down where it was."""
+        self.cases = {name: case for name, case in self.cases.items() if name in names}
+
     def write(self, name: str, document: Any, indent: int | None = 1) -> None:
         """Write a document as JSON; equal documents give equal bytes."""
         write_text(self.folder / name, json.dumps(document, indent=indent, allow_nan=False) + "\n")
+
+    def tell(self, page: str) -> None:
+        """Write the page of the search."""
+        write_text(self.folder / PAGE, page)
 
     def state(self) -> Any:
         """Return where the search goes on, None for one that has not begun."""
         path = self.folder / STATE
         if not path.is_file():
             return None
-        try:
-            return json.loads(read_text(path))
-        except ValueError:
-            raise InputError("not the state of a search", file=str(path)) from None
+        found = parse_json(read_text(path), str(path))
+        if "state" not in found or found.get("sha256") != _digest(found["state"]):
+            raise InputError(
+                "not the state of a search as it was written", file=str(path), field="sha256",
+                value=found.get("sha256"), expected="the hash of `state`; begin anew in another folder",
+            )  # fmt: skip
+        return found["state"]
+
+    def remember(self, state: Mapping[str, Any]) -> None:
+        """Write down where the search goes on."""
+        self.write(STATE, {"sha256": _digest(state), "state": state}, indent=None)
+
+
+def _digest(state: Any) -> str:
+    return hashlib.sha256(json.dumps(state).encode()).hexdigest()
 
 
 def files(folder: Path) -> Iterator[Path]:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast, get_type_hints
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
@@ -87,8 +87,20 @@ def case_of(instance: Instance, name: str | None = None) -> Case:
     told = cast("Mapping[str, Any]", found)
     try:
         story = Story(**told)
+        _check_kinds(story, name)
         if story.manoeuvre.upper() not in Manoeuvre.__members__:
             raise InputError("no manoeuvre", file=name, field=f"{KEY}.manoeuvre", value=story.manoeuvre)
     except (TypeError, AttributeError):
         raise InputError("not a case", file=name, field=KEY, value=sorted(told), expected=expected) from None
     return Case(instance, story)
+
+
+def _check_kinds(story: Story, file: str | None) -> None:
+    """Refuse numbers where words are to stand, and the other way round."""
+    for name, kind in get_type_hints(Story).items():
+        value = getattr(story, name)
+        allowed = (int, float) if kind is float else kind
+        if not isinstance(value, allowed) or isinstance(value, bool):
+            raise InputError(
+                "of the wrong kind", file=file, field=f"{KEY}.{name}", value=value, expected=kind.__name__
+            )

@@ -15,7 +15,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.records import table
-from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginTables, find_margins, margin_rules
 
@@ -51,7 +51,7 @@ class Watched:
             entries: Any = world.breach_log.entry[ENTRIES[self.rule]]
             return entries * (1.0 if self.rule == "3.clear" else self.group.instances[0].problem.period)
         problems = [instance.problem for instance in self.group.instances]
-        kinds, index = kinds_of(problems)
+        kinds, index = distinct_problems(problems)
         rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
         found = table(EgoMargins, len(problems))
         tables = MarginTables(

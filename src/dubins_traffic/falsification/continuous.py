@@ -10,7 +10,8 @@ import numpy as np
 
 from dubins_traffic.agents.choices import BOUNDS, CHOICE
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.falsification.sampling import Genome, Source
+from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.falsification.sampling import Source, Stream
 from dubins_traffic.kernels.arrays import Floats
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class _Climb:
         drawn = source.fresh(base)
         self._shapes = {car: table.shape for car, table in drawn.tables.items()}
         size = max(2, sum(rows * columns for rows, columns in self._shapes.values()))
-        dice = source.dice(base)
+        dice = source.dice(base, Stream.CHOICES)
 
         def normal(*shape: int) -> Floats:
             return dice.standard_normal(shape)
@@ -127,4 +128,4 @@ class _Climb:
             tables[car] = low + (high - low) * share
             exits = np.minimum(np.floor(share[:, CHOICE.EXIT] * (high[CHOICE.EXIT] + 1)), high[CHOICE.EXIT])
             tables[car][:, CHOICE.EXIT] = exits
-        return Genome(self.base, {}, tables)
+        return Genome(self.base, self.base, {}, tables)

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.verdict import EGO_RULES
@@ -45,11 +47,19 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A cell of a coverage table: how often it was put to the test, and in how many trials it was broken."""
+    """A cell of a coverage table: how often it was put to the test, and in how many trials it was broken.
+
+    What broke a rule has put it to the test, whatever brought it about.
+    """
 
     cell: Cell
     tested: int
     broken: int
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is known of the cell."""
+        return not self.tested and not self.broken
 
     def to_json(self) -> dict[str, Any]:
         """Return the row as a JSON object."""
@@ -74,4 +84,5 @@ def coverage(expected: Iterable[Cell], exercised: Ints, broken: Ints) -> list[Ro
     """
     numbers = {cell.number for cell in expected}
     numbers |= {number for number in range(len(exercised)) if exercised[number] or broken[number]}
-    return [Row(Cell.of(number), int(exercised[number]), int(broken[number])) for number in sorted(numbers)]
+    tested = np.maximum(exercised, broken)
+    return [Row(Cell.of(number), int(tested[number]), int(broken[number])) for number in sorted(numbers)]

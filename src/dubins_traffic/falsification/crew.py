@@ -15,6 +15,7 @@ from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError, WorkerLostError
+from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.trying import Findings, Laboratory
 
 if TYPE_CHECKING:
@@ -31,13 +32,13 @@ class Crew(Protocol):
 
     Attributes
     ----------
-    make : callable
-        Makes the controller.
+    make : callable or Remote
+        Makes the controller, or drives trials elsewhere.
     name : str
         What records and cases call it.
     """
 
-    make: Maker
+    make: Maker | Remote
     name: str
 
     def run(self, instances: Sequence[Instance]) -> Findings:
@@ -48,8 +49,8 @@ class Crew(Protocol):
 class Here:
     """Runs all trials in this process."""
 
-    def __init__(self, controller: str | Maker, name: str) -> None:
-        self.make: Maker = maker(controller)
+    def __init__(self, controller: str | Maker | Remote, name: str) -> None:
+        self.make = driver_of(controller)
         self.name = name
         self._laboratory = Laboratory(controller)
 
@@ -83,7 +84,7 @@ class Elsewhere:
 
     def __init__(self, controller: str, engine: Engine[Lot]) -> None:
         controllers.load(controller)
-        self.make: Maker = maker(controller)
+        self.make: Maker | Remote = maker(controller)
         self.name = controller
         self._engine = engine
         self._number = 0
@@ -131,8 +132,22 @@ def maker(controller: str | Maker) -> Maker:
     return (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
 
 
+def driver_of(controller: str | Maker | Remote) -> Maker | Remote:
+    """Return what makes a controller, or what drives trials elsewhere."""
+    return controller if isinstance(controller, Remote) else maker(controller)
+
+
+def name_of(controller: str | Maker | Remote) -> str:
+    """Return what records and cases call a controller."""
+    if isinstance(controller, str):
+        return controller
+    return (
+        controller.name if isinstance(controller, Remote) else getattr(controller, "__name__", "controller")
+    )
+
+
 @contextlib.contextmanager
-def crew_of(controller: str | Maker, name: str, workers: int, ray: str | None) -> Generator[Crew]:
+def crew_of(controller: str | Maker | Remote, name: str, workers: int, ray: str | None) -> Generator[Crew]:
     """Yield who runs the trials of a search with a controller: `workers` processes, or a Ray cluster at an address.
 
     Raises
@@ -144,9 +159,9 @@ def crew_of(controller: str | Maker, name: str, workers: int, ray: str | None) -
         yield Here(controller, name)
         return
     if not isinstance(controller, str):
-        expected = "a controller given by name"
+        expected = "a controller given by name, not one elsewhere"
         raise InputError(
-            "can't be made by other processes", field="controller", value=controller, expected=expected
+            "can't be made by other processes", field="controller", value=name, expected=expected
         )
     if ray is not None:
         check_address(ray)

@@ -15,11 +15,11 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.companies import beginner
 from dubins_traffic.falsification.crew import Crew, crew_of, maker
 from dubins_traffic.falsification.intervals import Interval, clopper_pearson, of_mean, wilson
+from dubins_traffic.falsification.liveness import TARGETS
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import Begin, split
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
-from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -106,7 +106,7 @@ def estimate(
     controller : str or callable
         As `run_batch` takes it.
     event : str
-        The rule.
+        The rule, or ``1.goal``: the longest gap of a goal, seconds below its limit.
     below : float
         The margin (docs/scores.md); 0: the rule is broken.
     method : str
@@ -130,8 +130,8 @@ def estimate(
         If anything of this is wrong.
     """
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
-    if event not in EGO_RULES:
-        expected = f"one of {', '.join(EGO_RULES)}"
+    if event not in TARGETS:
+        expected = f"one of {', '.join(TARGETS)}"
         raise InputError("no rule of the ego's", file="--event", value=event, expected=expected)
     if method not in METHODS:
         raise InputError(

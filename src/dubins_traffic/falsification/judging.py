@@ -11,18 +11,26 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.falsification.trying import EgoTrace, Tried, broken_formulas, tried_of
+from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.liveness import first_overdue, spare
+from dubins_traffic.falsification.remote import Remote
+from dubins_traffic.falsification.sentences import sentence_of
+from dubins_traffic.falsification.trying import Tried, broken_formulas, judged_record, tried_of
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
-from dubins_traffic.record.reader import Record, read, replay
+from dubins_traffic.record.reader import Record, read
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.scoring.score import Score, score
+from dubins_traffic.scoring.margins import LIVENESS
+from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Place, Ruling, Violation
 
 if TYPE_CHECKING:
+    from dubins_traffic.engine.controlled import Maker
+    from dubins_traffic.falsification.cells import Cell
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.protocols import Controller
 
-Make = Callable[[], "Controller"]
+Make = Callable[[], "Controller"] | Remote
+"""What makes the controller, or drives trials elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +51,10 @@ class Judged:
         return self.first(rule) if verdict.verdict is Ruling.VIOLATED else None
 
     def first(self, rule: str) -> Violation | None:
-        """Return the ego's first breach of a rule, or where a formula became false, whatever others did."""
+        """Return the ego's first breach of a rule, formula or goal (`liveness`), whatever others did."""
         verdict, frames = self.score.verdict, self.record.frames
+        if rule == LIVENESS:
+            return self._overdue()
         own = () if verdict is None else verdict.violations
         for broken in own:
             if broken.car == EGO_NAME and broken.rule == rule:
@@ -56,6 +66,19 @@ class Judged:
         place = Place(float(frames.x[tick, EGO]), float(frames.y[tick, EGO]), None, None)
         return Violation(rule, EGO_NAME, time, tick, time, place)
 
+    def _overdue(self) -> Violation | None:
+        """Return where the ego was when a goal had not been visited for too long."""
+        verdict, frames = self.score.verdict, self.record.frames
+        late = None if verdict is None else spare(verdict, self.record.ending)
+        if verdict is None or verdict.gap_limit_s is None or late is None or late >= 0.0:
+            return None
+        found = first_overdue(self.record, verdict.gap_limit_s)
+        if found is None:
+            return None
+        x, y = float(frames.x[found.tick, EGO]), float(frames.y[found.tick, EGO])
+        times = found.tick / frames.rate, found.tick, found.since / frames.rate
+        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, found.goal, None))
+
 
 def judge(instance: Instance, make: Make, name: str) -> Judged:
     """Return what the judge says of a trial that has been written, read and run anew.
@@ -64,8 +87,8 @@ def judge(instance: Instance, make: Make, name: str) -> Judged:
     ----------
     instance : Instance
         What is run; it goes through its document first.
-    make : callable
-        Makes the controller, which is called `name`.
+    make : callable or Remote
+        Makes the controller, which is called `name`; or drives the trial.
 
     Raises
     ------
@@ -74,14 +97,17 @@ def judge(instance: Instance, make: Make, name: str) -> Judged:
     """
     document = json.loads(json.dumps(instance_to_document(instance)))
     again = instance_from_document(document)
+    record = make.drive(again) if isinstance(make, Remote) else _recorded(again, make, name)
+    found, passages = judged_record(record)
+    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.frames.rate))
+
+
+def _recorded(instance: Instance, make: Maker, name: str) -> Record:
+    """Return the record of a trial that is run here."""
     with tempfile.TemporaryDirectory(prefix="dubins-traffic-") as folder:
         path = Path(folder) / "trial.mcap"
-        run_trial(again, controllers.made(make), record=path, name=name, sketch=False)
-        record = replace(read(path), wall=None, file=None)
-    trace = EgoTrace()
-    replay(record, [trace])
-    found = score(record)
-    return Judged(record, found, tried_of(found, record.ending, trace.passages(), 0, record.frames.rate))
+        run_trial(instance, controllers.made(make), record=path, name=name, sketch=False)
+        return replace(read(path), wall=None, file=None)
 
 
 def cut_to(instance: Instance, tick: int) -> Instance:
@@ -97,3 +123,16 @@ def confirm(instance: Instance, rule: str, make: Make, name: str) -> Judged | No
         return None
     found = judge(cut_to(instance, breach.tick), make, name)
     return found if found.breach(rule) is not None else None
+
+
+def case_in(instance: Instance, cell: Cell, make: Make, name: str) -> Case | None:
+    """Return an instance as a case of the ego's failure in a cell, judged afresh; None if it does not stand."""
+    found = confirm(instance, cell.rule, make, name)
+    breach = None if found is None else found.breach(cell.rule)
+    if found is None or breach is None:
+        return None
+    story = Story(
+        cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
+        sentence_of(found.record, found.score, breach),
+    )  # fmt: skip
+    return Case(found.record.instance, story)

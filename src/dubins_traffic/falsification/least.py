@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.judging import judge
-from dubins_traffic.falsification.sampling import Genome
 from dubins_traffic.falsification.trying import DONE, Tried
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +22,13 @@ BARRED: Final = 1 << 40
 """Beside the flags of `rules.propositions`: has come to a crossing that was not clear."""
 STRAIGHT_WITHIN: Final = 0.5
 """Sine of the largest turn that still counts as going straight on, 30 degrees."""
+TELLING: Final = (
+    FLAG.LEFT | FLAG.OVERTAKING | FLAG.BLOCKED | FLAG.STOPPED | FLAG.AHEAD | FLAG.FIRST | FLAG.FORFEITED | FLAG.BREACH3
+    | FLAG.EXCUSED | FLAG.TURNED | FLAG.LINGERS | FLAG.HEMMED | BARRED
+)  # fmt: skip
+"""The flags by which situations are told apart."""
+MANOEUVRE_BIT, DEGREE_BIT = 44, 48
+"""Where manoeuvre and degree stand in the number of a situation, above all flags."""
 _AT_CROSSINGS: Final = ("3.stop", "3.order", "3.clear")
 
 
@@ -71,6 +79,16 @@ class Passages:
                 return Cell(rule, Manoeuvre.ENTERING, int(self.degree[row]))
             row += 1
         return Cell(rule, Manoeuvre(int(self.manoeuvre[row])), int(self.degree[row]))
+
+    def situations(self, trials: int) -> list[tuple[int, ...]]:
+        """Return for each of `trials` trials the numbers of the situations in it, ascending.
+
+        A situation is a stretch: its manoeuvre, degree, and which of the flags `TELLING` held in it.
+        """
+        number = self.flags & TELLING | self.manoeuvre << MANOEUVRE_BIT | self.degree << DEGREE_BIT
+        ends: list[int] = np.searchsorted(self.trial, np.arange(trials + 1)).tolist()
+        whole: list[int] = number.tolist()
+        return [tuple(sorted(set(whole[a:b]))) for a, b in pairwise(ends)]
 
     def exercised(self, crossing_degree: int) -> Ints:
         """Return how often each cell was put to the test, (`CELLS`,): what could have been broken there.

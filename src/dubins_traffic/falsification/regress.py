@@ -13,10 +13,12 @@ from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.falsification.crew import driver_of, name_of
 from dubins_traffic.falsification.judging import judge
+from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.record.sink import FAULTS
-from dubins_traffic.scoring.verdict import EGO_NAME, Ruling
+from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
 
 if TYPE_CHECKING:
     from dubins_traffic.scoring.verdict import Violation
@@ -35,7 +37,8 @@ class Outcome:
     verdict : str
         The ruling, or how the trial ended if by a fault.
     broken : tuple of str
-        The rules that the ego broke before the assumption fell, in order of time.
+        The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the case
+        is about.
     sentence : str
         Who did what when; empty if the ego broke nothing.
     """
@@ -63,15 +66,15 @@ class Outcome:
         }
 
 
-def regress(folder: str | os.PathLike[str], controller: str | Maker) -> list[Outcome]:
+def regress(folder: str | os.PathLike[str], controller: str | Maker | Remote) -> list[Outcome]:
     """Run every case of a folder with a controller.
 
     Parameters
     ----------
     folder : path
         A folder of cases, or that of a search.
-    controller : str or callable
-        As `run_batch` takes it.
+    controller : str, callable or Remote
+        As `run_batch` takes it, or a program elsewhere (`falsification.remote.Remote`).
 
     Raises
     ------
@@ -92,11 +95,11 @@ def cases_in(folder: str | os.PathLike[str]) -> list[tuple[Path, Case]]:
     return found
 
 
-def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker) -> Iterator[Outcome]:
+def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[Outcome]:
     """Run cases with a controller, and yield what it did in each."""
-    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
-    make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
-    controllers.made(make)
+    name, make = name_of(controller), driver_of(controller)
+    if not isinstance(make, Remote):
+        controllers.made(make)
     for path, case in cases:
         judged = judge(case.instance, make, name)
         verdict, ending = judged.score.verdict, judged.record.ending
@@ -104,6 +107,8 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker) -> Ite
             raise InputError("is not judged by the rules", file=str(path), field="rules", expected="true")
         own = [broken for broken in verdict.violations if broken.car == EGO_NAME]
         own = own if verdict.verdict is Ruling.VIOLATED else []
+        if case.story.rule not in EGO_RULES and (asked := judged.breach(case.story.rule)) is not None:
+            own = [*own, asked]
         faulty = ending is not None and ending.end in FAULTS
         said = ending.end.value if faulty and ending is not None else verdict.verdict.value
         of_it = [broken for broken in own if broken.rule == case.story.rule] or own

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from dubins_traffic.agents import choices
-from dubins_traffic.cars.state import Pose
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.falsification import moves
+from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.instance import EAgent
@@ -27,8 +28,24 @@ DURATION: Final = 15.0
 MOST_LEGS: Final = 12
 CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
 """Parameters by which a car that keeps the law breaks it; one that has any of them stays as it is."""
+ONE: Final = 0.6
+"""Share of the trials that differ from their parent in one change only."""
 STREAM: Final = 0xFA1
 """Apart from all other streams of random numbers that follow from the seed."""
+
+WORD: Final = 0xFFFFFFFF
+"""The largest number of 32 bits."""
+
+
+class Stream(IntEnum):
+    """What the random numbers of a trial of a search decide; what one stream decides says nothing of another."""
+
+    CHOICES = 0
+    """What the e-agents of a trial that is drawn choose."""
+    CHANGES = 1
+    """In what a child differs from its parent, and which cars are brought to the ego."""
+    PARENTS = 2
+    """Whether a trial is drawn or a child, and whose."""
 
 
 def prepared(
@@ -56,45 +73,6 @@ def prepared(
     return Configuration.from_document(document, configuration.file)
 
 
-@dataclass(frozen=True, slots=True)
-class Genome:
-    """What an instance of a search is made of.
-
-    Attributes
-    ----------
-    base : int
-        Number of the trial whose network, goals and cars it has.
-    starts : mapping of int to Pose
-        Other starts of some of its cars, by the cars' numbers.
-    tables : mapping of int to (K, 7) float64
-        What each e-agent chooses (`agents.choices`), by the cars' numbers.
-    """
-
-    base: int
-    starts: Mapping[int, Pose] = field(default_factory=dict[int, Pose])
-    tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON object, from which `from_json` makes an equal one."""
-        return {
-            "base": self.base,
-            "starts": {str(car): list(pose) for car, pose in self.starts.items()},
-            "tables": {str(car): [len(table), choices.to_rows(table)] for car, table in self.tables.items()},
-        }
-
-    @staticmethod
-    def from_json(document: Mapping[str, Any]) -> Genome:
-        """Return the genome of a JSON object."""
-        tables: dict[int, Floats] = {}
-        for car, (legs, rows) in document["tables"].items():
-            table = choices.empty(legs)
-            known = choices.from_rows(rows)
-            table[: len(known)] = known
-            tables[int(car)] = table
-        starts = {int(car): Pose(*pose) for car, pose in document["starts"].items()}
-        return Genome(document["base"], starts, tables)
-
-
 class Source:
     """Makes and changes the instances of a search.
 
@@ -108,18 +86,35 @@ class Source:
 
     def __init__(self, configuration: Configuration, seed: int) -> None:
         self._configuration, self._seed = configuration, seed
+        self._words = [STREAM, seed & WORD, seed >> 32] if seed > WORD else [STREAM, seed]
+        self._movable = moves.movable(configuration)
         self._known: dict[int, Instance] = {}
+        self._freed: tuple[tuple[EAgent, ...], tuple[EAgent, ...]] = (), ()
+        """The e-agents of the last instance that was drawn, and what became of them."""
 
-    def dice(self, number: int) -> np.random.Generator:
-        """Return the random numbers from which trial `number` of the search follows."""
-        return np.random.default_rng([STREAM, self._seed, number])
+    def dice(self, number: int, stream: Stream) -> np.random.Generator:
+        """Return the random numbers from which trial `number` of the search follows, of one of its streams."""
+        words = [*self._words, number, stream] if stream else [*self._words, number]
+        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(np.array(words, dtype=np.uint32))))
 
     def draw(self, numbers: Sequence[int]) -> list[Instance]:
         """Return the instances of the configuration with some numbers."""
         missing = sorted({number for number in numbers if number not in self._known})
-        for instance in draw_many(self._configuration, self._seed, missing):
-            self._known[instance.trial] = freed(instance)
+        if missing:
+            for instance in draw_many(self._configuration, self._seed, missing):
+                self._known[instance.trial] = self._free(instance)
         return [self._known[number] for number in numbers]
+
+    def _base(self, number: int) -> Instance:
+        """Return the instance of the configuration with a number."""
+        return self._known.get(number) or self.draw([number])[0]
+
+    def _free(self, instance: Instance) -> Instance:
+        """Return an instance whose e-agents may choose; those of several instances are often the same objects."""
+        if instance.e_agents is not self._freed[0]:
+            self._freed = instance.e_agents, tuple([_freed(agent) for agent in instance.e_agents])
+        own, agents = self._freed
+        return instance if agents == own else replace(instance, e_agents=agents)
 
     def forget(self, kept: set[int]) -> None:
         """Forget the instances that have none of the numbers `kept`."""
@@ -127,32 +122,32 @@ class Source:
 
     def fresh(self, number: int) -> Genome:
         """Return the genome of trial `number` of the configuration, with choices drawn for all cars that can choose."""
-        instance = self.draw([number])[0]
-        dice, legs = self.dice(number), _legs(instance)
+        instance = self._base(number)
+        dice, legs = self.dice(number, Stream.CHOICES), _legs(instance)
         share = float(dice.uniform(0.05, 0.5))
-        return Genome(number, {}, {car: choices.drawn(dice, legs, share) for car in free_cars(instance)})
+        return Genome(
+            number, number, {}, {car: choices.drawn(dice, legs, share) for car in free_cars(instance)}
+        )
 
-    def varied(self, genome: Genome, dice: np.random.Generator) -> Genome:
-        """Return a genome with one thing changed, or a few."""
-        tables = dict(genome.tables)
-        if not tables:
-            return genome
-        cars = sorted(tables)
-        for _ in range(1 + int(dice.geometric(0.6))):
-            car = cars[int(dice.integers(len(cars)))]
-            tables[car] = choices.mutated(dice, tables[car])
-        return replace(genome, tables=tables)
+    def varied(self, genome: Genome, mate: Genome, dice: np.random.Generator) -> Genome:
+        """Return a genome with one thing changed, or a few; some are taken from another one, `mate`."""
+        other = mate, self._base(mate.base)
+        for _ in range(int(dice.geometric(ONE))):
+            base = self._base(genome.base)
+            genome = moves.changed(genome, base, other, self._movable, dice)
+        return genome
+
+    def arranged(self, number: int, dice: np.random.Generator) -> Genome:
+        """Return the genome that `fresh` draws, with some of the cars brought to where they meet the ego soon."""
+        genome = self.fresh(number)
+        for _ in range(1 + int(dice.integers(len(self._movable) + 1))):
+            genome = moves.joined(genome, self._base(number), self._movable, dice)
+        return genome
 
     def build(self, genomes: Sequence[Genome]) -> list[Instance]:
         """Return the instances of genomes."""
         bases = self.draw([genome.base for genome in genomes])
         return [_built(base, genome) for base, genome in zip(bases, genomes, strict=True)]
-
-
-def freed(instance: Instance) -> Instance:
-    """Return an instance whose e-agents may choose, those that keep the law; nothing is chosen yet."""
-    agents = tuple([_freed(agent) for agent in instance.e_agents])
-    return instance if agents == instance.e_agents else replace(instance, e_agents=agents)
 
 
 def free_cars(instance: Instance) -> list[int]:

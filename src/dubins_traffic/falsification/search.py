@@ -7,7 +7,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,50 +15,37 @@ import numpy as np
 
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
-from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import archive as archives
 from dubins_traffic.falsification.archive import Archive
-from dubins_traffic.falsification.case import Case, Story
-from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.case import Case
+from dubins_traffic.falsification.cells import Cell
+from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.coverage import Row, coverage, possible
-from dubins_traffic.falsification.crew import Crew, crew_of
-from dubins_traffic.falsification.judging import confirm
+from dubins_traffic.falsification.coverage_page import coverage_page
+from dubins_traffic.falsification.crew import Crew, crew_of, name_of
+from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.falsification.judging import case_in
 from dubins_traffic.falsification.least import Least
+from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sampling import DURATION, Source, prepared
-from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.falsification.strategies import Strategy, make
-from dubins_traffic.falsification.trying import DONE, FORMULA, Tried
-from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.falsification.targets import ASKED, check_targets, targets_of
+from dubins_traffic.falsification.trying import DONE, Findings, Tried
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.scoring.verdict import EGO_RULES
+from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
 
 GENERATION: Final = 128
-"""Trials that are proposed at a time, whoever runs them."""
+"""Most trials that are proposed at a time, whoever runs them."""
+SMALL: Final = 32
+SHARE: Final = 8
+"""A generation is no more than one of so many parts of the trials before it, or `SMALL`."""
 TRIALS: Final = 10_000
 SAVE: Final = 20.0
 """Seconds after which a search writes down where it goes on."""
 
 Progress = Callable[["Search"], object]
-
-
-@dataclass(slots=True)
-class Counts:
-    """What became of the trials of a search: how many ran, and of these broke the assumption, failed, broke a rule."""
-
-    trials: int = 0
-    discarded: int = 0
-    faulty: int = 0
-    violated: int = 0
-    unconfirmed: int = 0
-    """Breaches that did not stand when they were judged afresh."""
-    exercised: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
-    broken: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the counts as a JSON object."""
-        names = ("trials", "discarded", "faulty", "violated", "unconfirmed")
-        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +73,11 @@ class Found:
     violated: int
     coverage: list[Row]
 
+    @property
+    def page(self) -> Path:
+        """The page with the coverage and what was found."""
+        return self.folder / archives.PAGE
+
 
 class Search:
     """A search under way.
@@ -104,6 +96,11 @@ class Search:
         The rules, and formulas, that are asked for.
     crew : Crew
         Who runs the trials.
+
+    Attributes
+    ----------
+    found_in : dict of str to int
+        For each case, by the name of its cell, the number of the trial in which it was found, from 0.
     """
 
     def __init__(
@@ -119,54 +116,70 @@ class Search:
         self._settings, self._source, self._strategy = settings, source, strategy
         self._targets, self._crew = tuple(targets), crew
         self._expected: set[int] = set()
+        self.found_in: dict[str, int] = {}
         self._least = Least()
         state = archive.state()
         if state is not None:
             self._restore(state)
 
     def generation(self, most: int) -> None:
-        """Try the next trials, at most `most`."""
+        """Try the next trials, at most `most`; whatever interrupts it, they are taken over whole or not at all."""
         first = self.counts.trials
-        numbers = range(first, first + min(GENERATION, most))
+        size = min(GENERATION, max(SMALL, first // SHARE // SMALL * SMALL))
+        numbers = range(first, first + min(size, most))
         genomes = self._strategy.propose(numbers)
         instances = self._source.build(genomes)
         findings = self._crew.run(instances)
+        fresh, unconfirmed = self._judged(numbers, instances, findings.tried)
+        with WHOLE:
+            self._take_all(numbers, genomes, instances, findings)
+            self.counts.unconfirmed += unconfirmed
+            for cell, (number, case) in fresh.items():
+                self.archive.keep(cell, case)
+                self.found_in[cell] = number
+
+    def _take_all(
+        self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], findings: Findings
+    ) -> None:
+        """Count the trials of a generation, and tell the strategy of them."""
         places = {id(own.problem.network): own for own in instances}
         self._expected.update(cell.number for cell in possible(places.values()))
-        for number, genome, instance, tried in zip(numbers, genomes, instances, findings.tried, strict=True):
+        for number, genome, tried in zip(numbers, genomes, findings.tried, strict=True):
             self._least.take(number, genome, tried)
-            known = self._take(instance, tried)
-            self._strategy.tell(number, genome, tried, known)
+            self._strategy.tell(number, genome, tried, self._count(tried))
         self.counts.exercised += findings.exercised
         self.counts.trials += len(numbers)
 
-    def _take(self, instance: Instance, tried: Tried) -> bool:
-        """Count a trial and keep its failures; tell whether it broke a rule."""
-        counts = self.counts
+    def _count(self, tried: Tried) -> bool:
+        """Count a trial; tell whether it broke a rule."""
+        counts, wanted = self.counts, self._wanted(tried)
         counts.discarded += tried.discarded
         counts.faulty += tried.faulty
-        wanted = [cell for cell, _ in tried.cells if cell.rule in self._targets]
         counts.violated += bool(wanted)
         for cell in wanted:
             if cell.number >= 0:
                 counts.broken[cell.number] += 1
-            if cell.name not in self.archive.cases and not self._keep(instance, cell):
-                counts.unconfirmed += 1
         return bool(wanted)
 
-    def _keep(self, instance: Instance, cell: Cell) -> bool:
-        """Judge a failure afresh, and keep it as a case if it stands."""
-        make, name = self._crew.make, self._crew.name
-        found = confirm(instance, cell.rule, make, name)
-        breach = None if found is None else found.breach(cell.rule)
-        if found is None or breach is None:
-            return False
-        story = Story(
-            cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
-            sentence_of(found.record, found.score, breach),
-        )  # fmt: skip
-        self.archive.keep(cell.name, Case(found.record.instance, story))
-        return True
+    def _wanted(self, tried: Tried) -> list[Cell]:
+        return [cell for cell, _ in tried.cells if cell.rule in self._targets]
+
+    def _judged(
+        self, numbers: range, instances: Sequence[Instance], tried: Sequence[Tried]
+    ) -> tuple[dict[str, tuple[int, Case]], int]:
+        """Judge the failures of new kinds afresh; return those that stand with their trials, and how many don't."""
+        fresh: dict[str, tuple[int, Case]] = {}
+        unconfirmed = 0
+        for number, instance, own in zip(numbers, instances, tried, strict=True):
+            for cell in self._wanted(own):
+                if cell.name in self.archive.cases or cell.name in fresh:
+                    continue
+                case = case_in(instance, cell, self._crew.make, self._crew.name)
+                if case is None:
+                    unconfirmed += 1
+                else:
+                    fresh[cell.name] = number, case
+        return fresh, unconfirmed
 
     def result(self) -> Found:
         """Return what has been found so far."""
@@ -180,40 +193,51 @@ class Search:
         """Return which rule, manoeuvre and crossing have been put to the test."""
         expected = [Cell.of(number) for number in self._expected]
         rows = coverage(expected, self.counts.exercised, self.counts.broken)
-        return [row for row in rows if row.cell.rule in self._targets or self._targets[0] not in EGO_RULES]
+        asked = set(self._targets).intersection(EGO_RULES) or EGO_RULES
+        return [row for row in rows if row.cell.rule in asked]
 
     def save(self) -> None:
         """Write down what has been found, and where the search goes on."""
         if DONE in self._targets:
             for name, case in self._least.cases(self._source, self._crew).items():
                 self.archive.keep(name, case)
-        rows = [row.to_json() for row in self.coverage()]
+        covered = self.coverage()
+        rows = [row.to_json() for row in covered]
         cases = {name: case.story.sentence for name, case in sorted(self.archive.cases.items())}
-        report = {"settings": self._settings, **self.counts.to_json(), "cases": cases, "coverage": rows}
+        numbers = dict(sorted(self.found_in.items()))
+        report = {
+            "settings": self._settings, **self.counts.to_json(), "cases": cases, "found_in": numbers, "coverage": rows,
+        }  # fmt: skip
         self.archive.write(archives.REPORT, report)
+        counts = self.counts.to_json()
+        page = coverage_page(self._settings, counts, covered, self.archive.cases, self.found_in)
+        self.archive.tell(page)
         state = {
             "settings": self._settings,
             "counts": self.counts.to_json(),
             "exercised": self.counts.exercised.tolist(),
             "broken": self.counts.broken.tolist(),
             "expected": sorted(self._expected),
+            "found_in": numbers,
             "strategy": self._strategy.state(),
             "least": self._least.state() if DONE in self._targets else [],
         }
-        self.archive.write(archives.STATE, state, indent=None)
+        self.archive.remember(state)
 
     def _restore(self, state: Any) -> None:
         self.counts = Counts(**state["counts"])
         self.counts.exercised += np.array(state["exercised"], dtype=np.int64)
         self.counts.broken += np.array(state["broken"], dtype=np.int64)
         self._expected = set(state["expected"])
+        self.found_in = dict(state["found_in"])
         self._strategy.restore(state["strategy"])
         self._least.restore(state["least"])
+        self.archive.forget_but(self.found_in)
 
 
 def falsify(
     configuration: Configuration | str | os.PathLike[str],
-    controller: str | Maker = COMPILED,
+    controller: str | Maker | Remote = COMPILED,
     folder: str | os.PathLike[str] = "falsified",
     *,
     rules: Sequence[str] = (),
@@ -240,14 +264,15 @@ def falsify(
     ----------
     configuration : Configuration, path or name
         What the instances are drawn from.
-    controller : str or callable
-        As `run_batch` takes it.
+    controller : str, callable or Remote
+        As `run_batch` takes it, or a program elsewhere (`falsification.remote.Remote`).
     folder : path
         What is found is kept here; made if missing.
     rules : sequence of str
-        The rules that are asked for, such as ``3.clear``; by default all.
+        The rules that are asked for, such as ``3.clear``; by default all that a trial of any length can break.
+        ``1.goal`` asks for goals that are not visited for longer than ``satisfied`` allows.
     formula : str, optional
-        A formula of one's own that is asked for instead.
+        A formula of one's own that is asked for instead, one that a finite trial can break.
     least_score : bool
         Whether the trials in which the ego gets least done are looked for instead.
     trials : int, optional
@@ -277,9 +302,9 @@ def falsify(
         On Ctrl-C; what has been found is kept.
     """
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
-    targets = _targets(rules, formula, least_score=least_score)
+    targets = targets_of(rules, formula, least_score=least_score)
     own = prepared(own, duration, {} if formula is None else {ASKED: formula})
-    name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
+    name = name_of(controller)
     if trials is None and seconds is None:
         trials = TRIALS
     settings = {
@@ -287,12 +312,16 @@ def falsify(
         "controller": name, "targets": list(targets), "seed": seed, "strategy": strategy,
     }  # fmt: skip
     source = Source(own, seed)
+    check_targets(targets, source)
     proposing = make(strategy, source, targets)
     with (
         archives.opened(Path(folder), settings, resume=resume) as archive,
         crew_of(controller, name, workers, ray) as crew,
+        heard_between_frames(),
     ):
         search = Search(archive, settings, source, proposing, targets, crew)
+        if archive.state() is None:
+            search.save()
         try:
             for _ in _generations(search, trials, seconds):
                 if progress is not None:
@@ -300,22 +329,6 @@ def falsify(
         finally:
             search.save()
         return search.result()
-
-
-ASKED: Final = "asked"
-"""The name by which a problem carries the formula that a search asks for."""
-
-
-def _targets(rules: Sequence[str], formula: str | None, *, least_score: bool) -> tuple[str, ...]:
-    unknown = [rule for rule in rules if rule not in EGO_RULES]
-    if unknown:
-        expected = f"one of {', '.join(EGO_RULES)}"
-        raise InputError("no rule of the ego's", file="--rule", value=unknown[0], expected=expected)
-    if least_score:
-        return (DONE,)
-    if formula is not None:
-        return (f"{FORMULA} {ASKED}",)
-    return tuple(rules) or EGO_RULES
 
 
 def _generations(search: Search, trials: int | None, seconds: float | None) -> Iterator[int]:

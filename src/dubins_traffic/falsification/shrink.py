@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.falsification.case import Case, Story, read_case
-from dubins_traffic.falsification.judging import Judged, confirm
+from dubins_traffic.falsification.crew import driver_of
+from dubins_traffic.falsification.judging import Judged, Make, confirm
+from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
 from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.falsification.trying import Laboratory
@@ -25,7 +26,7 @@ Progress = Callable[[str], object]
 
 def shrink(
     case: Case | str | os.PathLike[str],
-    controller: str | Maker | None = None,
+    controller: str | Maker | Remote | None = None,
     progress: Progress | None = None,
 ) -> Case:
     """Return the smallest case that is found by taking things away from a case: one thing less, and the breach is gone.
@@ -37,7 +38,7 @@ def shrink(
     ----------
     case : Case or path
         What is shrunk.
-    controller : str or callable, optional
+    controller : str, callable or Remote, optional
         Who drives; by default the one of the case.
     progress : callable, optional
         Is told what has been taken away.
@@ -49,7 +50,7 @@ def shrink(
     """
     own = case if isinstance(case, Case) else read_case(case)
     driver = own.story.controller if controller is None else controller
-    make = (lambda: controllers.load(driver)) if isinstance(driver, str) else driver
+    make = driver_of(driver)
     name = driver if isinstance(driver, str) else own.story.controller
     shrinker = _Shrinker(driver, make, name, own.story.rule)
     found = confirm(own.instance, own.story.rule, make, name)
@@ -87,7 +88,7 @@ def single_removals(judged: Judged) -> list[Removal]:
 class _Shrinker:
     """Takes things away while the ego goes on breaking `rule`."""
 
-    def __init__(self, driver: str | Maker, make: Maker, name: str, rule: str) -> None:
+    def __init__(self, driver: str | Maker | Remote, make: Make, name: str, rule: str) -> None:
         self._laboratory = Laboratory(driver)
         self._make, self._name, self._rule = make, name, rule
 

@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, Frames
+from dubins_traffic.controllers import named
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, ask_all, check_clear, grouped
+from dubins_traffic.engine.asking import ask_all, check_clear
+from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, grouped
 from dubins_traffic.engine.group import Group
+from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.liveness import spare
 from dubins_traffic.falsification.passages import Passages, find_passages
+from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.margins import LIVENESS
+from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
+from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.protocols import Ending
-    from dubins_traffic.scoring.score import Score
 
 FORMULA: Final = "formula"
 """What a search calls a formula of the problem's own begins with this."""
@@ -34,6 +42,9 @@ METRE: Final = 1e-4
 """What a metre counts beside a round."""
 BROKEN: Final = -1e-9
 """A margin of what is broken is not above this."""
+BOXES: Final = 8
+"""So many trials of a controller in a box run at a time, each with a process of its own."""
+MOST: Final = 256
 Cancelled = Callable[[], bool]
 
 
@@ -49,16 +60,20 @@ class Tried:
         Whether it ended by a fault.
     margins : dict
         How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
-        ("formula NAME"); what nothing could break is left out. Negative: broken. `DONE`: what the ego got done, rounds,
+        ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
+        is left out. Negative: broken. `DONE`: what the ego got done, rounds,
         then the share of the goals visited, then metres.
     cells : tuple of (Cell, int)
-        The first breach of each rule by the ego, and its frame, in order of time.
+        The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame.
+    situations : tuple of int
+        What it met with (`passages.Passages.situations`); empty where nobody asks for it.
     """
 
     discarded: bool
     faulty: bool
     margins: dict[str, float]
     cells: tuple[tuple[Cell, int], ...]
+    situations: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
@@ -74,8 +89,8 @@ class Laboratory:
 
     Parameters
     ----------
-    controller : str or callable
-        As `engine.batch.run_batch` takes it.
+    controller : str, callable or Remote
+        As `engine.batch.run_batch` takes it, or what drives trials elsewhere.
     cancelled : callable
         Is asked now and then whether to stop.
 
@@ -85,14 +100,19 @@ class Laboratory:
         If there is no such controller.
     """
 
-    def __init__(self, controller: str | Maker, cancelled: Cancelled = lambda: False) -> None:
+    def __init__(self, controller: str | Maker | Remote, cancelled: Cancelled = lambda: False) -> None:
         self._name = controller if isinstance(controller, str) else "controller"
-        self._make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
         self.cancelled = cancelled
-        self._fit = fitness()
+        self._asked, self._fit = 0, fitness()
+        self._remote = controller if isinstance(controller, Remote) else None
+        self._overtakes: Overtakes | None
+        self._lanes, self._overtakes = lanes_of(self._name)
+        if isinstance(controller, Remote):
+            return
+        self._make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
         made = controllers.made(self._make)
-        self._asked = 0
         self._shared = made if isinstance(made, BatchController) else None
+        self._most = BOXES if named.SANDBOX.search(self._name) else MOST
 
     def attempt(self, instances: Sequence[Instance]) -> Findings:
         """Run the trials of instances.
@@ -104,16 +124,15 @@ class Laboratory:
         """
         found: dict[int, Tried] = {}
         whole = Findings([])
-        together = [own for own in instances if can_share(own)]
-        compiled = [own for own in together if self._name == COMPILED and self._fit(own) and undisturbed(own)]
+        together = [own for own in instances if self._remote is None and can_share(own)]
+        known = self._name == COMPILED or self._lanes
+        compiled = [own for own in together if known and self._fit(own) and undisturbed(own)]
         fast = set(map(id, compiled))
         for own in grouped(compiled):
-            group = Group(own, keeps_rules=True)
-            group.finish(self.cancelled)
-            self._check()
-            self._take(group, range(len(own)), found, whole)
+            self._take(self._finished(own), range(len(own)), found, whole)
         for own in grouped([own for own in together if id(own) not in fast]):
-            self._ask(own, found, whole)
+            for first in range(0, len(own), self._most):
+                self._ask(own[first : first + self._most], found, whole)
         shared = set(map(id, together))
         for own in instances:
             if id(own) not in shared:
@@ -125,6 +144,19 @@ class Laboratory:
     def _check(self) -> None:
         if self.cancelled():
             raise KeyboardInterrupt
+
+    def _finished(self, instances: Sequence[Instance]) -> Group:
+        """Return trials that have been run without asking anybody for commands in Python."""
+        if not self._lanes:
+            group = Group(instances, keeps_rules=True)
+            group.finish(self.cancelled)
+        else:
+            own = LanesTogether(instances, self._overtakes)
+            group = own.group
+            while len(group.active) and not self.cancelled():
+                own.step()
+        self._check()
+        return group
 
     def _ask(self, instances: Sequence[Instance], found: dict[int, Tried], whole: Findings) -> None:
         """Run trials whose controllers are asked in every tick."""
@@ -153,17 +185,26 @@ class Laboratory:
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
         whole.exercised += passages.exercised(_crossing_degree(group.instances[0]))
         rate = group.instances[0].problem.rate
+        situations = passages.situations(len(outcomes))
         for b, outcome in enumerate(outcomes):
-            found[id(outcome.instance)] = tried_of(outcome.score, outcome.ending, passages, b, rate)
+            tried = tried_of(outcome.score, outcome.ending, passages, b, rate)
+            found[id(outcome.instance)] = replace(tried, situations=situations[b])
 
     def _alone(self, instance: Instance, whole: Findings) -> Tried:
         """Run a trial that can't be stepped with others."""
+        if self._remote is not None:
+            record = self._remote.drive(instance)
+            found, passages = judged_record(record)
+            whole.exercised += passages.exercised(_crossing_degree(instance))
+            tried = tried_of(found, record.ending, passages, 0, instance.problem.rate)
+            return replace(tried, situations=passages.situations(1)[0])
         ego = EgoTrace()
         driver = controllers.made(self._make)
         result = run_trial(instance, driver, sinks=[ego], name=self._name, sketch=False)
         passages = ego.passages()
         whole.exercised += passages.exercised(_crossing_degree(instance))
-        return tried_of(result.score, result.ending, passages, 0, instance.problem.rate)
+        tried = tried_of(result.score, result.ending, passages, 0, instance.problem.rate)
+        return replace(tried, situations=passages.situations(1)[0])
 
 
 class EgoTrace:
@@ -189,25 +230,44 @@ class EgoTrace:
         return find_passages(lane, bits, np.array([lane.shape[1]]), [self._network])
 
 
+def judged_record(record: Record) -> tuple[Score, Passages]:
+    """Return the score of a record, and the ego's way through its trial."""
+    trace = EgoTrace()
+    replay(record, [trace])
+    return score(record), trace.passages()
+
+
 def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int, rate: float) -> Tried:
     """Return what a search keeps of a trial that has been judged: number `trial` of `passages`, at `rate` Hz."""
     verdict = score.verdict
     faulty = ending is not None and ending.end in FAULTS
-    margins = {f"{FORMULA} {own.name}": -1.0 if own.verdict == "false" else 1.0 for own in score.formulas}
+    margins = {
+        f"{FORMULA} {own.name}": own.robustness for own in score.formulas if own.robustness is not None
+    }
     margins[DONE] = score.counted_rounds + score.goals_visited + METRE * score.driven.distance_m
     if verdict is None:
         return Tried(False, faulty, margins, ())
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
+    late = spare(verdict, ending)
+    margins |= {} if late is None else {LIVENESS: late}
     own = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
     first = {broken.rule: broken.tick for broken in reversed(own)}
     for rule in first:
         margins[rule] = min(margins.get(rule, -0.0), BROKEN)
-    if not verdict.assumption_broken:
+    assumption_broken = verdict.assumption_broken
+    if not assumption_broken:
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
-    discarded = verdict.verdict is Ruling.EXCUSED or (not own and verdict.assumption_broken)
+        first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
+    discarded = verdict.verdict is Ruling.EXCUSED or (not own and assumption_broken)
     ordered = sorted(first.items(), key=lambda item: (item[1], item[0]))
     cells = () if discarded else tuple((passages.cell(rule, trial, tick), tick) for rule, tick in ordered)
     return Tried(discarded, faulty, margins, cells)
+
+
+def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
+    """Tell whether a name is that of `lanes`, and when its shield overtakes; None without a shield."""
+    bare, overtakes = controllers.shield_of(name) or (name, None)
+    return bare == "lanes", None if overtakes is None else check_overtakes(overtakes or "sure")
 
 
 def broken_formulas(score: Score) -> dict[str, float]:

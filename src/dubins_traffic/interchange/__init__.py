@@ -1,1 +1,1 @@
-"""Bags and logs of other tools, to and from records."""
+"""Converts records to and from bags and logs of other tools."""

@@ -1,4 +1,4 @@
-"""ROS 1 bags as records: of ours, and of those recorded beside any program with the topics of 2016."""
+"""Reads ROS 1 bags as records: bags written here, and bags recorded beside any program with the topics of 2016."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from dubins_traffic.transports.ros1.transport import COMMANDS
 from dubins_traffic.trial.buffer import FrameBuffer
 
 SLACK = 1_000
-"""Nanoseconds by which a message may be later than the frame it belongs to."""
+"""Largest delay of a message after the frame to which it belongs, nanoseconds."""
 WHOLE = 0.1
-"""Seconds by which a trial of 2016, of whole seconds, may seem longer or shorter in a bag, or outlast its poses."""
+"""Tolerance for the duration of a trial of 2016, of whole seconds, in a bag, and for the end of its poses, seconds."""
 MAGIC = b"#ROSBAG V2.0"
 Sample = tuple[float, ...]
 
 
 @dataclass(slots=True)
 class _Track:
-    """Samples of one thing, in order of time."""
+    """Samples of one quantity, in order of time."""
 
     times: list[int] = field(default_factory=list[int])
     samples: list[Sample] = field(default_factory=list[Sample])
@@ -60,7 +60,7 @@ class _Track:
 
 @dataclass(slots=True)
 class _Run:
-    """One trial in a bag: when its problem was told and with which text; when it was over, and what ours say of it."""
+    """One trial in a bag: time and text of its problem, the time of its end, and the notes of bags written here."""
 
     began: int
     text: str
@@ -71,7 +71,7 @@ class _Run:
 
 @dataclass(slots=True)
 class _Bag:
-    """What is read of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; trials; texts."""
+    """The content of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; trials; texts."""
 
     poses: dict[str, _Track] = field(default_factory=dict[str, _Track])
     twists: dict[str, _Track] = field(default_factory=dict[str, _Track])
@@ -81,7 +81,7 @@ class _Bag:
     notes: list[tuple[int, str]] = field(default_factory=list[tuple[int, str]])
 
     def assign(self) -> None:
-        """Give each trial what ours say of it: messages of one time come in any order."""
+        """Give each trial the notes of bags written here; messages of one time come in any order."""
         for run, following in zip(self.runs, [*self.runs[1:], None], strict=True):
             end = math.inf if following is None else following.began
             run.instance = next((text for time, text in self.instances if run.began <= time < end), None)
@@ -178,7 +178,7 @@ def _take(bag: _Bag, topic: str, time: int, message: Any) -> None:
 
 
 def _take_problem(bag: _Bag, time: int, text: str) -> None:
-    """Begin a trial, or end one; what is latched may be told twice."""
+    """Begin or end a trial; latched messages may come twice."""
     running = bag.runs[-1] if bag.runs and bag.runs[-1].over is None else None
     if running is not None and text != running.text:
         running.over, running = time, None
@@ -187,7 +187,7 @@ def _take_problem(bag: _Bag, time: int, text: str) -> None:
 
 
 def _instance(bag: _Bag, run: _Run, number: int, file: str) -> Instance:
-    """Return the instance: the whole one of a bag of ours, else the problem with cars where they began."""
+    """Return the instance: that of a bag written here, otherwise the problem with cars where their poses begin."""
     if run.instance is not None:
         return instance_from_document(parse_json(run.instance, file), file)
     others = [
@@ -208,7 +208,7 @@ def _instance(bag: _Bag, run: _Run, number: int, file: str) -> Instance:
 
 
 def _duration(seconds: float, rate: float) -> float:
-    """Return the duration of a trial that took so long in a bag."""
+    """Return the duration of a trial from its length in a bag."""
     whole = round(seconds)
     if whole > 0 and abs(seconds - whole) <= WHOLE:
         return float(whole)
@@ -216,7 +216,7 @@ def _duration(seconds: float, rate: float) -> float:
 
 
 def _replay(bag: _Bag, run: _Run, instance: Instance, sink: Sink) -> None:
-    """Label the frames as a trial does and push them."""
+    """Label the frames as a trial does and hand them to the sink."""
     began, rate = run.began, instance.problem.rate
     over = math.inf if run.over is None else run.over
     last = min(
@@ -256,7 +256,7 @@ def _state(bag: _Bag, instance: Instance, time: int) -> State:
 
 
 def _commands(bag: _Bag, instance: Instance, time: int, state: State) -> np.ndarray:
-    """Return the commands held since `time`; those of cars that have none are how they moved."""
+    """Return the commands held since `time`; for cars without commands their speeds and yaw rates."""
     commands = np.stack([state.speed, state.yaw_rate], axis=2)
     for n, name in enumerate(instance.names):
         command = bag.commands[name].at(time) if name in bag.commands else None

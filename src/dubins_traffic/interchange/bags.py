@@ -1,4 +1,4 @@
-"""Records as ROS 1 bags, with the trial data of 2016 beside them, so that tools of 2016 score them.
+"""Writes records as ROS 1 bags with the trial data of 2016 beside them, so that tools of 2016 can score them.
 
 A bag holds what the topics of `transports.ros1` carry, one message a frame, and two topics of ours so that nothing
 is lost on the way back: the whole instance, and contacts, events and the end as JSON.
@@ -40,7 +40,7 @@ DATE = "1970-01-01 00:00:01"
 
 
 def typestore() -> Any:
-    """Return the types of ROS 1 with ours.
+    """Return the message types of ROS 1 together with those of this package.
 
     Raises
     ------

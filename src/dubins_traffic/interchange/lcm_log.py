@@ -1,4 +1,4 @@
-"""Logs of lcm-logger as records."""
+"""Reads logs of lcm-logger as records."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dubins_traffic.transports.lcm.encoding import problem_from_message
 from dubins_traffic.trial.buffer import FrameBuffer
 
 MAGIC = b"\xed\xa1\xda\x01"
-"""With which every event of a log begins."""
+"""Bytes with which every event of a log begins."""
 BROKEN = (ValueError, struct.error, IndexError)
 
 
@@ -39,19 +39,19 @@ class _Trial:
 
     @property
     def ticks(self) -> int:
-        """How many ticks were logged without a gap; -1 without any frame."""
+        """Number of ticks that were logged without a gap; -1 without any frame."""
         return len(list(takewhile(self.cars.__contains__, count()))) - 1
 
 
 @dataclass(slots=True)
 class _Log:
-    """The trials of a log, and the announcement that holds."""
+    """The trials of a log, and the latest announcement."""
 
     trials: list[_Trial] = field(default_factory=list[_Trial])
     announced: instance_t | None = None
 
     def of(self, trial: int) -> _Trial | None:
-        """Return the trial to which a frame belongs, None if nobody announced it."""
+        """Return the trial to which a frame belongs, None if it was not announced."""
         if self.announced is None or self.announced.trial != trial:
             return None
         if not self.trials or self.trials[-1].instance.trial != trial:
@@ -153,7 +153,7 @@ def _instance(message: instance_t, cars: list[car_t], ticks: int, number: int) -
 
 
 def _replay(trial: _Trial, instance: Instance, ticks: int, sink: Sink) -> None:
-    """Label the frames as a trial does and push them."""
+    """Label the frames as a trial does and hand them to the sink."""
     labeller, buffer = Labeller([instance]), FrameBuffer(instance, [sink])
     state = State.zeros(1, len(instance.names))
     _fill(state, trial.cars, 0)

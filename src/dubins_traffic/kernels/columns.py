@@ -1,10 +1,10 @@
 """Blocks of columns with names: for loops that take several cars at once (`kernels.arrays.BLOCK`).
 
     @columns(BLOCK)
-    class Kept:
+    class Places:
         x: Floats
 
-    block = kept[b, n // BLOCK]
+    block = places[b, n // BLOCK]
     block.x[n % BLOCK] += 1.0
 
 Compiled, a block is a pointer and a column an array at a fixed distance from it, so that the compiler knows how far

@@ -147,3 +147,4 @@ def _compile(compiler: Compiler, wish: asking.Wish) -> None:
 
 if __name__ == "__main__":
     main()
+    os._exit(0)  # all is on disk; to take down what Numba has made, part by part, takes as long as a kernel

@@ -2,7 +2,8 @@
 
 A function that `jit` has taken runs as it is while its machine code is not in the cache; a companion compiles it
 beside, and a later call goes over to machine code. `DUBINS_TRAFFIC_KERNELS` says ``auto`` for that, ``compiled`` for
-waiting until it is there, ``interpreted`` for never compiling, as ``NUMBA_DISABLE_JIT=1`` does.
+waiting until it is there, ``interpreted`` for never compiling, as ``NUMBA_DISABLE_JIT=1`` does. A kernel looks into
+what is kept from tick to tick by a `jit_look`; with `DUBINS_TRAFFIC_CACHES` set to ``off`` nothing is kept.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from dubins_traffic.kernels.store import KEPT, TIER
 P = ParamSpec("P")
 R = TypeVar("R")
 
+CACHES = "DUBINS_TRAFFIC_CACHES"
+"""The environment variable that turns off all that kernels keep from tick to tick: for tests, and to find mistakes."""
 TIERS = ("auto", "compiled", "interpreted", KEPT)
 """`kept`: what has been compiled is used, of a folder that need not be one's own, and nothing else is compiled."""
 BESIDE = (
@@ -39,7 +42,7 @@ BESIDE = (
 class Maker(Protocol):
     """How the companion makes a kernel."""
 
-    def __call__(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:
+    def __call__(self, function: Callable[..., Any], *, inlined: bool, wide: bool, rare: bool) -> Any:
         """Return what can be compiled."""
         ...
 
@@ -65,6 +68,27 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
     return _made(function, inlined=True)
 
 
+def jit_look(function: Callable[P, bool]) -> Callable[P, bool]:
+    """Compile as `jit_inline` does a look into a cache, which tells whether what is kept holds, and may always say no.
+
+    With `CACHES` set to ``off`` it always does, and kernels run interpreted: the same bits come out.
+    """
+    return cast("Callable[P, bool]", _says_no) if caches_are_off() else _made(function, inlined=True)
+
+
+def _says_no(*_args: object, **_named: object) -> bool:
+    """Find nothing in a cache."""
+    return False
+
+
+def jit_rare(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `jit` does what few ticks need: apart from its callers, whose code for all other ticks stays together.
+
+    So the processor has less to fetch, and the compiler less to put into others.
+    """
+    return _made(function, rare=True)
+
+
 def jit_wide(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `jit` does, and make the same steps for several cars one instruction: the compiler takes longer."""
     return _made(function, wide=True)
@@ -76,10 +100,15 @@ def jit_long(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _made(
-    function: Callable[P, R], *, inlined: bool = False, wide: bool = False, patient: bool = False
+    function: Callable[P, R],
+    *,
+    inlined: bool = False,
+    wide: bool = False,
+    patient: bool = False,
+    rare: bool = False,
 ) -> Callable[P, R]:
     if companion is not None:
-        return companion(function, inlined=inlined, wide=wide)
+        return companion(function, inlined=inlined, wide=wide, rare=rare)
     if never_compiled():
         return function
     return Kernel(function, patient=patient)
@@ -91,13 +120,27 @@ def is_quick(kernel: Callable[..., Any]) -> bool:
 
 
 def never_compiled() -> bool:
-    """Whether kernels stay plain functions for ever."""
+    """Tell whether kernels stay plain functions for ever."""
     off = os.environ.get("NUMBA_DISABLE_JIT", "").strip()
-    return off not in ("", "0") or os.environ.get(TIER) == "interpreted"
+    return off not in ("", "0") or os.environ.get(TIER) == "interpreted" or caches_are_off()
+
+
+def caches_are_off() -> bool:
+    """Tell whether kernels keep nothing from tick to tick.
+
+    Raises
+    ------
+    InputError
+        If the environment variable that says so says something else.
+    """
+    said = os.environ.get(CACHES) or "on"
+    if said not in ("on", "off"):
+        raise InputError("caches are on or off", file=CACHES, value=said, expected="on or off")
+    return said == "off"
 
 
 def waits() -> bool:
-    """Whether a call waits until its kernel is compiled.
+    """Tell whether a call waits until its kernel is compiled.
 
     Raises
     ------

@@ -40,8 +40,8 @@ RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""
 FOREIGN = ("numba", "NRT", "Py", "_Py")
 """How the names of functions begin that only a process with Numba or for Python has."""
-SELDOM = 200_000
-"""New objects between two searches for rubbish: there is little among what the compiler makes."""
+SELDOM = 2_000_000
+"""New objects between two searches for rubbish: there is little among what the compiler makes, 0.1 million a second."""
 
 _numba = cast(Any, numba)
 _types = cast(Any, types)
@@ -82,25 +82,28 @@ class Compiler:
         self._codegen = self._context.codegen()
         self._codegen._library_class = Library
         self._codegen.set_env = _leave
+        self._rare: list[Any] = []
         index_plainly()
         shorten()
         take_as_numbers()
         fetching.learn()
         gc.set_threshold(SELDOM)
 
-    def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool) -> Any:
+    def jit(self, function: Callable[..., Any], *, inlined: bool, wide: bool, rare: bool) -> Any:
         """Return what Numba makes of a kernel's function, for others to call and for `machine_code`."""
         made = _numba.njit(
             error_model="numpy", nogil=True, forceinline=inlined, _nrt=False, no_cfunc_wrapper=True,
             no_cpython_wrapper=True, pipeline_class=Pipeline,
         )(function)  # fmt: skip
         made.is_wide = wide
+        if rare:
+            self._rare.append(made)
         return made
 
     def kernel(self, module: Any, name: str) -> Any:
         """Return what `jit` has made of a function, wherever that was, if it was."""
         found = getattr(module, name)
-        return found if hasattr(found, "py_func") else self.jit(found, inlined=False, wide=False)
+        return found if hasattr(found, "py_func") else self.jit(found, inlined=False, wide=False, rare=False)
 
     def machine_code(self, kernel: Any, kinds: Sequence[Kind], symbol: str) -> tuple[bytes, Kind]:
         """Return an object file with the function `symbol`, and the kind of what the kernel returns.
@@ -123,6 +126,7 @@ class Compiler:
         for library in _reached(compiled.library):
             program.link_in(library._final_module, preserve=True)
         _close(program, symbol)
+        self._set_apart(program)
         whole = Library(self._codegen, symbol)
         whole._final_module = program
         usual, _config.SLP_VECTORIZE = _config.SLP_VECTORIZE, int(kernel.is_wide or _config.SLP_VECTORIZE)
@@ -132,6 +136,13 @@ class Compiler:
             _config.SLP_VECTORIZE = usual
         _check(program)
         return self._codegen._tm.emit_object(program), returned
+
+    def _set_apart(self, program: Any) -> None:
+        """Say of the functions of a program that are rarely called that they are: they are put into no other one."""
+        rare = {own.fndesc.llvm_func_name for made in self._rare for own in made.overloads.values()}
+        for own in program.functions:
+            if own.name in rare:
+                own.add_function_attribute("cold")
 
     def _entry(self, described: Any, kinds: Sequence[Kind], symbol: str) -> Any:
         """Return a module with the function that reads the frame, calls the kernel and writes what it returns."""

@@ -41,13 +41,19 @@ MOST_KNOWN = 1 << 12
 """Rows of a table that are kept once they have been made; of longer tables others are made anew each time."""
 
 
-class Rows(Protocol[R_co]):
-    """A NumPy array whose elements are rows of one record: what kernels see of it."""
+class _Array(Protocol):
+    """What all arrays of rows have."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Lengths of the array's axes."""
         ...
+
+    def __len__(self) -> int: ...
+
+
+class Rows(_Array, Protocol[R_co]):
+    """A NumPy array whose elements are rows of one record: what kernels see of it."""
 
     @overload
     def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
@@ -63,16 +69,9 @@ class Rows(Protocol[R_co]):
         """Write a row, or a field of all rows."""
         ...
 
-    def __len__(self) -> int: ...
 
-
-class Grid(Protocol[R_co]):
+class Grid(_Array, Protocol[R_co]):
     """As `Rows`, with two axes: a row at each place (b, n)."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Lengths of the array's axes."""
-        ...
 
     @overload
     def __getitem__(self, place: str) -> npt.NDArray[Any]: ...
@@ -87,8 +86,6 @@ class Grid(Protocol[R_co]):
     def __setitem__(self, field: str, values: Any) -> None:
         """Write a field of all rows."""
         ...
-
-    def __len__(self) -> int: ...
 
 
 class Table(np.ndarray[Any, Any]):
@@ -112,7 +109,16 @@ class Table(np.ndarray[Any, Any]):
         except KeyError:
             return self._find(place)
         except TypeError:
-            return super().__getitem__(place)
+            found = super().__getitem__(place)
+            return found.view(type(self)) if found.base is None else found
+
+    def copy(self, order: Any = "C") -> Any:
+        """Return a table of the same values on memory of its own."""
+        return np.array(self, order=order).view(type(self))
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        """Return a copy."""
+        return self.copy()
 
     def __reduce__(self) -> Any:
         """Be pickled as the array that it is."""
@@ -125,16 +131,34 @@ class Table(np.ndarray[Any, Any]):
         cast(Any, super()).__setitem__(place, value)
 
     def _find(self, place: Any) -> Any:
-        found = super().__getitem__(place)
+        plain = _plain(self)
+        found = super().__getitem__(place) if plain is None else plain[place]
         if isinstance(place, str):
-            return found.view(np.ndarray)
-        if isinstance(found, np.void):
+            found = found.view(np.ndarray)
+        elif isinstance(found, np.void):
             axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
             far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
-            found = self.KIND(self, far)
-        if len(self.known) < MOST_KNOWN:
+            found = self.KIND(self if plain is None else plain, far)
+        else:
+            found = found.view(type(self))
+        if plain is not None and len(self.known) < MOST_KNOWN:
             self.known[place] = found
         return found
+
+
+def _plain(own: Table) -> npt.NDArray[Any] | None:
+    """Return a table's memory as an array that does not refer to the table, or None if the memory is the table's own.
+
+    What a table keeps must not keep the table: NumPy does not show the garbage collector what an array is a view of,
+    so that such a circle would never be let go.
+    """
+    root: npt.NDArray[Any] = own
+    while isinstance(root.base, np.ndarray):
+        root = root.base
+    if root is own or not root.flags.c_contiguous or not own.size:
+        return None
+    far = own.ctypes.data - root.ctypes.data
+    return np.ndarray(own.shape, own.dtype, buffer=root, offset=far, strides=own.strides)
 
 
 def _revive(kind: Any, rows: npt.NDArray[Any]) -> Any:

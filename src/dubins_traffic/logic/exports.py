@@ -7,11 +7,13 @@ every step the assumptions fix. Bounds become ticks of the given period except i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from dubins_traffic.logic.formula import (
+    FUTURE,
+    PAST,
     Bounds,
     Brackets,
     Formula,
@@ -195,22 +197,43 @@ def _rounded(formula: Formula, period: float) -> Formula:
 
 
 _TLSF: Final = Style({}, Brackets.ALL, bounds=_colon)
+_TEMPORAL: Final = FUTURE | PAST
 
 
 def tlsf(spec: Specification, period: float, title: str = "Traffic network of Dubins cars") -> str:
-    """Return a document in TLSF (full format, Mealy semantics; bounds in ticks)."""
+    """Return a document in TLSF (full format, strict Mealy semantics; bounds in ticks).
+
+    Strict: the system must keep its steps for as long as the environment has kept its own, so it can't win by a breach
+    that leaves the environment without a step.
+    """
     plain = _changed(_without_past(spec), lambda formula: until_and_release_only(in_ticks(formula, period)))
-    sections = {
-        "INPUTS": plain.inputs,
-        "OUTPUTS": plain.outputs,
-        "ASSUME": [written(formula, _TLSF) for formula in plain.assumptions],
-        "GUARANTEE": [written(formula, _TLSF) for formula in plain.guarantees],
-    }
+    assumed, guaranteed = _by_form(plain.assumptions), _by_form(plain.guarantees)
+    sections: dict[str, Sequence[str]] = {"INPUTS": plain.inputs, "OUTPUTS": plain.outputs}
+    for place, names in enumerate((("INITIALLY", "PRESET"), ("REQUIRE", "ASSERT"), ("ASSUME", "GUARANTEE"))):
+        for name, side in zip(names, (assumed, guaranteed), strict=True):
+            sections[name] = [written(formula, _TLSF) for formula in side[place]]
     lines = ["INFO {", f'  TITLE: "{_quoted(title)}"', '  DESCRIPTION: "Rules of the road"']
-    lines += ["  SEMANTICS: Mealy", "  TARGET: Mealy", "}", "", "MAIN {"]
+    lines += ["  SEMANTICS: Mealy,Strict", "  TARGET: Mealy", "}", "", "MAIN {"]
     for name, items in sections.items():
-        lines += [f"  {name} {{", *(f"    {item};" for item in items), "  }"]
+        if items or name in ("INPUTS", "OUTPUTS"):
+            lines += [f"  {name} {{", *(f"    {item};" for item in items), "  }"]
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def _by_form(side: Sequence[Formula]) -> tuple[list[Formula], list[Formula], list[Formula]]:
+    """Return what holds at first, what holds of every step (without its `always`), and all else."""
+    first: list[Formula] = []
+    steps: list[Formula] = []
+    others: list[Formula] = []
+    for formula in side:
+        within = {part.op for part in subformulas(formula.args[0])} if formula.op is Op.G else {Op.G}
+        if not _TEMPORAL & {part.op for part in subformulas(formula)}:
+            first.append(formula)
+        elif formula.bounds is None and _TEMPORAL & within <= {Op.X}:
+            steps.append(formula.args[0])
+        else:
+            others.append(formula)
+    return first, steps, others
 
 
 def _quoted(text: str) -> str:

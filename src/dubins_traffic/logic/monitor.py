@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import table
-from dubins_traffic.logic.automaton import Automaton, Limits, automaton
+from dubins_traffic.logic.automaton import FALSE, Automaton, Limits, automaton
 from dubins_traffic.logic.delays import Line, Requests, delayed, line
 from dubins_traffic.logic.formula import (
     FUTURE,
@@ -191,6 +191,8 @@ class Monitors:
         The names of the formulas, in the order of the verdicts' columns.
     late : frozenset of str
         The formulas for which *false* may come later than it could.
+    breakable : frozenset of str
+        The formulas that can become *false* at all: what can always still come is never broken.
     tables : int
         How many table look-ups a frame of one trial takes.
     lines : int
@@ -226,6 +228,9 @@ class Monitors:
             except FormulaError as error:
                 raise error.within(field=name) from None
         self.late = frozenset(late)
+        self.breakable = frozenset(
+            self.formulas[piece.formula] for piece in self._pieces if (piece.table.verdict == FALSE).any()
+        )
         self.tables = len(self._pieces)
         self.lines = len(self._delays)
         self._tables = packed_tables(self._pieces)

@@ -1,1 +1,1 @@
-"""What a driver is told: observations from the state of a trial, as values, and as flat vectors in a car's frame."""
+"""Observations: what a driver knows of a frame, as named tuples and as flat vectors in a car's own frame."""

@@ -1,4 +1,4 @@
-"""Flat observations: what a driver knows as a vector of numbers from -1 to 1 in the car's own frame.
+"""Flat observations: a frame as a vector of numbers from -1 to 1, in a car's own frame of reference.
 
 The vector has these parts, one after another (`Layout`); docs/learning.md says what each number is:
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
 SHOWN = 5
-"""Other cars that are shown unless another number is asked for."""
+"""Default number of other cars that are shown."""
 _FLAGS = tuple(NAMES)[: SIZE.FLAGS]
 _OWN = ("speed", "yaw_rate", *_FLAGS)
 _LANE = ("on_lane", "offset", "heading_cos", "heading_sin", "progress", "to_end")
@@ -88,7 +88,7 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """How many numbers a vector has."""
+        """Length of the vector, F."""
         return SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL + SIZE.CAR * self.cars + self.rays
 
     @property
@@ -101,21 +101,21 @@ class Layout:
 
 
 class FlatObserver:
-    """Makes the flat observation of each tick from what a controller is told, the same bits as in a batch.
+    """Makes the flat observation of each tick from a controller's observations; the bits equal those in a batch.
 
-    It is asked once a tick, since it remembers which goals have been visited.
+    Call it exactly once per tick, since it keeps which goals have been visited.
 
     Parameters
     ----------
     problem : Problem
-        What is driven.
+        The problem of the trial.
     cars : int
         Other cars that are shown, at most.
 
     Attributes
     ----------
     layout : Layout
-        What stands where.
+        Names and places of the numbers.
 
     Examples
     --------
@@ -149,5 +149,5 @@ class FlatObserver:
 
     @property
     def visits(self) -> int:
-        """Visits of goals so far."""
+        """Number of visits of goals so far."""
         return self._tables.trial[0].visits

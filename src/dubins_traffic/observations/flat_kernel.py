@@ -1,4 +1,4 @@
-"""The flat observation of one car, compiled; `observations.flat` says what stands where."""
+"""The flat observation of one car (compiled); `observations.flat` gives its layout."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.observations.outlook import Outlook, OutlookTables
 from dubins_traffic.observations.seeking import lane_of, metres_to_goal, next_lane
 from dubins_traffic.roads.lookup import lane_end
-from dubins_traffic.routing.lane_graph import frame
+from dubins_traffic.routing.lane_graph import foot, frame
 
 
 class _Size(NamedTuple):
@@ -37,13 +37,13 @@ SIZE: Final = _Size()
 
 @jit_inline
 def within(value: float) -> float:
-    """Return `value` (share) cut to -1 to 1."""
+    """Return `value` (share) clipped to [-1, 1]."""
     return min(max(value, -1.0), 1.0)
 
 
 @jit_inline
 def near_far(metres: float, scale: float) -> float:
-    """Return 0 where `metres` (m) is 0, 1/2 where it is `scale` (m), and 1 where it is infinite."""
+    """Map `metres` (m), 0 to infinity, to [0, 1]: `scale` (m) becomes 1/2."""
     return 1.0 - scale / (max(metres, 0.0) + scale)
 
 
@@ -102,11 +102,9 @@ def _lane(b: int, n: int, lane: int, at: int, out: npt.NDArray[np.float32], tabl
     """Write where the car is on its lane."""
     own = tables.trial[b]
     state = tables.state
-    ax, ay, tx, ty, length = frame(tables.roads, own.net, lane)
-    rx, ry = state.x[b, n] - ax, state.y[b, n] - ay
-    along = rx * tx + ry * ty
+    along, left, tx, ty, length = foot(tables.roads, own.net, lane, state.x[b, n], state.y[b, n])
     out[SIZE.OWN] = 1.0 if at < 0 else 0.0
-    out[SIZE.OWN + 1] = within((tx * ry - ty * rx) / own.half_width)
+    out[SIZE.OWN + 1] = within(left / own.half_width)
     out[SIZE.OWN + 2] = within(tx * state.c[b, n] + ty * state.s[b, n])
     out[SIZE.OWN + 3] = within(tx * state.s[b, n] - ty * state.c[b, n])
     out[SIZE.OWN + 4] = min(max(along / length, 0.0), 1.0)
@@ -136,7 +134,7 @@ def _crossing(b: int, n: int, v: int, out: npt.NDArray[np.float32], tables: Outl
 
 @jit_inline
 def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: OutlookTables) -> None:
-    """Write where the goal is that the ego seeks, and which way leads there."""
+    """Write where the goal that the ego seeks is, and which way leads there."""
     roads, state = tables.roads, tables.state
     place = SIZE.OWN + SIZE.LANE + SIZE.CROSSING
     for k in range(SIZE.GOAL):
@@ -163,7 +161,7 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
 
 @jit
 def _nearest(b: int, n: int, shown: int, sight2: float, tables: OutlookTables) -> int:
-    """List the nearest cars that car n sees in `tables.near`, the first of equally near ones first; return how many."""
+    """List the nearest cars that car n sees in `tables.near`, of equally near ones the lower index first."""
     state, near, apart = tables.state, tables.near, tables.apart
     count = 0
     if shown == 0:
@@ -216,7 +214,7 @@ def _relation(
 
 @jit
 def sweep(b: int, tick: int, tables: OutlookTables) -> None:
-    """Let the laser of the ego of trial b sweep if it is time to in frame `tick`; else the last scan stays."""
+    """Make the laser scan of the ego of trial b if one is due in frame `tick`; otherwise the last scan stays."""
     laser, own = tables.laser[0], tables.trial[b]
     if laser.rate == 0.0:
         return
@@ -228,6 +226,6 @@ def sweep(b: int, tick: int, tables: OutlookTables) -> None:
 
 @jit_inline
 def _laser(b: int, place: int, out: npt.NDArray[np.float32], tables: OutlookTables) -> None:
-    """Write the last scan: 0 for nothing nearer than the shortest range, 1 for nothing within the longest."""
+    """Write the last scan: 0 is a body nearer than the shortest range, 1 no body within the longest."""
     for k in range(tables.rays.shape[0]):
         out[place + k] = min(max(tables.ranges[b, k] / tables.laser[0].longest, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""What flat observations are made from, as tables: each trial's scales, its goals, and the ways to them."""
+"""The tables from which flat observations are made: each trial's scales, its goals, and distances to them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.straight import require_straight
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.tours import lane_graph
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 @record
 class Outlook:
-    """What the flat observations of one trial are scaled by, and what its ego seeks."""
+    """The scales of the flat observations of one trial, and the goal that its ego seeks."""
 
     net: int
     """The trial's road network."""
@@ -85,7 +84,7 @@ class Sweeps:
 
 
 class OutlookTables(Tables):
-    """All that flat observations of a batch are made from.
+    """All tables from which the flat observations of a batch are made.
 
     Attributes
     ----------
@@ -94,23 +93,23 @@ class OutlookTables(Tables):
     roads : RoadTable
         The roads of the batch.
     trial : (B,) Outlook
-        Scales of each trial, and what its ego seeks.
+        Scales of each trial, and the goal that its ego seeks.
     goal : (G,) SoughtGoal
         The goals of one trial after another, each once.
     metres : (M, L)
-        From the start of each lane to a goal, for each distinct pair of network and goal; inf where there is no way.
+        Distance from the start of each lane to a goal, for each distinct pair of network and goal; inf for no way.
     near : (K,)
         Scratch: the cars that are shown, nearest first.
     apart : (K,)
-        Scratch: the squares of their distances, square metres.
+        Scratch: their squared distances, square metres.
     laser : (1,) Sweeps
         The laser.
     rays : (R,) Ray
         Directions of its rays.
     ranges : (B, R)
-        What the last sweep of each ego has met, metres.
+        The last scan of each ego, metres.
     around : Surroundings
-        What rays may meet.
+        The bodies that rays may meet.
     """
 
     state: State
@@ -139,16 +138,14 @@ def new_outlook(
     Parameters
     ----------
     problems
-        One a trial; with one laser, or none.
+        One for each trial; all with the same laser, or all without.
     nets, roads
         The number of each trial's network in the table of the roads.
     around
         State and labels, and the cars and obstacles of the batch.
     shown
-        How many other cars are shown.
+        Number of other cars that are shown.
     """
-    for problem in problems:
-        require_straight(problem.network, "what environments show of lanes")
     state, labels, cars, obstacles = around
     trial = table(Outlook, len(problems))
     trial["net"] = nets
@@ -169,7 +166,7 @@ def new_outlook(
 
 
 def _goals(problems: Sequence[Problem], trial: Rows[Outlook]) -> tuple[Rows[SoughtGoal], Floats]:
-    """Return the goals of the trials, and the ways to them; note in `trial` which are whose."""
+    """Return the goals of the trials, and the distances to them; fill in which goals are whose in `trial`."""
     known: dict[int, tuple[RoadNetwork, dict[int, int]]] = {}
     rows: list[tuple[int, int]] = []
     count = 0
@@ -191,7 +188,7 @@ def _goals(problems: Sequence[Problem], trial: Rows[Outlook]) -> tuple[Rows[Soug
 
 
 def metres_to_vertices(network: RoadNetwork, vertices: Iterable[int]) -> list[Floats]:
-    """Return the metres from the start of each lane to each intersection along lanes, (L,); inf: there is no way."""
+    """Return, for each of `vertices`, the distance to it from the start of each lane along lanes, (L,); inf: no way."""
     known = cast("dict[int, Floats]", network.known.setdefault(Outlook, {}))
     wanted = list(vertices)
     missing = [vertex for vertex in wanted if vertex not in known]

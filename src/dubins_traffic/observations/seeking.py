@@ -1,4 +1,4 @@
-"""Which goal a car seeks, and how far it is to it along lanes, compiled.
+"""Which goal a car seeks, and how far it is to it along lanes (compiled).
 
 A car seeks the goal of its present round that is nearest along lanes when it has visited the one before; visits are
 those of docs/rules.md. Inside a disc there is no lane state: from there the way leads straight to where a road leaves
@@ -13,8 +13,8 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.observations.outlook import OutlookTables
-from dubins_traffic.roads.lookup import lane_end
-from dubins_traffic.routing.lane_graph import frame
+from dubins_traffic.roads.lookup import lane_direction_at, lane_end
+from dubins_traffic.routing.lane_graph import foot, frame
 
 
 @jit_inline
@@ -24,15 +24,15 @@ def lane_of(b: int, n: int, tables: OutlookTables) -> int:
     if lane >= 0:
         return lane
     segment: int = tables.labels.segment[b, n]
-    row: int = tables.roads.seg_off[tables.trial[b].net] + segment
-    own = tables.roads.segment[row]
-    ahead = tables.state.c[b, n] * own.tx + tables.state.s[b, n] * own.ty
+    x, y = tables.state.x[b, n], tables.state.y[b, n]
+    tx, ty = lane_direction_at(tables.roads, tables.trial[b].net, 2 * segment, x, y)
+    ahead = tables.state.c[b, n] * tx + tables.state.s[b, n] * ty
     return 2 * segment + (0 if ahead >= 0.0 else 1)
 
 
 @jit
 def metres_to_goal(b: int, n: int, row: int, tables: OutlookTables) -> float:
-    """Return how far car n has to drive along lanes to the goal in `row` (row) of the goals, metres; inf: no way."""
+    """Return the distance along lanes from car n to the goal in `row` (row) of `tables.goal`, metres; inf: no way."""
     roads, goal = tables.roads, tables.goal[row]
     net = tables.trial[b].net
     at: int = tables.labels.at[b, n]
@@ -40,8 +40,7 @@ def metres_to_goal(b: int, n: int, row: int, tables: OutlookTables) -> float:
     if at >= 0:
         return _out_of_disc(b, at, x, y, row, tables)
     lane = lane_of(b, n, tables)
-    ax, ay, tx, ty, length = frame(roads, net, lane)
-    along = (x - ax) * tx + (y - ay) * ty
+    along, _, _, _, length = foot(roads, net, lane, x, y)
     return tables.metres[goal.route, lane] - min(max(along, 0.0), length)
 
 
@@ -91,9 +90,9 @@ def next_lane(b: int, n: int, row: int, tables: OutlookTables) -> int:
 
 @jit
 def seek(b: int, tables: OutlookTables) -> int:
-    """Note what the ego of trial b has visited in a frame that has been labelled, once; return how many goals.
+    """Note the goals that the ego of trial b visits in a labelled frame; return how many. Call it once per frame.
 
-    Where it has visited the goal that it seeks, or seeks none, it seeks the nearest one of the round from here on.
+    If it has visited the goal that it seeks, or seeks none, it seeks the nearest goal of its round from here on.
     """
     own = tables.trial[b]
     at: int = tables.labels.at[b, EGO]
@@ -110,7 +109,7 @@ def seek(b: int, tables: OutlookTables) -> int:
 
 @jit
 def _come_into(b: int, at: int, tables: OutlookTables) -> int:
-    """Note that the ego has come into the disc of `at`; return how many goals it has visited by that."""
+    """Note that the ego has come into the disc of `at`; return the number of goals that it visits thereby."""
     own = tables.trial[b]
     visited, done = 0, 1
     for row in range(own.first_goal, own.last_goal):

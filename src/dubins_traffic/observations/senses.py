@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 new = cast("Callable[..., Any]", tuple.__new__)  # pyright: ignore[reportUnknownMemberType]
-"""Makes a named tuple from a sequence of all its fields, in half the time of a call; some ten are made a tick."""
+"""Makes a named tuple from a sequence of all its fields, in half the time of calling its class."""
 
 
 class Senses:
@@ -40,13 +40,13 @@ class Senses:
     instance : Instance
         What is run.
     car : int
-        Whose senses these are; the ego's by default. Only the ego's are noisy.
+        Index of the car; the ego by default. Only the ego's observations are noisy.
     radius : float, optional
-        From where other cars are seen, metres; by default the problem's sensing radius.
+        Distance within which other cars are seen, metres; by default the problem's sensing radius.
     laser : Laser, optional
-        Instead of the problem's laser.
+        Replaces the problem's laser.
     scanner : Scans, optional
-        Finds what the laser's rays meet; by default that is worked out from the state.
+        Measures the laser ranges; by default they are computed from the state.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class Senses:
         """
         laser = self._laser
         if laser is None:
-            raise ValueError("no laser")
+            raise ValueError("these senses have no laser to sweep")
         if self._scanner is not None:
             rays = numbers(self._rays, np.float64)
             return _cut(self._scanner.scan(self._car, rays, laser.range_max), laser)
@@ -132,7 +132,7 @@ class Senses:
         return ranges
 
     def _sweep(self, tick: int, state: State, laser: Laser) -> None:
-        """Scan when the laser's next sweep is due; in between the last scan stays."""
+        """Make a scan if the laser's next sweep is due; otherwise the last scan stays."""
         number = int(tick * laser.rate / self._rate + 1e-9)
         if number > self._latest:
             self._latest = number
@@ -140,6 +140,6 @@ class Senses:
 
 
 def _cut(ranges: Floats, laser: Laser) -> Floats:
-    """Return ranges with those beyond the laser's as REP 117 of ROS says (see `cars.sensing.scan`)."""
+    """Return ranges with those out of the laser's bounds set to +-inf, as in `cars.sensing.scan`."""
     far = np.where(ranges >= laser.range_max, np.inf, ranges)
     return np.where(ranges < laser.range_min, -np.inf, far)

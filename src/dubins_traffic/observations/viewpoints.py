@@ -1,7 +1,7 @@
-"""Trials as each of their cars sees them: rows of a batch in which another car stands in the ego's place.
+"""Trials as each of their cars sees them: a batch with a row for each car, in which that car is the ego.
 
-What is written for egos, such as the shield and flat observations, serves any car in its own row: itself first, then
-the others in their order, as in what a driver is told (`observations.senses`).
+So kernels that are written for egos, such as the shield and flat observations, serve any car: in its row the car comes
+first, then the others by index, as in an observation (`observations.senses`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class ViewTables(Tables):
 
 @jit
 def turn_round(trials: Ints, views: ViewTables) -> None:
-    """Write what the cars of some `trials` (K,) see in the present frame."""
+    """Fill the rows of all cars of some `trials` (K,) from the present frame."""
     for k in range(trials.shape[0]):
         b: int = trials[k]
         count = views.state.count[b]
@@ -60,18 +60,18 @@ def _put(b: int, car: int, row: int, place: int, views: ViewTables) -> None:
 
 
 class Viewpoints:
-    """What each car of some trials sees.
+    """The present frame of some trials as each car sees it.
 
     Parameters
     ----------
     state, labels : State, Labels
-        The present frame of the trials, (B, N), as it is now and will be.
+        The frame of the trials, (B, N), which its owner updates in place.
 
     Attributes
     ----------
     state, labels : State, Labels
-        The same as each car sees it, (B N, N), when it was looked at last; rows of cars that a trial does not have
-        hold nothing.
+        The same as each car sees it, (B N, N), as of the last `look`; rows of cars that a trial does not have are
+        empty.
     """
 
     def __init__(self, state: State, labels: Labels) -> None:
@@ -83,5 +83,5 @@ class Viewpoints:
         self.look(every)
 
     def look(self, trials: Ints) -> None:
-        """Look at the present frame of some trials, (K,)."""
+        """Update the rows of some trials, (K,), to their present frame."""
         self._turn(trials, self._tables)

@@ -1,4 +1,4 @@
-"""The last look before a tick: no motion that could bring about a contact, or leads off the road."""
+"""The last check before a tick: refuses motions that could lead to a contact or off the road (compiled)."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Protocol
 from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.cars.tables import ObstacleTable, box_of
 from dubins_traffic.kernels.boxes import Box, separation
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.roads.lookup import nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.shape import half_extent
 
 GUARD = 0.01
-"""What is kept free beyond the other's worst motion, metres."""
+"""Gap kept in addition to the other body's worst motion, metres."""
 NEAR = 0.2
-"""What is farther away than this is not looked at: no tick leads there, metres."""
+"""Bodies farther away than this are ignored if they are out of reach in a tick, metres."""
 VERGE = 0.02
-"""What an ego's centre keeps from the edge of the road whatever happens, metres."""
+"""Distance that an ego's centre keeps from the edge of the road, metres."""
 
 
 class Mover(Protocol):
@@ -36,6 +36,8 @@ class Mover(Protocol):
         Its least turning radius, metres.
     period : float
         Seconds of a tick.
+    near : float
+        What is farther away than this is not looked at: no tick leads there, metres.
     """
 
     half_length: float
@@ -47,6 +49,7 @@ class Mover(Protocol):
     yaw_most: float
     tightest: float
     period: float
+    near: float
 
 
 @jit_inline
@@ -64,9 +67,9 @@ def travel_of(car: Mover) -> float:
     return travel
 
 
-@jit
+@jit_rare
 def leaves_road(pose: Pose, command: Command, period: float, roads: RoadTable, net: int) -> bool:
-    """Whether a motion for one tick takes the centre to VERGE from the road's edge, or farther beyond that."""
+    """Tell whether a motion for one tick takes the centre to VERGE from the road's edge, or farther beyond that."""
     edge = float(roads.half_width[net]) - VERGE
     nx, ny, _, _ = advance(pose.x, pose.y, pose.c, pose.s, command.speed, command.yaw_rate, period)
     _, after = nearest_segment(roads, net, nx, ny)
@@ -78,7 +81,7 @@ def leaves_road(pose: Pose, command: Command, period: float, roads: RoadTable, n
 
 @jit
 def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
-    """Whether a motion of a car for one tick can't touch another body, or leads away from it.
+    """Tell whether a motion of a car for one tick can't touch another body, or leads away from it.
 
     No point of the other gets farther than `travel` (m) in the tick, 0 if it can't move. Where a rectangle and another
     that moves are close, that is not enough: see `keeps_clear`.
@@ -96,7 +99,7 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
 
 @jit_inline
 def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
-    """Whether a motion keeps a car from all that another may reach in the tick, or can only lead away from it.
+    """Tell whether a motion keeps a car from all that another may reach in the tick, or can only lead away from it.
 
     A disc leads away if the gap grows. Of a rectangle that turns a corner may swing toward the other while the gap
     grows, and the other may come to touch another side: so a rectangle leads away only if it drives straight on and all
@@ -144,13 +147,13 @@ def gaps(pose: Pose, command: Command, car: Mover, other: Box, far: float) -> tu
 
 @jit_inline
 def may_meet(pose: Pose, command: Command, car: Mover, other: Pose, travel: float) -> bool:
-    """Whether a motion for one tick might touch a car of the same kind at a pose, if that is within NEAR.
+    """Tell whether a motion for one tick might touch a car of the same kind at a pose, if that is within `car.near`.
 
     The rest is as in `keeps_clear`; `travel` (m).
     """
     dx = other.x - pose.x
     dy = other.y - pose.y
-    far = 2.0 * car.reach + NEAR
+    far = 2.0 * car.reach + car.near
     return dx * dx + dy * dy < far * far and not keeps_clear(pose, command, car, body_at(other, car), travel)
 
 
@@ -158,7 +161,7 @@ def may_meet(pose: Pose, command: Command, car: Mover, other: Pose, travel: floa
 def may_hit(
     b: int, pose: Pose, command: Command, car: Mover, obstacles: ObstacleTable, near: float, spread: float
 ) -> bool:
-    """Whether a motion for one tick might touch an obstacle of trial b.
+    """Tell whether a motion for one tick might touch an obstacle of trial b.
 
     Looked at are those within `near` (m) of what the car reaches; each is kept clear by `spread` (m) more than GUARD.
     The rest is as in `motion_is_safe`.

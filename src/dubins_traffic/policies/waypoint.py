@@ -5,12 +5,16 @@ from __future__ import annotations
 from math import sqrt
 
 from dubins_traffic.cars.state import Command, Pose
+from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit
 
 TAN_WANDER = 0.07011455787200271
 """Tangent of 0.07 rad, the bearing tolerance of the 2016 e-agent."""
 TAN_SIMPLE = 0.10033467208545055
 """Tangent of 0.1 rad, the bearing tolerance of the 2016 ego controller."""
+
+STEEP = 1.0
+"""Tangent of the bearing error beyond which a car that drives curves turns in place, if it can."""
 
 
 @jit
@@ -56,6 +60,21 @@ def turn_then_drive(
         whole = period * sqrt(ahead * ahead + left * left)
         turn = yaw_rate if yaw_rate * whole <= abs(left) else abs(left) / whole
     return 0.0, turn if left > 0.0 else -turn
+
+
+@jit
+def turn_or_pursue(
+    pose: Pose, goal_x: float, goal_y: float, most: Command, slowest: float, radius: float, period: float
+) -> tuple[float, float]:
+    """Return (speed, yaw rate): as `pursue`, but a car without a turning `radius` (m) turns in place to what is aside.
+
+    The goal is (`goal_x` (m), `goal_y` (m)), `slowest` (m/s) the least speed; the rest is as for `turn_then_drive`.
+    """
+    if radius == 0.0:
+        _, turn = turn_then_drive(pose, goal_x, goal_y, most, STEEP, INFINITE, period)
+        if turn != 0.0:
+            return 0.0, turn
+    return pursue(pose, goal_x, goal_y, most, slowest, radius)
 
 
 @jit

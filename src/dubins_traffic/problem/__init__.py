@@ -1,1 +1,1 @@
-"""What is to be solved: trials configurations, problems and instances, and how they are drawn."""
+"""Trials configurations, problems and instances: their documents, and how instances are drawn."""

@@ -27,7 +27,7 @@ from dubins_traffic.roads.network import RoadNetwork
 
 @dataclass(frozen=True, slots=True)
 class PlannedAgent:
-    """An e-agent of a document: what it is, where it starts (None: drawn), and the entry that says so."""
+    """An e-agent of a document: the e-agent, its start (None: drawn), and the path of its entry."""
 
     agent: EAgent
     start: Pose | None
@@ -49,7 +49,7 @@ class Configuration:
     agents : tuple of PlannedAgent
         The e-agents, counts multiplied out.
     file : str or None
-        Where it was read.
+        The file from which it was read.
     """
 
     document: Mapping[str, Any]
@@ -225,7 +225,7 @@ def pose_of(x: float, y: float, theta: float) -> Pose:
 
 
 def settings_of(document: Mapping[str, Any], file: str | None = None) -> Settings:
-    """Return the settings of a document, without looking up its road network; InputError if one is wrong."""
+    """Return the settings of a document, without reading its road network; InputError if one is wrong."""
     if version_of(document, file) == 0:
         parse(Settings0, document, file=file)
         known = {key: value for key, value in document.items() if key in VERSION_0_KEYS}

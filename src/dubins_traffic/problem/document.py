@@ -1,4 +1,4 @@
-"""Problem instances as documents: version 0 as in 2016, version 1 with all that an instance is."""
+"""Problem instances as documents: version 0 as in 2016, version 1 with all of an instance."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from dubins_traffic.problem.versions import version_of
 from dubins_traffic.roads.network import RoadNetwork
 
 DURATION_BOUNDS = (30, 90)
-"""Bounds from which a duration that a document does not give is drawn, seconds."""
+"""Bounds of the duration that is drawn if a document gives none, seconds."""
 
 
 def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]:
@@ -40,9 +40,9 @@ def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]
     Parameters
     ----------
     instance : Instance
-        What to write.
+        The instance to write.
     version : int
-        0: what a controller of 2016 is told; 1: everything, so that reading it gives an equal instance.
+        0: what a controller of 2016 is given; 1: everything, so that reading it gives an equal instance.
     """
     problem = instance.problem
     public: dict[str, Any] = {
@@ -91,7 +91,7 @@ def instance_from_document(
     file : str, optional
         Named in messages.
     seed, trial : int
-        For what is drawn, where the document gives none.
+        Seed and number of the trial for what is drawn, if the document gives none.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Drawing instances: instance = draw(configuration, seed, trial), a function of these three and of nothing else."""
+"""Drawing instances: ``draw(configuration, seed, trial)`` depends on these three arguments alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.recipe import Recipe
 
 TOGETHER = 64
-"""So many instances are drawn at a time."""
+"""Number of instances that are drawn at a time."""
 
 
 def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instance:
@@ -21,7 +21,7 @@ def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instanc
     Parameters
     ----------
     configuration : Configuration
-        What to draw from.
+        The configuration.
     seed : int
         Root seed, 0 <= seed < 2**64.
     trial : int
@@ -41,9 +41,9 @@ def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instanc
 
 
 def draw_many(configuration: Configuration, seed: int, trials: Iterable[int]) -> Iterator[Instance]:
-    """Yield the trials of a configuration that have the numbers `trials`: what `draw` returns, much sooner.
+    """Yield the instances that `draw` returns for the numbers `trials`, much faster.
 
-    It loads the compiler. The parameters and errors are those of `draw`; an error comes with the trial that it is of.
+    It uses compiled code. The parameters and errors are those of `draw`; an error is raised when its trial is reached.
     """
     numbers = iter(trials)
     while some := [int(trial) for trial in islice(numbers, TOGETHER)]:

@@ -1,4 +1,4 @@
-"""What is drawn for an instance, piece by piece; each piece has a stream of random numbers of its own."""
+"""Draws the parts of an instance; each part has a stream of random numbers of its own."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from dubins_traffic.problem.starts import Wish
 from dubins_traffic.roads.network import RoadNetwork
 
 BESIDE = 0.02
-"""What a car needs beside it to pass an obstacle in its lane, metres."""
+"""Gap that a car needs beside it to pass an obstacle within its lane, metres."""
 
 
 class Stream(IntEnum):
-    """Streams of random numbers, one a purpose: what is drawn for one never shifts another."""
+    """Streams of random numbers, one for each purpose: drawing from one never shifts another."""
 
     NETWORK = 1
     GOALS = 2
@@ -34,7 +34,7 @@ class Stream(IntEnum):
 def draw_goals(
     network: RoadNetwork, bounds: tuple[int, int], draws: Draws
 ) -> tuple[tuple[float, float], ...]:
-    """Return goals, as many as drawn from `bounds` (both included), distinct while there are intersections."""
+    """Return goals, their number drawn from `bounds` (both included); they differ as far as intersections suffice."""
     count = draws.between(*bounds)
     places = len(network.intersections)
     picks = draws.sample(min(count, places), places)
@@ -62,7 +62,7 @@ def drawn_cycle(agent: EAgent) -> bool:
 def complete_agents(
     network: RoadNetwork, planned: Sequence[PlannedAgent], draws: Draws
 ) -> tuple[EAgent, ...]:
-    """Return the e-agents with everything about them drawn."""
+    """Return the e-agents with all that is random about them drawn."""
     agents: list[EAgent] = []
     for agent in (plan.agent for plan in planned):
         parameters = dict(agent.parameters)
@@ -81,10 +81,10 @@ def agent_wishes(
     car: Car,
     obstacles: Sequence[Obstacle],
 ) -> list[Wish]:
-    """Return where each e-agent is to start: as planned, else drawn; a loop on its cycle.
+    """Return where each e-agent is to start: as planned, otherwise drawn; one of kind `loop` on its cycle.
 
-    One that keeps the rules starts on a lane without obstacles in the way, as long as there is one: before an obstacle
-    that it can't pass it might never be able to keep them.
+    An e-agent that keeps the rules starts on a lane without obstacles in the way, if there is one: in front of an
+    obstacle that it can't pass it might never be able to keep them.
     """
     wishes: list[Wish] = []
     clear = _clear_lanes(network, car, obstacles)

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, in the words of `InputError`: file, field, value, expectation."""
+"""Turns the errors of pydantic into `InputError`: file, field, value, expectation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _EXPECTED = {
 
 
 ALIKE = 0.8
-"""Similarity of two keys (2 matches / characters) from which one is taken for the other misspelt."""
+"""Similarity of two keys (2 matches / characters) from which one counts as the other misspelt."""
 
 
 class Strict(BaseModel):
@@ -48,13 +48,13 @@ class Strict(BaseModel):
 
 
 class Open(Strict):
-    """The same for documents whose unknown keys are kept."""
+    """Base of models of documents whose unknown keys are kept."""
 
     model_config = ConfigDict(extra="allow")
 
 
 class Careful(Open):
-    """Like `Open`, except that a key which looks like a known one misspelt is refused: it would mean nothing."""
+    """Like `Open`, but a key that looks like a known one misspelt is refused, since it would have no effect."""
 
     @model_validator(mode="before")
     @classmethod
@@ -70,7 +70,7 @@ class Careful(Open):
 
 
 def fault(problem: str, expected: str, field: str = "", value: object = None) -> PydanticCustomError:
-    """Return the error for a validator to raise: what is wrong, and what would have been right.
+    """Return the error that a validator raises: what is wrong, and what would have been right.
 
     `field` and `value` say which part of the validated value is to blame, if not all of it.
     """
@@ -79,7 +79,7 @@ def fault(problem: str, expected: str, field: str = "", value: object = None) ->
 
 
 def more_faults(count: int) -> str:
-    """Return what a message on one of several faults ends with."""
+    """Return the end of a message about the first of several faults: how many more there are."""
     return f" (and {count} more fault{'s' if count > 1 else ''})"
 
 

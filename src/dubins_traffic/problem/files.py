@@ -1,4 +1,4 @@
-"""Documents as files: reading (by path, name or standard input), telling what they are, writing."""
+"""Documents as files: reads them by path or from standard input, tells their kind, writes them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def read_source(path: str | os.PathLike[str]) -> Source:
 
 
 def source_of(data: bytes, name: str) -> Source:
-    """Return what has been read of the file called `name`; the exceptions are those of `read_source`."""
+    """Return `data`, the bytes of the file called `name`, as a text; the exceptions are those of `read_source`."""
     if data.startswith(MCAP_MAGIC):
         raise _refuse_record(name)
     folder = None if name == STANDARD_INPUT or is_stream(name) else Path(name).parent
@@ -101,7 +101,7 @@ def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
 
 
 def read_toml(path: str | os.PathLike[str], expected: str) -> dict[str, Any]:
-    """Return what the TOML file at `path` says.
+    """Return the content of the TOML file at `path`.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) ->
 
 
 def detect(document: Mapping[str, Any], file: str | None = None) -> Kind:
-    """Tell what a JSON document is from its keys.
+    """Return the kind of a JSON document, told by its keys.
 
     Raises
     ------
@@ -178,7 +178,7 @@ _CONFIGURATION_ONLY = frozenset({"number_trials", "duration_bounds", "number_goa
 
 
 def detect_text(text: str, file: str | None = None) -> Kind:
-    """Tell what a text is: a road network in a map format that is no JSON, else as `detect`."""
+    """Return the kind of a text: a road network in a map format other than JSON, otherwise as `detect` says."""
     if is_map(text):
         return Kind.NETWORK
     return detect(parse_json(text, file), file)
@@ -194,7 +194,7 @@ def _object(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _checked_text(text: str, path: str) -> str:
-    """Return a text that can be written; halves of a pair of surrogates, which JSON can escape, can't."""
+    """Return `text` if it can be written as UTF-8; single surrogates, which JSON can escape, can't."""
     try:
         text.encode()
     except UnicodeEncodeError as error:

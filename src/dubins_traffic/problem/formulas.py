@@ -1,4 +1,4 @@
-"""The formulas that a problem carries beside its task: they must be readable, about the problem, and monitorable."""
+"""The formulas that a problem carries beside its task, and their checks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 MOST: Final = 100
 """Most formulas of a problem."""
 NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9_ .:-]{0,39}$"
-"""What the name of a formula is like."""
+"""Pattern of the name of a formula."""
 
 
 def read_formula(name: str, text: str) -> Formula:
@@ -26,7 +26,7 @@ def read_formula(name: str, text: str) -> Formula:
     Raises
     ------
     FormulaError
-        If `text` is none; names the field, line and column.
+        If `text` is no formula; names the field, line and column.
     """
     try:
         return parse(text)

@@ -1,4 +1,4 @@
-"""A problem: what a controller is told. An instance: a problem plus what it is not told."""
+"""A problem: what a controller is given. An instance: a problem and what a controller is not given."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
 from dubins_traffic.cars.body import Car, Obstacle
+from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
 from dubins_traffic.problem.bend_preconditions import check_bends
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
 
 NUDGED = "nudged"
-"""The kind of e-agent that does what another kind does, late and with noise."""
+"""The kind of e-agent that does what another kind does, delayed and with noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ class Disturbances:
 
 @dataclass(frozen=True, slots=True)
 class EAgent:
-    """An e-agent: `kind` is our name for its type (`wander`), `type` the name in the document (`wander/wander`)."""
+    """An e-agent: `kind` is the name of its kind here (`wander`), `type` that in the document (`wander/wander`)."""
 
     kind: str
     name: str
@@ -59,7 +60,7 @@ class EAgent:
 
     @property
     def driver(self) -> EAgent:
-        """The e-agent that says what this one asks for: itself, unless it is nudged."""
+        """The e-agent that decides this one's commands: itself, or of a nudged one the kind that it delays."""
         if self.kind != NUDGED:
             return self
         return EAgent(self.parameters["kind"], self.name, self.type, self.parameters["parameters"])
@@ -67,11 +68,11 @@ class EAgent:
 
 @dataclass(frozen=True, slots=True)
 class Problem(Pictured):
-    """What a controller is told before a trial.
+    """What a controller is given before a trial.
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
     `rules` holds the parameters of docs/rules.md by name, empty where the rules are not to be judged; `formulas` the
-    texts of what is judged beside the task, by name.
+    texts of what is judged beside the task, by name. Neither can be changed.
     """
 
     network: RoadNetwork
@@ -86,8 +87,12 @@ class Problem(Pictured):
     rules: Mapping[str, Any]
     formulas: Mapping[str, str] = field(default_factory=dict[str, str])
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rules", read_only(self.rules))
+        object.__setattr__(self, "formulas", read_only(self.formulas))
+
     def __deepcopy__(self, memo: object) -> Self:
-        """Return this very problem, which never changes."""
+        """Return this object itself, which is immutable."""
         return self
 
     def __repr__(self) -> str:
@@ -137,18 +142,15 @@ class Instance(Pictured):
     def __post_init__(self) -> None:
         problem = self.problem
         if not problem.network.is_straight:
-            kinds = [agent.kind for agent in self.e_agents]
             check_bends(
                 problem.network,
                 problem.intersection_radius,
                 problem.car,
-                bool(problem.obstacles),
-                kinds,
                 problem.rules,
             )
 
     def __deepcopy__(self, memo: object) -> Self:
-        """Return this very instance, which never changes."""
+        """Return this object itself, which is immutable."""
         return self
 
     def __repr__(self) -> str:
@@ -156,7 +158,7 @@ class Instance(Pictured):
 
     @property
     def title(self) -> str:
-        """Which trial it is: ``trial 2 of seed 4``."""
+        """The trial in words: ``trial 2 of seed 4``."""
         return f"trial {self.trial} of seed {self.seed}"
 
     @property

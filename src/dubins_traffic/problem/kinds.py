@@ -125,8 +125,8 @@ class Scripted(Strict):
     repeat: bool = Field(default=False, description="whether the commands begin again after the last")
 
 
-class Lawful(Strict):
-    """Keeps the rules of the road: right lane, stops, order of arrival; may be made to break named ones."""
+class _Driver(Strict):
+    """Keeps the rules of the road, and goes somewhere."""
 
     goes: Literal["wander", "loop", "places"] = Field(
         default="wander", description="at random, round a cycle, or between random intersections"
@@ -142,6 +142,11 @@ class Lawful(Strict):
         default=0.0,
         description="seconds for which it parks where it starts; before a crossing it does not park",
     )
+
+
+class Lawful(_Driver):
+    """Keeps the rules of the road: right lane, stops, order of arrival; may be made to break named ones."""
+
     rolls: Share = Field(
         default=0.0, description="share of crossings entered without stopping or waiting (E1)"
     )
@@ -190,23 +195,13 @@ class Choice(Strict):
         return {name: value for name, value in handler(self).items() if value is not None}
 
 
-class Chosen(Strict):
+class Chosen(_Driver):
     """Keeps the rules of the road, and does what a table says where they leave it a choice."""
 
     goes: Literal["wander", "loop", "places"] = Field(
         default="wander", description="where nothing is chosen: at random, round a cycle, or between places"
     )
-    cycle: list[NetworkPoint] | None = Field(
-        default=None,
-        min_length=2,
-        max_length=limits.GOALS,
-        description="for loop: lattice points of the intersections, in order; null: drawn",
-    )
     speed: Speed = Field(default=0.5, description="speed where nothing is chosen, m/s")
-    departs_after: Annotated[float, Field(ge=0, le=50)] = Field(
-        default=0.0,
-        description="seconds for which it parks where it starts; before a crossing it does not park",
-    )
     choices: list[Choice] = Field(
         default=[],
         max_length=limits.LEGS,
@@ -289,28 +284,28 @@ KINDS: dict[str, type[Strict]] = {
     COUNTER: Counter,
     REMOTE: Remote,
 }
-"""Kinds by name, each with the model of its parameters; `agents.kinds` says what is made of them."""
+"""Kinds by name, each with the model of its parameters; `agents.kinds` says how they drive."""
 KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis", "chosen"})
 """Kinds of e-agents that keep the rules of the road."""
 ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})
-"""Kinds of e-agents whose trials run by themselves: drivers of their own decide, in Python or elsewhere."""
+"""Kinds of e-agents whose trials are not batched: a driver in Python or in another process decides."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}
-"""Types (package/executable) of 2016, and what they are called here."""
+"""Types (package/executable) of 2016, and the kinds that they are here."""
 
 PROGRAM = r"^[A-Za-z][A-Za-z0-9_]*/[A-Za-z0-9_.-]+$"
-"""A type package/executable; one that is not ours is a program of the user's."""
+"""Pattern of a type package/executable; if it is not known here it is a program of the user's."""
 
 
 def kind_of(name: str) -> str:
-    """Return the kind that `name`, ours or of 2016, stands for.
+    """Return the kind that a type `name`, of this package or of 2016, stands for.
 
-    A package/executable that is not ours is remote; what names a class is the user's own.
+    Another package/executable is of kind `remote`; a name of a class is of kind `own`.
 
     Raises
     ------
     InputError
-        If there is none.
+        If `name` is none of these.
     """
     kind = NAMES_2016.get(name, name)
     if kind in KINDS:
@@ -329,9 +324,9 @@ def kind_of(name: str) -> str:
 
 
 def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the rest.
+    """Return all parameters of an e-agent of `kind`: those given, checked, and the defaults of the others.
 
-    Those of the user's own are checked by their class, when a trial begins.
+    Parameters of a user's own class are checked when a trial begins.
     """
     if kind == OWN:
         return dict(given)

@@ -49,7 +49,7 @@ class Lines(NamedTuple):
 
 
 def chord(along: Floats, left: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Return where lines are inside a disc whose centre is `along` down the line and `left` of it; else inf, -inf."""
+    """Return where lines enter and leave a disc centred `along` and `left` of them; inf, -inf where they miss it."""
     square = radius * radius - left * left
     half = np.sqrt(np.maximum(square, 0.0))
     hit = square > 0.0

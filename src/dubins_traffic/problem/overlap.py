@@ -1,4 +1,4 @@
-"""Whether bodies and obstacles that stand overlap: exact, in plain Python, for starts that are given.
+"""Tells exactly whether standing bodies and obstacles overlap, in plain Python, for starts that are given.
 
 A shape is its corners, in order, and a rounding: a disc is one corner, rounded.
 """
@@ -40,7 +40,7 @@ def obstacle_shape(obstacle: Obstacle) -> Shape:
 
 
 def overlap(a: Shape, b: Shape) -> bool:
-    """Whether two shapes have a point in common."""
+    """Tell whether two shapes have a point in common."""
     reach = a.rounding + b.rounding
     if _contains(a, b.corners[0]) or _contains(b, a.corners[0]):
         return True
@@ -48,7 +48,7 @@ def overlap(a: Shape, b: Shape) -> bool:
 
 
 def contains(shape: Shape, point: Point) -> bool:
-    """Whether `point` lies inside the polygon of a shape, by the number of edges to its right."""
+    """Tell whether `point` lies inside the polygon of a shape, by the number of edges to its right."""
     return _contains(shape, point)
 
 
@@ -69,7 +69,7 @@ def _contains(shape: Shape, point: Point) -> bool:
 
 
 def _near(p: Point, q: Point, r: Point, s: Point, reach: float) -> bool:
-    """Whether the edges pq and rs cross or come within `reach`."""
+    """Tell whether the edges pq and rs cross or come within `reach`."""
     if _side(p, q, r) * _side(p, q, s) < 0 and _side(r, s, p) * _side(r, s, q) < 0:
         return True
     gaps = (_gap(p, r, s), _gap(q, r, s), _gap(r, p, q), _gap(s, p, q))

@@ -1,4 +1,4 @@
-"""Free places for cars on the right lanes of a network: intervals of the lanes' centre lines, cut by what is there.
+"""Free places for cars on the right lanes of a network: intervals of lanes' centre lines, without what blocks them.
 
 Places are found exactly, not by trial and error, so that "does not fit" is a fact. All bits follow from
 + - * / and square roots in a fixed order.
@@ -21,7 +21,7 @@ from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.network import RoadNetwork
 
 SLACK = 1e-9
-"""Added to every clearance, metres, so that rounding never eats into it."""
+"""Added to every clearance, metres, so that rounding never makes it too small."""
 
 
 class Intervals(NamedTuple):
@@ -32,7 +32,7 @@ class Intervals(NamedTuple):
     high: Floats
 
     def select(self, index: Ints) -> Intervals:
-        """Return the intervals at `index`."""
+        """Return the intervals with the numbers `index`."""
         return Intervals(self.lane[index], self.low[index], self.high[index])
 
 
@@ -60,13 +60,13 @@ class Places:
         return self._network.lanes
 
     def copy(self) -> Places:
-        """Return a copy that may be cut on its own."""
+        """Return an independent copy."""
         twin = object.__new__(Places)
         twin.__dict__.update(self.__dict__)
         return twin
 
     def block(self, x: float, y: float, radius: float) -> None:
-        """Take away what is closer than `radius` to (x, y)."""
+        """Remove all places closer than `radius` to (x, y)."""
         radius += SLACK
         index = self._around(x, y, radius)
         own = self._free.select(index)
@@ -74,7 +74,7 @@ class Places:
         self._put(index, _cut(own, *chord(along, left, radius)))
 
     def block_shape(self, shape: Shape, clearance: float) -> None:
-        """Take away what is closer than `clearance` to a shape, or inside it."""
+        """Remove all places closer than `clearance` to a shape, or inside it."""
         radius = shape.rounding + clearance + SLACK
         x, y = shape.corners[0]
         reach = max(abs(p - x) + abs(q - y) for p, q in shape.corners)
@@ -86,7 +86,7 @@ class Places:
         self._put(index, own.select(np.flatnonzero(np.array(outside, dtype=np.bool_))))
 
     def block_intersections(self, radius: float) -> None:
-        """Take away what is closer than `radius` to any intersection."""
+        """Remove all places closer than `radius` to an intersection."""
         radius += SLACK
         segment, vertex = self._near.couples(radius)
         lane = np.concatenate([2 * segment, 2 * segment + 1])
@@ -140,7 +140,7 @@ class Places:
         return np.repeat(begin - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))
 
     def _put(self, index: Ints, new: Intervals) -> None:
-        """Put `new` in the place of the intervals at `index`, which are all of their lanes."""
+        """Replace the intervals with the numbers `index`, which are all of their lanes, by `new`."""
         kept = np.ones(len(self._free.lane), dtype=np.bool_)
         kept[index] = False
         rest = self._free.select(np.flatnonzero(kept))
@@ -167,7 +167,7 @@ class Places:
 
 
 class _Near:
-    """Which lanes are near a point, through uniform cells."""
+    """Finds the lanes near a point by uniform cells."""
 
     def __init__(self, network: RoadNetwork, w: float) -> None:
         self._network = network

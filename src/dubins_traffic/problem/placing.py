@@ -1,4 +1,4 @@
-"""Drawing the starts of many trials, compiled: what `problem.starts` does while there is room."""
+"""Draws the starts of many trials (compiled), as `problem.starts` does in the usual case that all cars fit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dubins_traffic.problem.starts import Ground, Wish, gap_radius
 NO_CAR = np.uint64(0xFFFFFFFF)
 """Stands where a running trial's random numbers have a car (`kernels.philox.Draws`)."""
 CUTS = 24
-"""Room for so many more intervals for each car; where more are cut the trial is drawn without compiled code."""
+"""Number of intervals per car for which there is scratch; a trial that needs more is drawn in plain Python."""
 
 
 class Room(NamedTuple):
@@ -78,7 +78,7 @@ def lots(ground: Ground, outside: Places, wishes: Sequence[Wish]) -> Lots:
 def place_cars(
     own: Lots, wishes: Sequence[Wish], seed: int, trials: Sequence[int], stream: int
 ) -> list[list[Pose] | None]:
-    """Return the start poses of the cars of each trial; None where they don't fit as they should at best."""
+    """Return the start poses of the cars of each trial; None if they don't fit with the full gap."""
     poses = np.zeros((len(trials), len(own.order), 4))
     placed = np.zeros(len(trials), dtype=np.int64)
     size = len(own.lane) + CUTS * len(wishes)

@@ -1,4 +1,4 @@
-"""Poses as documents give them: checked, with the JSON Schema of each form."""
+"""Checks poses in documents, with the JSON Schema of each form."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def check_start(value: object) -> object:
 
 
 def _numbers(value: object) -> list[float]:
-    """Return a list of finite numbers; an empty one if `value` is not that."""
+    """Return `value` as a list of finite numbers, an empty list if it is anything else."""
     row = cast("Sequence[object]", value) if isinstance(value, list | tuple) else ()
     numbers = [
         float(x) for x in row if isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e300

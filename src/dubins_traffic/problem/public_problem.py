@@ -1,4 +1,4 @@
-"""What a controller is told, as a document: for controllers in other processes."""
+"""The problem as a document, for controllers in other processes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import REMOTE
 
 SECRET = ("starts", "duration", "seed", "trial", "disturbances", "end_on_collision", "simulator")
-"""Fields of an instance that a controller is not told."""
+"""Fields of an instance that a controller is not given."""
 
 
 def problem_to_document(problem: Problem) -> dict[str, Any]:
-    """Return the document of `problem`: that of an instance, version 1, without what a controller is not told.
+    """Return the document of `problem`: that of an instance, version 1, without the fields in `SECRET`.
 
-    Of the e-agents it gives the names alone; their type is said to be `remote`, whatever drives them.
+    Of the e-agents it gives the names alone; their type is always given as `remote`.
     """
     cars = 1 + len(problem.e_agents)
     agents = tuple(EAgent(REMOTE, name, REMOTE) for name in problem.e_agents)

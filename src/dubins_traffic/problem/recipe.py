@@ -1,4 +1,4 @@
-"""What the instances of a configuration have in common, worked out once, and how each is drawn from it."""
+"""Draws the instances of a configuration; what they have in common is computed once."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class Recipe:
         return site
 
     def _is_fixed(self, network: RoadNetwork) -> bool:
-        """Tell whether a network that has been drawn is that of all trials: nothing of it was left to chance."""
+        """Tell whether a network is the same in all trials: nothing about it is random."""
         wanted = self._settings.network
         if self._network is not None or wanted is None or wanted.grid is None:
             return self._network is not None

@@ -1,4 +1,4 @@
-"""What a problem must give before rules 2 and 3 are defined on it (docs/rules.md#room)."""
+"""Preconditions for rules 2 and 3 to be defined on a problem (docs/rules.md#room)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 
 SLACK = 1e-9
-"""Metres by which rounding may fall short of a demand."""
+"""Tolerance for rounding in these comparisons, metres."""
 
 
 def check_demands(

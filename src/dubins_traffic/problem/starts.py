@@ -18,10 +18,10 @@ from dubins_traffic.problem.places import Places
 from dubins_traffic.roads.network import RoadNetwork
 
 ROOMY = 0.5
-"""Gap left between two bodies, metres for w = 0.3 m, while there is room: more than the 0.5 m of free view that the
+"""Preferred gap between two bodies, metres for w = 0.3 m: not less than the 0.5 m of free view that the
 reference e-agent needs to set off."""
 TIGHT = 0.1
-"""Gap left between two bodies where that does not fit, metres for w = 0.3 m."""
+"""Gap between two bodies if not all cars fit with `ROOMY`, metres for w = 0.3 m."""
 
 
 class Wish(NamedTuple):
@@ -63,9 +63,9 @@ def areas_of(ground: Ground) -> Areas:
 def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
     """Return the start poses of all cars.
 
-    Those not given are drawn uniformly over the right lanes' centre lines, headed with the lane, bodies clear of
-    the obstacles, of all discs of intersections and of one another by a gap. Where that does not fit, the cars are
-    packed, then the gap is reduced, then places inside discs are used.
+    Starts that are not given are drawn uniformly over the right lanes' centre lines, headed with the lane, with bodies
+    clear of obstacles, of all discs of intersections and, by a gap, of one another. If the cars don't fit so, they are
+    packed; if they still don't, the gap is reduced, and then places inside discs are used.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Dra
 
 
 def gap_radius(car: Car, gap: float = ROOMY) -> float:
-    """Return how far the centres of two cars are apart at least, metres, so that a gap is left between the bodies."""
+    """Return the least distance of the centres of two cars, metres, that leaves `gap` between their bodies."""
     return 2.0 * car.body.reach + gap * (car.w / 0.3)
 
 

@@ -1,4 +1,4 @@
-"""The chunks of a record's file, whole or cut off; damage and a missing end are told apart.
+"""Reads the chunks of a record's file, whole or cut off; tells damage from a missing end.
 
 A file that ends with a footer and the closing magic has been finished: then its summary must match its checksum, the
 index in it must name the very chunks that are there, and every length must lead from one MCAP record to the next.
@@ -27,7 +27,7 @@ _SIZE = struct.Struct("<Q")
 _CHECKED_BEFORE: Final = len(MCAP0_MAGIC) + 4
 """Bytes at the end of a finished file that its checksum does not cover: the checksum itself and the magic."""
 _BESIDE: Final = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)
-"""What may stand beside chunks in the data section; other programs add the last two."""
+"""MCAP records that may stand beside chunks in the data section; other programs add the last two."""
 
 
 class Entry(NamedTuple):
@@ -57,7 +57,7 @@ class _Footer:
 
 
 class _DamageError(Exception):
-    """What is damaged in the content of a chunk."""
+    """The content of a chunk is damaged; the message says how."""
 
 
 def is_finished(data: bytes) -> bool:
@@ -107,7 +107,7 @@ def _damaged(file: str | None, place: str | None, why: str) -> RecordError:
 
 
 def _footer(data: bytes, file: str | None) -> _Footer | None:
-    """Return what the end of a finished file says, None of one that was cut off."""
+    """Return the footer of a finished file, None for a file that was cut off."""
     if not is_finished(data):
         return None
     at = len(data) - len(MCAP0_MAGIC) - _FOOTER.size
@@ -152,7 +152,7 @@ def _walk(data: bytes, footer: _Footer | None, file: str | None) -> Iterator[tup
 
 
 def _is_sound(data: bytes, kind: int, first: int, length: int) -> bool:
-    """Tell whether what begins at `first` may stand in the data section, and its lengths agree."""
+    """Tell whether an MCAP record at `first` may stand in the data section, and its lengths agree."""
     if kind == Opcode.HEADER:
         return first == len(MCAP0_MAGIC)
     if kind == Opcode.CHUNK:
@@ -163,7 +163,7 @@ def _is_sound(data: bytes, kind: int, first: int, length: int) -> bool:
 
 
 def _fits(data: bytes, first: int, length: int) -> bool:
-    """Tell whether the lengths inside a chunk, as far as they are there, agree with its own, which is `length`."""
+    """Tell whether the lengths inside a chunk, as far as the data go, agree with its own, `length`."""
     at = first + _HEAD.size
     if at + _CHUNK.size > len(data):
         return True

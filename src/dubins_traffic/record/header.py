@@ -48,7 +48,7 @@ def as_message(document: Mapping[str, Any]) -> bytes:
 def document(
     instance: Instance, controller: str | None, versions: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """Return what `encode` encodes."""
+    """Return the document that `encode` encodes."""
     bounds = instance.problem.car.bounds
     if versions is None:
         versions = {PACKAGE: version(PACKAGE), "mcap": version("mcap")}

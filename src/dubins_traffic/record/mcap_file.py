@@ -55,7 +55,7 @@ class McapFile:
         self._write(MCAP0_MAGIC, _packed([Header(profile="", library=library)]))
 
     def fork(self, stream: BinaryIO) -> McapFile:
-        """Return the same file as far as it goes, whose copy in `stream` goes on by itself."""
+        """Return an independent file in `stream`, which holds a copy of this file up to here."""
         twin = copy(self)
         twin._stream, twin._chunks, twin._counts = stream, list(self._chunks), dict(self._counts)
         return twin

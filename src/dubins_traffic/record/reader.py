@@ -1,4 +1,4 @@
-"""Reads records, whole or cut off at any byte, and feeds them to sinks again."""
+"""Reads records, whole or cut off at any byte, and hands them to sinks again."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dubins_traffic.record.header import Header
 from dubins_traffic.record.sink import End, Ending, Sink
 
 LARGEST: Final = 2**31
-"""Bytes that a record may have; what goes on after them never ends."""
+"""Most bytes of a record; a longer stream is taken to be endless."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def from_bytes(data: bytes, file: str | None = None) -> Record:
 
 
 def replay(record: Record, sinks: Sequence[Sink]) -> None:
-    """Feed a record to `sinks` in the blocks in which the trial did; without an ending, `end` is not called."""
+    """Hand a record to `sinks` in the blocks of the trial; `end` is not called if the record has no ending."""
     for sink in sinks:
         sink.begin(record.instance)
     for block in record.blocks:

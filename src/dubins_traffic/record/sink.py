@@ -1,4 +1,4 @@
-"""What a trial pushes its frames into, and how a trial ends: what a record and its writer must know.
+"""Sinks, which receive the frames of a trial, and the ends of trials.
 
 `dubins_traffic.protocols` offers these names beside the other seams; take them from there in the rooms above it.
 """
@@ -59,11 +59,11 @@ FAULTS = frozenset(
         End.BOX_FAILED,
     }
 )
-"""Ends that are somebody's fault and not a trial's own."""
+"""Ends that are a fault of a driver, transport or world."""
 
 
 SHIELD: Final = "shield"
-"""Kind of the events that say when a shield has stepped in."""
+"""Kind of the events that note that a shield has stepped in."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +79,13 @@ class Sink(Protocol):
     """Receives a trial, in order, in blocks of at most one simulated second."""
 
     def begin(self, instance: Instance) -> None:
-        """A trial begins."""
+        """Begin a trial."""
         ...
 
     def frames(self, frames: Frames) -> None:
-        """The next block of frames, with their contacts and events."""
+        """Take the next block of frames, with their contacts and events."""
         ...
 
     def end(self, ending: Ending) -> None:
-        """The trial is over; nothing follows."""
+        """Take the ending of the trial; nothing follows."""
         ...

@@ -1,4 +1,4 @@
-"""The sidecar of a record: what was measured on a wall clock, kept out of the record so that its bytes repeat."""
+"""The sidecar of a record: wall-clock figures, kept apart so that equal trials make equal records."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Wall:
 
 
 def summary(values: Sequence[float]) -> dict[str, float]:
-    """Return count, mean, median, p99 and max of `values`; nothing of none."""
+    """Return count, mean, median, p99 and max of `values`, an empty mapping if there are none."""
     if not values:
         return {}
     array = np.array(values)
@@ -132,7 +132,7 @@ _TYPES: Final[Mapping[str, tuple[Callable[[object], bool], str]]] = {
     "machine": (lambda value: isinstance(value, dict), "an object"),
     "transport": (lambda value: isinstance(value, dict), "an object"),
 }
-"""What the fields of a sidecar must be."""
+"""The check of each field of a sidecar, and what it expects."""
 
 
 def remove_record(record: Path) -> None:

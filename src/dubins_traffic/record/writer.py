@@ -49,7 +49,7 @@ class RecordEncoder:
         self._chunk({schema.HEADER: [Message(0, 0, self._head)]})
 
     def fork(self, stream: BinaryIO) -> RecordEncoder:
-        """Return an encoder of the same record, whose copy in `stream` goes on by itself."""
+        """Return an independent encoder of the same record; `stream` holds a copy of it up to here."""
         twin = copy(self)
         twin._stream, twin._mcap = stream, self._mcap.fork(stream)
         return twin
@@ -113,7 +113,7 @@ class RecordWriter:
             self._encoder.begin(instance)
 
     def fork(self, path: Path | str, *, overwrite: bool = False) -> RecordWriter:
-        """Return a writer of the same record at another `path`, as far as it goes; it goes on by itself.
+        """Return an independent writer at `path` of a copy of this record up to here.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class RecordWriter:
 
     @contextmanager
     def _written(self) -> Generator[None, None, None]:
-        """Turn what the operating system refuses into an error that names the file."""
+        """Turn an error of the operating system into an InputError that names the file."""
         try:
             yield
         except FileExistsError as error:

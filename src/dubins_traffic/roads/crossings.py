@@ -27,18 +27,23 @@ def first_crossing(segments: Sequence[Segment], corners: Sequence[Corners]) -> t
     bent = pieces(segments, corners)
     chains = [own or chain(row[:2], (), row[2:]) for own, row in zip(bent, segments, strict=True)]
     owner = [s for s, own in enumerate(chains) for _ in own]
-    place = [k for own in chains for k in range(len(own))]
     rows = [piece for own in chains for piece in own]
     shared = [frozenset(((row[0], row[1]), (row[2], row[3]))) for row in segments]
     found: list[tuple[int, int]] = []
     for i, j in _candidates(rows):
         s, other = owner[i], owner[j]
-        if s == other and abs(place[i] - place[j]) == 1:
+        if s == other and _follow(rows[i : j + 1]):
             continue
         common = shared[s] & shared[other] if s != other else frozenset[Point]()
         if _meet(rows[i], rows[j], common):
             found.append((min(s, other), max(s, other)))
     return min(found, key=lambda pair: (pair[1], pair[0]), default=None)
+
+
+def _follow(row: Sequence[Piece]) -> bool:
+    """Whether the last of some pieces of a chain begins where the first one ends, but for what rounding may leave."""
+    between = sum(piece.length for piece in row[1:-1])
+    return between <= 4.0 * NEAR * (row[0].length + row[-1].length)
 
 
 def _candidates(rows: Sequence[Piece]) -> Iterator[tuple[int, int]]:

@@ -11,7 +11,7 @@ from math import sqrt
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import record
-from dubins_traffic.roads.bends import bent_coordinates, bent_direction, bent_distance2
+from dubins_traffic.roads.bends import bent_coordinates, bent_direction, bent_distance2, nearest_piece
 from dubins_traffic.roads.road_raster import CELL
 from dubins_traffic.roads.table import RoadTable
 
@@ -265,6 +265,30 @@ def lane_direction_at(t: RoadTable, net: int, lane: int, x: float, y: float) -> 
     if lane & 1:
         return -tx, -ty
     return tx, ty
+
+
+@jit_inline
+def bends_before(t: RoadTable, net: int, lane: int, x: float, y: float) -> bool:
+    """Tell whether the road of a lane bends between a point and the lane's end."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    if own.piece < 0:
+        return False
+    k, _ = nearest_piece(t.piece, own, x, y)
+    return k != (own.piece if lane & 1 else own.last)
+
+
+@jit
+def tightness(t: RoadTable, net: int, lane: int, width: float) -> float:
+    """Return a `width` (m) in units of the least radius of a lane's road, 0 if that is straight."""
+    row: int = t.seg_off[net] + (lane >> 1)
+    own = t.segment[row]
+    most = 0.0
+    if own.piece >= 0:
+        for k in range(own.piece, own.last + 1):
+            if t.piece[k].side != 0.0:
+                most = max(most, width / t.piece[k].radius)
+    return most
 
 
 @jit_inline

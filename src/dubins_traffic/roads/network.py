@@ -94,12 +94,17 @@ class RoadNetwork(Embedding, Pictured):
 
     @property
     def summary(self) -> str:
-        """The network in a few words: ``17 segments, 12 intersections on a 3 x 4 lattice``."""
+        """The network in a few words: ``17 segments, 12 intersections on a 3 x 4 lattice``; metres where off it."""
         rows, columns = self.shape
         segments, points = len(self.segments), len(self.intersections)
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
         bent = sum(1 for own in self.corners if own)
-        return f"{found} on a {rows} x {columns} lattice" + (f", {bent} bent" if bent else "")
+        if self.on_lattice:
+            place = f"on a {rows} x {columns} lattice"
+        else:
+            width, height = np.ptp(self.points, axis=0)
+            place = f"on {width:.0f} x {height:.0f} m"
+        return f"{found} {place}" + (f", {bent} bent" if bent else "")
 
     def __deepcopy__(self, memo: object) -> RoadNetwork:
         """Return this very network, which never changes."""

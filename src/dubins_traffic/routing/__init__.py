@@ -1,1 +1,1 @@
-"""Finding one's way: the graph of lanes, rounds through the goals, and how long they take on an empty road."""
+"""Routing: the graph of lanes, rounds through the goals, and their times in free flow."""

@@ -1,4 +1,4 @@
-"""Free flow: the yardstick for rounds and distances.
+"""Free flow: times and distances of rounds on empty roads, for comparison.
 
 A point that meets nobody drives, at the car's top speed, along lanes: from the ego's start, on the lane that its
 heading tells, to the nearest goal on the round, and then the round for ever. The round is the shortest closed route

@@ -1,10 +1,11 @@
-"""The graph of lanes, compiled: where a lane lies, which one a car is on, how far it is to others."""
+"""The graph of lanes: where a lane lies, which lane a car is on, distances between lanes (compiled)."""
 
 from __future__ import annotations
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
+from dubins_traffic.roads.bends import bent_foot, bent_place
 from dubins_traffic.roads.lookup import lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 
@@ -13,12 +14,40 @@ FAR = 1 << 40
 
 @jit
 def frame(roads: RoadTable, net: int, lane: int) -> tuple[float, float, float, float, float]:
-    """Return (x, y, tx, ty, length): start, unit direction and length of a lane on the road's centre line."""
+    """Return (x, y, tx, ty, length): start, unit direction there and length of a lane on the road's centre line."""
     row: int = roads.seg_off[net] + (lane >> 1)
     own = roads.segment[row]
+    if own.piece >= 0 and lane & 1:
+        return own.end_x, own.end_y, -own.end_tx, -own.end_ty, own.length
     if lane & 1:
         return own.x + own.length * own.tx, own.y + own.length * own.ty, -own.tx, -own.ty, own.length
     return own.x, own.y, own.tx, own.ty, own.length
+
+
+@jit
+def foot(
+    roads: RoadTable, net: int, lane: int, x: float, y: float
+) -> tuple[float, float, float, float, float]:
+    """Return (s, l, tx, ty, length): metres along a lane and left of it, its direction there, and its length."""
+    row: int = roads.seg_off[net] + (lane >> 1)
+    own = roads.segment[row]
+    if own.piece >= 0:
+        along, left, tx, ty = bent_foot(roads.piece, own, lane & 1 != 0, x, y)
+        return along, left, tx, ty, own.length
+    ax, ay, tx, ty, length = frame(roads, net, lane)
+    rx, ry = x - ax, y - ay
+    return rx * tx + ry * ty, tx * ry - ty * rx, tx, ty, length
+
+
+@jit
+def place_on_lane(roads: RoadTable, net: int, lane: int, along: float) -> tuple[float, float, float, float]:
+    """Return (x, y, tx, ty): the point of a road's centre line `along` (m) from a lane's start, and the direction."""
+    row: int = roads.seg_off[net] + (lane >> 1)
+    own = roads.segment[row]
+    if own.piece >= 0:
+        return bent_place(roads.piece, own, lane & 1 != 0, along)
+    x0, y0, tx, ty, _ = frame(roads, net, lane)
+    return x0 + along * tx, y0 + along * ty, tx, ty
 
 
 @jit

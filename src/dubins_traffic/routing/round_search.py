@@ -1,4 +1,4 @@
-"""The shortest round through some goals, compiled: over all cyclic orders, and all lanes by which each is reached."""
+"""Finds the shortest round through some goals, over all cyclic orders and all lanes into each goal (compiled)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LaneTables(Tables):
 
 
 class Search(Tables):
-    """Room for the search through n goals on L lanes.
+    """Scratch of the search for rounds through n goals on L lanes.
 
     `far` (n, 4, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
     from the lanes into one goal to those into another; `total`, `other` (4, 4) and `to_go` (n + 1, 4): what is reckoned
@@ -55,7 +55,7 @@ class Search(Tables):
 
 
 def room(goals: int, lanes: int) -> Search:
-    """Return room for a search."""
+    """Return the scratch of a search."""
     return Search(
         far=np.zeros((goals, ARMS, lanes)),
         leg=np.full((goals, goals, ARMS, ARMS), np.inf),
@@ -203,7 +203,7 @@ def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> Any:
 
 @jit
 def _next_order(order: Ints) -> bool:
-    """Go on to the next order that begins with the same goal; False after the last."""
+    """Write the next order that begins with the same goal; return False after the last."""
     k = order.shape[0] - 2
     while k >= 1 and order[k] > order[k + 1]:
         k -= 1
@@ -224,7 +224,7 @@ def _next_order(order: Ints) -> bool:
 
 @jit
 def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
-    """Drive the best round of the best order, from its first goal to itself; return how many lanes it has."""
+    """Write the lanes of the best round of the best order, from its first goal to itself; return their number."""
     count = goals.shape[0]
     arms = _chain(goals, g, own, own.best)
     start = 0

@@ -1,4 +1,4 @@
-"""The round that a car drives under the rules: its goals in order, and how far it is to each from every lane."""
+"""The round that a car drives under the rules: its goals in order, and the distance to each from every lane."""
 
 from __future__ import annotations
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
 
 EXACT = 7
-"""Up to so many goals the shortest of all rounds is found; more are taken each time nearest first."""
+"""Up to this many goals the shortest round is found; of more goals the nearest is taken next."""
 
 MOST_KEPT, FEWEST_KEPT = 1 << 19, 8
-"""So many numbers, about, are kept of rounds that have been found on a network, and so many rounds at least."""
+"""About how many numbers are cached of the rounds found on a network, and the least number of rounds."""
 
 TurnCost = Callable[[int, int], float]
 
@@ -79,7 +79,7 @@ class LaneGraph:
         return LaneTables(*after, *before, _offsets(self.into), into)
 
     def metres_to(self, target: int) -> Floats:
-        """Return what `distances` does, without penalties, as an array."""
+        """Return the result of `distances` without penalties, as an array."""
         far = np.empty(self.count)
         work = np.empty((2, self.count), dtype=np.int64)
         metres_to(target, self.tables, far, work[0], work[1])
@@ -188,7 +188,7 @@ def find_rounds(graph: LaneGraph, many: Iterable[Sequence[int]]) -> None:
 
 
 def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
-    """Return the round of free flow through `goals`: of a single one to the nearest other intersection and back.
+    """Return the round through `goals` in free flow; with a single goal, to the nearest other intersection and back.
 
     Only another disc makes the next visit of a goal one (docs/rules.md#visit), and turning round in a disc is free.
     Through several goals it is what `find_round` finds.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.tables import TrialRules
@@ -24,29 +24,30 @@ class RightLane(NamedTuple):
 
 @jit_inline
 def lane_of(t: RoadTable, own: TrialRules, b: int, lane: int) -> RightLane:
-    """Return a lane of trial b, whose rules are `own`."""
+    """Return the right lane of `lane` in trial b, whose rules are `own`."""
     return RightLane(b, lane, t.segment[int(t.seg_off[own.net]) + (lane >> 1)].length, own.lane_width)
 
 
 @jit
 def narrows(low: float, high: float, lane_width: float, needed: float) -> bool:
-    """Tell whether a thing over the lateral interval [low, high] leaves less than `needed` of the right lane.
+    """Tell whether a body over the lateral interval [low, high] leaves less than `needed` (m) of the right lane free.
 
-    The right lane lies over [-lane_width, 0]; what does not reach into it leaves all of it. Else the larger of
-    the gaps on the two sides of the thing counts. Metres.
+    The right lane lies over [-lane_width, 0]; a body outside it leaves all of it free. Otherwise the larger of the gaps
+    on the two sides of the body counts.
     """
     if high <= -lane_width or low >= 0.0:
         return False
     return max(low + lane_width, -high) < needed
 
 
-@jit
+@jit_rare
 def obstacle_narrows(
     obstacles: ObstacleLanes, place: RightLane, near: float, far: float, needed: float
 ) -> bool:
-    """Tell whether an obstacle leaves less than `needed` metres of a lane where its progress is in [near, far], metres.
+    """Tell whether an obstacle leaves less than `needed` metres of a right lane free between two places along it.
 
-    An obstacle's lateral interval is the hull of its parts within that reach of the lane; its edges are clipped.
+    The stretch is from `near` (m) to `far` (m) along the lane. The lateral interval of an obstacle is the hull of its
+    parts there; edges are clipped to the stretch.
     """
     base: int = obstacles.base[place.trial]
     if base < 0:
@@ -79,9 +80,9 @@ def obstacle_narrows(
 def _clipped(
     s0: float, l0: float, s1: float, l1: float, rounding: float, begin: float, end: float
 ) -> tuple[float, float]:
-    """Return the lateral interval of a part within [begin, end]; an empty one if it lies beyond.
+    """Return the lateral interval of an obstacle's part within [begin, end] along the lane; empty if it lies beyond.
 
-    A part is the line from (s0, l0) to (s1, l1) grown by `rounding`; with a rounding it is not clipped.
+    The part is the line from (s0, l0) to (s1, l1) grown by `rounding`; a part with a rounding is not clipped.
     """
     if s0 > s1:
         s0, l0, s1, l1 = s1, l1, s0, l0

@@ -1,4 +1,4 @@
-"""What the kernels of the referee read and write: the terms of each trial, running clocks, and breaches found."""
+"""The referee's tables: parameters of each trial, memory of cars and goals, and the breaches found."""
 
 from __future__ import annotations
 
@@ -59,12 +59,15 @@ NEVER_DUE: Final = 1 << 62
 
 @record
 class RefereeParameters:
-    """The terms by which one trial is judged; metres, eased by GRAIN for the car that would be in breach, and ticks."""
+    """The parameters by which one trial is judged: metres and ticks.
+
+    Limits in metres are eased by GRAIN in favour of the car that would be in breach.
+    """
 
     exit2: float
-    """Squared distance of a centre from a vertex up to which it is in the way of those who leave, square metres."""
+    """Squared distance of a centre from a vertex up to which it is in the way of cars that leave, square metres."""
     lone: float
-    """Distance of others from a vertex from which on none of them meets the disc or is in anybody's way out of it."""
+    """Distance from a vertex beyond which a car neither meets the disc nor is in the way of a car that leaves it."""
     way: float
     """E5's way ahead."""
     exit_gap: float
@@ -90,19 +93,22 @@ class RefereeParameters:
 
 @record
 class JudgedCar:
-    """What the referee remembers of one car; of runs the first tick, -1 where there is none."""
+    """What the referee remembers of one car. A run is consecutive frames in which something holds.
+
+    Of each run the first tick is remembered, -1 if there is none. Times are in ticks; nothing is in metres.
+    """
 
     number: int
-    """Which car of its trial it is."""
+    """The car's index in its trial."""
     bits: int = 0
     lane: int = -1
     crosses: int = -1
     at: int = -1
     """Flags, lane state, disc that the body meets and disc that holds the centre, of the frame before."""
     due: int = 0
-    """Tick in which the car has to be looked at though its labels stay as they are and nobody comes near."""
+    """Tick in which the car has to be judged again even if its labels stay the same and no car comes near."""
     off_road: int = NEVER
-    """Run of being off the road (ego); `NEVER` before it has been on one."""
+    """Run of being off the road (ego); `NEVER` before the ego has been on one."""
     left_since: int = -1
     free_since: int = -1
     """Run of being left and not hemmed in."""
@@ -113,7 +119,7 @@ class JudgedCar:
     exit_since: int = -1
     """Run of being in a disc with a free exit."""
     exit_paused: int = -1
-    """How many ticks of that run do not count."""
+    """Number of ticks of that run that do not count."""
     exit_counts: int = -1
     """That run's first tick while its ticks count, else -1."""
     rest_since: int = -1
@@ -123,23 +129,23 @@ class JudgedCar:
     in_since: int = -1
     """Run of being in the disc that its body meets."""
     came_by: int = -1
-    """The lane by which it came into the disc that its body meets, -1 if it started there."""
+    """The lane by which the car came into the disc that its body meets, -1 if it started there."""
     ticket: int = -1
-    """Tick of its ticket, as of the frame before."""
+    """Tick of the car's ticket, as of the frame before."""
     approach_since: int = -1
     """Run of approaching a crossing, as of the frame before."""
 
 
 @record
 class EntryMargins:
-    """The least margins of rule 3 over the ego's entries, negative once broken; infinite without an entry."""
+    """The least margins of rule 3 over the ego's entries: negative once it is broken, infinite without an entry."""
 
     stop: float = np.inf
-    """Ticks since it had stopped, or that it still had to approach for a stop."""
+    """Ticks for which it had stopped, or, negative, that it still lacked for a stop."""
     order: float = np.inf
     """Ticks from its ticket to the next one."""
     clear: float = np.inf
-    """Metres between the disc and the nearest body of others."""
+    """Metres between the disc and the nearest body of another car."""
 
 
 @record
@@ -167,24 +173,24 @@ class FoundBreach:
 
 
 class BreachLog(Tables):
-    """What the referee remembers, and what he has found.
+    """The referee's memory, and the breaches it has found.
 
     Attributes
     ----------
     car : (B, N) JudgedCar
-        What is remembered of each car.
+        The memory of each car.
     goal : (G,) JudgedGoal
         The goals of one trial after the other.
     entry : (B,) EntryMargins
-        By how much the ego has kept rule 3.
+        The least margins by which the ego has kept rule 3.
     goal_due : (B,) int64
-        Tick in which the goals have to be looked at though no car comes or goes.
+        Tick in which the goals have to be judged again even if no car comes or goes.
     look : (N,) int64
-        Scratch: the cars to be looked at.
+        Scratch: the cars to be judged in this frame.
     row : (K,) FoundBreach
         Breaches found.
     filled : (1,) int64
-        How many rows are filled.
+        Number of rows that are filled.
     """
 
     car: Grid[JudgedCar]
@@ -197,7 +203,7 @@ class BreachLog(Tables):
 
     @staticmethod
     def empty(trials: int, cars: int, goals: Ints, frames: int = 1) -> BreachLog:
-        """Return the log of `trials` x `cars` cars before their first frame, with room for `frames` frames.
+        """Return the log of `trials` x `cars` cars before the first frame, with rows for breaches in `frames` frames.
 
         `goals` (G,) are the vertices of the goals, of one trial after the other (`rules.referee.terms_of`).
         """
@@ -222,12 +228,12 @@ class BreachLog(Tables):
         return MOST * trials * cars + len(self.goal)
 
     def found(self) -> list[FoundBreach]:
-        """Return the breaches found; they stay as they are until the next frame is judged."""
+        """Return the breaches found; they are overwritten when the next frame is judged."""
         return [self.row[k] for k in range(int(self.filled[0]))]
 
 
 class RefereeTables(Tables):
-    """All that the frames of a batch are judged by, and what is found (`rules.referee_kernel.judge_frame`)."""
+    """All tables by which the frames of a batch are judged (`rules.referee_kernel.judge_frame`)."""
 
     state: State
     roads: RoadTable
@@ -247,7 +253,7 @@ def pack_terms(
     rates: Sequence[float],
     cars: CarTable,
 ) -> Rows[RefereeParameters]:
-    """Return the terms by which each trial is judged; where its goals are is left to fill in.
+    """Return the parameters by which each trial is judged; `goals_begin` and `goals_end` are left to fill in.
 
     Parameters
     ----------

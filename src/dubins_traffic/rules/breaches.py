@@ -1,4 +1,4 @@
-"""The referee's looks at one car, compiled: clocks of runs, breaches by rule, and who is in the way."""
+"""Judges one car in one frame (compiled): runs, and the breaches of rules 1 to 3, E3 and E6."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.rules.breach_log import (
     NEVER_DUE,
@@ -18,12 +18,12 @@ from dubins_traffic.rules.breach_log import (
 )
 from dubins_traffic.rules.propositions import FLAG
 
-GOES = FLAG.FIRST | FLAG.CLEAR
+FIRST_AND_CLEAR = FLAG.FIRST | FLAG.CLEAR
 
 
-@jit
+@jit_rare
 def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex: int, lane: int) -> None:
-    """Write down that a car has broken a rule, a number in `RULES`, in frame `tick`, except in which trial."""
+    """Append a breach of `rule`, a number in `RULES`, in frame `tick` to the log; the trial is left to fill in."""
     k: int = log.filled[0]
     found = log.row[k]
     found.rule = rule
@@ -37,7 +37,10 @@ def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex
 
 @jit_inline
 def run(holds: bool, tick: int, since: int) -> int:
-    """Return the first tick of a run that had begun in `since` (-1: there was none): -1 if it does not go on."""
+    """Return the first tick of a run after frame `tick`, in which its condition `holds` (bool) or not; -1 for no run.
+
+    Before that frame the run had begun in `since`.
+    """
     if not holds:
         return -1
     return since if since >= 0 else tick
@@ -45,23 +48,23 @@ def run(holds: bool, tick: int, since: int) -> int:
 
 @jit_inline
 def lasted(tick: int, since: int) -> int:
-    """Return for how many ticks a run has gone on that began in `since`, -1 if there is none."""
+    """Return the length in ticks of a run that began in `since`, -1 if there is none."""
     return tick - since if since >= 0 else -1
 
 
 @jit_inline
 def when_due(tick: int, since: int, ago: int) -> int:
-    """Return the tick in which a run will have gone on for `ago` ticks, `NEVER_DUE` if none will after this one."""
+    """Return the later tick in which a run that began in `since` will be `ago` ticks long, `NEVER_DUE` if none."""
     return since + ago if since >= 0 and since + ago > tick else NEVER_DUE
 
 
-@jit
+@jit_rare
 def judge_lane(
     car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
 ) -> None:
-    """Rule 2: left only while overtaking, and for a while unless it is hemmed in.
+    """Judge rule 2: a car is left only while overtaking, and for at most `left_time` unless it is hemmed in.
 
-    `bits` and `lane` are the car's in this frame.
+    `bits` (FLAG) and `lane` are those of the car in this frame.
     """
     car.left_since = run(bits & FLAG.LEFT != 0, tick, car.left_since)
     car.free_since = run(bits & (FLAG.LEFT | FLAG.HEMMED) == FLAG.LEFT, tick, car.free_since)
@@ -74,9 +77,9 @@ def judge_lane(
 
 @jit
 def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
-    """Rule 3, of car n of trial b that enters crossing v in this frame: judged on the frame before.
+    """Judge rule 3 for car n of trial b, which enters crossing v in this frame, by the frame before.
 
-    In that it had `stopped` there or not. The first `count` cars of `spacing.near` are all that may have been there.
+    The first `count` cars of `spacing.near` are all that may have been in the crossing then.
     """
     log, near = tables.log, tables.spacing.near
     car = log.car[b, n]
@@ -93,7 +96,7 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
 
 @jit_inline
 def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -> None:
-    """Rule 1: the ego stays on the road from its first frame there; `on` tells whether it is there."""
+    """Judge rule 1: after its first frame on the road the ego stays there; `on` (bool) tells whether it is."""
     if on:
         car.off_road = -1
     elif car.off_road == -1:
@@ -103,13 +106,15 @@ def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -
 
 @jit
 def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> None:
-    """E3, of car n of trial b that has stopped at v.
+    """Judge E3 for car n of trial b, which has stopped at v.
 
-    Who is first at a clear crossing enters in time, and takes few tickets.
+    A car that is first at a clear crossing enters it in time, and takes few tickets.
     """
     log, terms, kept = tables.log, tables.terms[b], tables.memory.car[b, n]
     car, lane = log.car[b, n], tables.labels.lane[b, n]
-    car.first_since = run(tables.labels.bits[b, n] & GOES == GOES, tick, car.first_since)
+    car.first_since = run(
+        tables.labels.bits[b, n] & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, car.first_since
+    )
     if lasted(tick, car.first_since) == terms.enter_ticks:
         add(log, car, RULE.ENTER, tick, car.first_since, v, lane)
     if kept.forfeits == terms.most_tickets + 1 and kept.ticket == tick:
@@ -118,9 +123,9 @@ def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> Non
 
 @jit_inline
 def at_goal(goal: int, count: int, at: Ints, cars: Rows[JudgedCar]) -> int:
-    """E6: return the e-agent that has been at a goal longest, -1 if none is there.
+    """Return the e-agent that has been at a goal longest (E6), -1 if none is there.
 
-    `at` (N,) are the discs that hold the centres; only the first `count` cars exist.
+    `at` (N,) are the discs that hold the centres of `cars` (N,); only the first `count` cars exist.
     """
     who = -1
     for n in range(EGO + 1, count):

@@ -1,4 +1,4 @@
-"""What e-agents owe (docs/rules.md#E3 to docs/rules.md#E6), judged in one frame (compiled)."""
+"""Judges what e-agents owe, E3 to E6 (docs/rules.md#E3), in one frame (compiled)."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 
 from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
 from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, RefereeTables
-from dubins_traffic.rules.breaches import GOES, add, at_goal, judge_queue, lasted, run, when_due
+from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, add, at_goal, judge_queue, lasted, run, when_due
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
 
-WAITS = FLAG.STANDS | FLAG.LINGERS | FLAG.EXCUSED | FLAG.STOPPED
-"""Flags of a car that is no reason to expect the one behind it to go on."""
+EXCUSES_FOLLOWER = FLAG.STANDS | FLAG.LINGERS | FLAG.EXCUSED | FLAG.STOPPED
+"""Flags of a car behind which another need not go on (E5)."""
 
 
 @jit_inline
 def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
-    """E3 to E5, of e-agent n of trial b.
+    """Judge E3 to E5 for e-agent n of trial b.
 
-    Returns the next tick in which more may be due, if its labels stay as they are.
+    Returns the next tick in which it has to be judged again if its labels stay the same.
     """
     log, terms, labels = tables.log, tables.terms[b], tables.labels
     car, lane, v = log.car[b, n], labels.lane[b, n], labels.crosses[b, n]
@@ -53,9 +53,10 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
 
 @jit
 def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int:
-    """E4, of e-agent n of trial b whose body meets the disc of v; return when to ask again, if its labels stay.
+    """Judge E4 for e-agent n of trial b, whose body meets the disc of v.
 
-    The ticks do not count in which the ego is there that came after it, or, for a while, with it.
+    Ticks do not count while the ego, too, is in the disc and came there later, or, up to `shared_time`, in the same
+    tick. Returns the tick in which to judge again if the car's labels stay the same.
     """
     log, terms = tables.log, tables.terms[b]
     car, ego = log.car[b, n], log.car[b, EGO]
@@ -81,18 +82,22 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
     return min(again, when_due(tick, car.exit_since, ago))
 
 
-@jit
+@jit_rare
 def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
-    """E5: tell whether car n of trial b is in a lane with a free way ahead."""
+    """Tell whether car n of trial b is in a lane with a free way ahead (E5)."""
     state, roads, labels, row = tables.state, tables.roads, tables.labels, tables.memory.car[b]
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
-    if lane < 0 or bits & FLAG.BLOCKED != 0 or (bits & FLAG.STOPPED != 0 and bits & GOES != GOES):
+    if (
+        lane < 0
+        or bits & FLAG.BLOCKED != 0
+        or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR)
+    ):
         return False
     here = row[n].progress
     for k in range(state.count[b]):
-        waits = labels.lane[b, k] == lane and np.int64(labels.bits[b, k]) & WAITS != 0
+        waits = labels.lane[b, k] == lane and np.int64(labels.bits[b, k]) & EXCUSES_FOLLOWER != 0
         if waits and 0.0 < row[k].progress - here <= terms.way:
             return False
     place = lane_of(roads, own, b, lane)
@@ -112,7 +117,7 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
 
 @jit
 def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
-    """Write which cars of frame `tick`, which has been judged, are in a lane with a free way ahead, (B, N) bool."""
+    """Write into `found` (B, N) which cars have a free way ahead (E5) in frame `tick`, which has been judged."""
     for b in range(tables.state.count.shape[0]):
         for n in range(tables.state.count[b]):
             found[b, n] = has_way(b, n, tick, tables)
@@ -120,7 +125,10 @@ def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
 
 @jit
 def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
-    """E6: no goal is taken for too long; find when one will be, or has to be looked at, if no car comes or goes."""
+    """Judge E6 in trial b: no goal is taken for too long.
+
+    Sets `BreachLog.goal_due`, the tick in which to judge again if no car comes or goes.
+    """
     log, terms = tables.log, tables.terms[b]
     due = NEVER_DUE
     for g in range(terms.goals_begin, terms.goals_end):
@@ -144,9 +152,9 @@ def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
 
 @jit
 def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, int]:
-    """E6: tell whether no exit of the goal v is free, for any e-agent in it, and the ego is near one.
+    """Tell whether the ego holds up the goal v (E6): no e-agent in it has a free exit, and the ego is near an exit.
 
-    Also returns when to ask again, if no car comes or goes.
+    Also returns the tick in which to ask again if no car comes or goes.
     """
     state, roads, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     row = int(roads.vert_off[own.net]) + v

@@ -1,4 +1,4 @@
-"""By how much the ego keeps rule 3 when it enters a crossing, or breaks it, compiled."""
+"""The margins by which the ego keeps or breaks rule 3 when it enters a crossing (compiled)."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ from math import sqrt
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import INFINITE
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.breach_log import EntryMargins, RefereeTables
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body
 
 LEAST = 1e-6
-"""Metres that a margin of the disc's clearance is away from 0 at least: its places are those of the frame after the one
-that is judged, and may be on the other side."""
+"""Least absolute value of the margin of clearance, metres.
+
+That margin is measured one frame after the one that is judged, when its sign may have changed: the sign is taken from
+the judgement, and the value is then this.
+"""
 
 
-@jit
+@jit_rare
 def measure_entry(b: int, tick: int, v: int, stopped: bool, count: int, tables: RefereeTables) -> None:
-    """Keep the least margins of rule 3 of the ego of trial b, which enters crossing v in this frame.
+    """Lower the ego's least margins of rule 3 to those of its entry into crossing v of trial b in this frame.
 
     `stopped` (whether), `count` (number) and `tables` (all rows of the referee) are those of
     `rules.breaches.judge_entry`; the signs follow its judgement.
@@ -39,7 +42,7 @@ def measure_entry(b: int, tick: int, v: int, stopped: bool, count: int, tables: 
 
 @jit
 def _lead(b: int, v: int, tables: RefereeTables) -> float:
-    """Return how many ticks after the ego's ticket the next one was taken at v, before it if negative."""
+    """Return how many ticks after the ego's ticket the next ticket at v was taken; negative: before it."""
     log, net = tables.log, tables.rules[b].net
     own = log.car[b, EGO].ticket
     lead = INFINITE

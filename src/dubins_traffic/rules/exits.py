@@ -23,25 +23,28 @@ def _is_bend(v: int, t: RoadTable, own: TrialRules) -> bool:
 
 @jit_inline
 def way_back(v: int, came: int, t: RoadTable, own: TrialRules) -> int:
-    """Return the segment that is no exit of v for a car that came by the lane `came` (-1: none): at bends only."""
+    """Return the segment by which a car came to v if v is a bend, where that segment is no exit for it; else -1.
+
+    The car came by the lane `came` (-1: none).
+    """
     return came // 2 if came >= 0 and _is_bend(v, t, own) else -1
 
 
 @jit_inline
 def _passes_by(k: int, came: int, back: int) -> bool:
-    """Tell whether car k, in a bend, is an e-agent that came there by another segment than `back`, by lane `came`.
+    """Tell whether car k, in a bend, is an e-agent that came there by lane `came`, not by the segment `back`.
 
-    So cars that meet in a bend, each before the other's exit, do not excuse each other.
+    Two cars that meet in a bend, each in front of the other's exit, do not excuse each other so.
     """
     return k != EGO and came >= 0 and came // 2 != back
 
 
 @jit_inline
 def stands_in_exit(along: float, lateral: float, away2: float, far2: float, width: float) -> bool:
-    """Tell whether a centre at (along, lateral) of a lane out of a disc, of the nearest segment, is in it and near by.
+    """Tell whether a centre at (along, lateral) is in a lane out of a disc and near the disc.
 
-    It is outside the disc, and `away2` is its squared distance from the intersection: near by is up to `far2`. The lane
-    reaches `width` metres right of the centre line.
+    The centre is outside the disc, and the lane is on the segment nearest to it. `away2` is its squared distance from
+    the intersection, near is up to `far2`. The lane reaches `width` metres right of the centre line.
     """
     inside = -width - GRAIN <= lateral <= GRAIN
     return inside and along > 0.0 and away2 <= far2
@@ -49,17 +52,16 @@ def stands_in_exit(along: float, lateral: float, away2: float, far2: float, widt
 
 @jit_inline
 def to_mouth(along: float, lateral: float, own: TrialRules, terms: RefereeParameters) -> float:
-    """Return how far (along, lateral) of a lane out of a disc is from where the lane leaves the disc, metres."""
+    """Return the distance of (along, lateral) from the point where a lane leaves the disc at its beginning, metres."""
     far, aside = along - own.radius, lateral + terms.lane_middle
     return sqrt(far * far + aside * aside)
 
 
 @jit
 def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTables) -> bool:
-    """Tell whether some lane out of v, except that on segment `back`, is free for car n of trial b.
+    """Tell whether any lane out of v, except that on segment `back`, is free for car n of trial b.
 
-    At a bend `back` is the segment by which n came or comes. All that may be near are among the first `count` cars of
-    `spacing.near`.
+    The first `count` cars of `spacing.near` are all that may be near.
     """
     t, own, terms = tables.roads, tables.rules[b], tables.terms[b]
     row = int(t.vert_off[own.net]) + v
@@ -82,7 +84,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
 
 @jit_inline
 def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> int:
-    """Return which lanes out of v car k takes, so that car n can't: bit `arm` for the lane of that arm."""
+    """Return the lanes out of v that car k keeps car n from taking: bit `arm` is the lane of that arm."""
     state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     net = own.net
     row = int(t.vert_off[net]) + v
@@ -113,10 +115,11 @@ def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> 
 
 @jit
 def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeTables) -> tuple[bool, int]:
-    """E4: tell whether car n of trial b, whose body meets the disc of v, may leave by some lane, and when to ask again.
+    """Return whether car n of trial b, in the disc of v, has a free exit (E4), and the tick in which to ask again.
 
-    That on segment `back` is no exit. Who is near with his centre outside the disc is in the way to one lane at most.
-    Where fewer are near than there are lanes, an exit is free until another one can have come near, or into the disc.
+    The lane on segment `back` is no exit. A car near the disc with its centre outside it is in the way of one exit at
+    most. So while fewer cars are near than there are lanes, and none has its centre in the disc, an exit is free until
+    another car can have come near or into the disc.
     """
     state, t, spacing, own, terms = (
         tables.state, tables.roads, tables.spacing, tables.rules[b], tables.terms[b],
@@ -146,9 +149,9 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
 
 @jit
 def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
-    """E6: tell whether the ego of trial b is near an exit of v, of which that on segment `back` is none.
+    """Tell whether the ego of trial b is near an exit of v (E6); the lane on segment `back` is no exit.
 
-    It is near if its centre is near to where the lane leaves the disc, or in the lane and near the disc.
+    It is near if its centre is near the point where the lane leaves the disc, or in the lane and near the disc.
     """
     state, t, labels, own, terms = (
         tables.state, tables.roads, tables.labels, tables.rules[b], tables.terms[b],

@@ -10,12 +10,12 @@ from dubins_traffic.rules.propositions import FLAG
 
 
 def in_breach(bits: int) -> bool:
-    """Tell whether a car breaks rule 2 or 3: left and not overtaking, or in a disc entered against rule 3."""
+    """Tell whether a car with the flags `bits` breaks rule 2 (left, not overtaking) or is in a disc against rule 3."""
     return bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT or bits & FLAG.BREACH3 != 0
 
 
 def blamed(first: bool, second: bool, first_breaks: bool, second_breaks: bool) -> tuple[bool, bool]:
-    """Return which of two cars is at fault, given which of them closed and which are in breach."""
+    """Return whether each of two cars is at fault, given whether each closed in and whether each is in breach."""
     first_guilty, second_guilty = first and first_breaks, second and second_breaks
     if first_guilty or second_guilty:
         return first_guilty, second_guilty
@@ -34,8 +34,8 @@ def with_fault(contact: Contact, bits: Bits) -> Contact:
 
     Notes
     -----
-    Never who did not move. A car that hits an obstacle is at fault. Of two cars: those that closed; of these, those
-    in breach; if none of these or all are, all that closed.
+    A car that did not move is never at fault. A car that hits an obstacle is. Of two cars those that closed in are
+    considered: if exactly one of these is in breach it alone is at fault, otherwise all of these are.
     """
     own = int(bits[contact.car])
     return with_fault_by(contact, own, int(bits[contact.other]) if contact.other >= 0 else 0)

@@ -18,23 +18,23 @@ from dubins_traffic.roads.lookup import (
 )
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.hemming import hem_in
-from dubins_traffic.rules.label_cache import holds_on, look_who_holds
+from dubins_traffic.rules.label_cache import check_label_caches, relabel_from_cache
 from dubins_traffic.rules.location import locate, moved2, put_in_order
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.queue import Queue, foremost, gather, keep_order
 from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.rules.tables import CarMemory, LabelTables
 
-LONG = FLAG.STILL | FLAG.LINGERS
-BESIDE = LONG | FLAG.LEFT | FLAG.OVERTAKING
-"""Flags of the cars about which there is something to say beside their lane: who stands, is left or overtakes."""
+MOTIONLESS = FLAG.STILL | FLAG.LINGERS
+NEEDS_OVERTAKING = MOTIONLESS | FLAG.LEFT | FLAG.OVERTAKING
+"""Flags by which `_label_overtaking` is needed: a car is still, lingers, is left or overtakes."""
 
 
 @jit
 def label_frame(tick: int, tables: LabelTables) -> None:
-    """Label frame `tick` of every trial: labels and memory hold those of the frame before and are updated.
+    """Label frame `tick` of every trial; labels and memory hold those of the frame before and are updated in place.
 
-    Before frame 0 both are as they are made: no lane, no vertex, no flag.
+    Before frame 0 both are as newly made: no lane, no vertex, no flag.
     """
     for b in range(tables.state.count.shape[0]):
         label_trial(b, tick, tables)
@@ -45,13 +45,13 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
     """Label frame `tick` of trial b."""
     state, labels, memory = tables.state, tables.labels, tables.memory
     own, row, due = tables.rules[b], memory.car[b], memory.due[b]
-    look_who_holds(b, tick, state, own, memory)
+    check_label_caches(b, tick, state, own, memory)
     cars = state.count[b]
     stirred = False
     count = 0
     some = 0
     for n in range(cars):
-        if not holds_on(b, n, tables.roads, own, labels, memory):
+        if not relabel_from_cache(b, n, tables.roads, own, labels, memory):
             stirred |= locate(b, n, tick, tables)
         elif row[n].zone == 0:
             some |= np.int64(labels.bits[b, n])
@@ -60,19 +60,19 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
         count += 1
     for k in range(cars if stirred else count):
         n = k if stirred else due[k]
-        some |= _stop(b, n, tick, tables)
+        some |= _label_approach(b, n, tick, tables)
     if some & FLAG.STOPPED != 0:
-        _queue_up(b, tick, tables)
-    elif some & LONG != 0:
+        _order_queues(b, tick, tables)
+    elif some & MOTIONLESS != 0:
         for n in range(cars):
-            labels.bits[b, n] = _who_stands(np.int64(labels.bits[b, n]))
-    if some & BESIDE != 0 or tables.obstacles.base[b] >= 0:
-        _look_beside(b, tick, tables)
+            labels.bits[b, n] = _with_stands(np.int64(labels.bits[b, n]))
+    if some & NEEDS_OVERTAKING != 0 or tables.obstacles.base[b] >= 0:
+        _label_overtaking(b, tick, tables)
 
 
 @jit
-def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
-    """Order the queues of trial b, and say who stands."""
+def _order_queues(b: int, tick: int, tables: LabelTables) -> None:
+    """Order the queues of trial b, excuse the cars behind them, and flag the cars that stand."""
     labels, memory, t = tables.labels, tables.memory, tables.roads
     own, head, row, members = tables.rules[b], memory.head[b], memory.car[b], memory.member[b]
     bits, lanes = labels.bits[b], labels.lane[b]
@@ -92,7 +92,7 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
     for n in range(cars):
         lane = lanes[n]
         if lane < 0:
-            bits[n] = _who_stands(np.int64(bits[n]))
+            bits[n] = _with_stands(np.int64(bits[n]))
         elif head[lane].lane == n:
             _excuse(n, own.excuse, row, bits)
     for n in range(cars):
@@ -101,8 +101,8 @@ def _queue_up(b: int, tick: int, tables: LabelTables) -> None:
 
 
 @jit
-def _look_beside(b: int, tick: int, tables: LabelTables) -> None:
-    """Find who of trial b is blocked, overtakes, is left and hemmed in."""
+def _label_overtaking(b: int, tick: int, tables: LabelTables) -> None:
+    """Flag the cars of trial b that are blocked, overtake, are left and are hemmed in."""
     segments, head, row = tables.labels.segment[b], tables.memory.head[b], tables.memory.car[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
@@ -112,7 +112,7 @@ def _look_beside(b: int, tick: int, tables: LabelTables) -> None:
         first.segment = n
     left = False
     for n in range(cars):
-        left |= _block(b, n, tick, tables)
+        left |= _label_blocked(b, n, tick, tables)
     for n in range(cars):
         segment = segments[n]
         head[segment].segment = -1
@@ -121,10 +121,10 @@ def _look_beside(b: int, tick: int, tables: LabelTables) -> None:
 
 
 @jit_inline
-def _stop(b: int, n: int, tick: int, tables: LabelTables) -> Any:
-    """Find whether car n approaches, has stopped and gets a ticket; enter it in the queue ahead.
+def _label_approach(b: int, n: int, tick: int, tables: LabelTables) -> Any:
+    """Flag whether car n approaches a crossing and has stopped there; give it a ticket and enter it in the queue.
 
-    Sets CLEAR too, which needs who crosses what. Returns the car's flags so far, with LEFT if it will be left.
+    Also sets CLEAR, which depends on all cars' discs. Returns the car's flags so far, with LEFT if it will be left.
     """
     labels, memory = tables.labels, tables.memory
     own, row, head = tables.rules[b], memory.car[b], memory.head[b]
@@ -184,7 +184,7 @@ def _give_ticket(car: CarMemory, tick: int) -> None:
 
 @jit_inline
 def _flag_queue(first: int, cars: Rows[CarMemory], bits: Any) -> None:
-    """Flag the cars of the queue that begins with car `first` and is in order, in `bits` (N,)."""
+    """Set the flags, `bits` (N,), of the cars in the ordered queue that begins with car `first`."""
     n = first
     while n >= 0:
         car = cars[n]
@@ -196,10 +196,10 @@ def _flag_queue(first: int, cars: Rows[CarMemory], bits: Any) -> None:
 
 @jit_inline
 def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
-    """Excuse the cars up to `far` metres behind excused ones, and say who stands, in `bits` (N,).
+    """Set EXCUSED for the cars of a lane up to `far` metres behind an excused one, and STANDS, in `bits` (N,).
 
-    They are those of one lane, in order, of which car `first` is foremost. A car without lane state is excused by
-    nothing.
+    The cars of the lane are listed in order from car `first`, the foremost, on. A car without lane state is never
+    excused.
     """
     start = first
     n = first
@@ -214,19 +214,19 @@ def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
                 bits[n] = np.int64(bits[n]) | FLAG.EXCUSED
                 break
             other = cars[other].next_in_lane
-        bits[n] = _who_stands(np.int64(bits[n]))
+        bits[n] = _with_stands(np.int64(bits[n]))
         n = car.next_in_lane
 
 
 @jit_inline
-def _who_stands(bits: Any) -> Any:
-    """Return the flags of a car with STANDS, if it does."""
-    return bits | FLAG.STANDS if bits & FLAG.EXCUSED == 0 and bits & LONG != 0 else bits
+def _with_stands(bits: Any) -> Any:
+    """Return the flags `bits` of a car, with STANDS if it stands."""
+    return bits | FLAG.STANDS if bits & FLAG.EXCUSED == 0 and bits & MOTIONLESS != 0 else bits
 
 
 @jit
-def _block(b: int, n: int, tick: int, tables: LabelTables) -> bool:
-    """Find whether the lane of car n is blocked, whether it overtakes, and whether it is left, which is returned."""
+def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
+    """Flag whether the lane of car n is blocked, whether it overtakes and whether it is left; return the last."""
     labels, t = tables.labels, tables.roads
     own, car = tables.rules[b], tables.memory.car[b, n]
     lane = labels.lane[b, n]
@@ -266,7 +266,7 @@ def _block(b: int, n: int, tick: int, tables: LabelTables) -> bool:
 
 @jit_inline
 def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, bool]:
-    """Tell whether a car that stands blocks the lane of car n, and whether one keeps it overtaking."""
+    """Tell whether a standing car blocks the lane of car n, and whether one is so near that n still overtakes."""
     state, t, row = tables.state, tables.roads, tables.memory.car[b]
     own = tables.rules[b]
     here = row[n].progress

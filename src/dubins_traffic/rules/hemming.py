@@ -1,17 +1,17 @@
-"""Who overtakes and is hemmed in: a car that has moved since it became left is near (docs/rules.md#hemmed)."""
+"""Which cars are hemmed in while they overtake: near a car that has moved meanwhile (docs/rules.md#hemmed)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import LabelTables
 
 
-@jit
+@jit_rare
 def hem_in(b: int, tick: int, tables: LabelTables) -> None:
-    """Find who of trial b is hemmed in, in a frame in which somebody is left; `tables` (trials, cars)."""
+    """Flag the cars of trial b that are hemmed in, in a frame in which some car is left; `tables` (LabelTables)."""
     labels, row = tables.labels, tables.memory.car[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
@@ -25,7 +25,7 @@ def hem_in(b: int, tick: int, tables: LabelTables) -> None:
 
 @jit
 def _is_hemmed(b: int, n: int, tables: LabelTables) -> bool:
-    """Tell whether a car is near car n that has not been still in some frame since n became left."""
+    """Tell whether near car n there is a car that was not still in some frame since n became left."""
     state, row, own = tables.state, tables.memory.car[b], tables.rules[b]
     since = row[n].left_since
     for other in range(state.count[b]):

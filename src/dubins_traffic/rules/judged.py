@@ -1,4 +1,4 @@
-"""What must be known of a trial to label and to judge it, and which trials have most of it in common."""
+"""What labeller, referee and vocabulary read of problems and instances, and which problems are alike in it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dubins_traffic.kernels.arrays import Ints, distinct
 from dubins_traffic.roads.network import RoadNetwork
 
 
-class Judged(Protocol):
-    """What labeller and referee ask of a problem (`problem.instance.Problem`)."""
+class JudgedProblem(Protocol):
+    """What this room reads of a problem (`problem.instance.Problem`)."""
 
     @property
     def network(self) -> RoadNetwork:
@@ -26,7 +26,7 @@ class Judged(Protocol):
 
     @property
     def car(self) -> Car:
-        """The car that all drive."""
+        """What all cars are."""
         ...
 
     @property
@@ -36,41 +36,56 @@ class Judged(Protocol):
 
     @property
     def sensing_radius(self) -> float:
-        """Metres."""
+        """Sensing radius, metres."""
         ...
 
     @property
     def obstacles(self) -> Sequence[Obstacle]:
-        """Static obstacles."""
+        """The static obstacles."""
+        ...
+
+    @property
+    def goals(self) -> Sequence[tuple[float, float]]:
+        """Lattice points of the goals."""
+        ...
+
+    @property
+    def goal_vertices(self) -> Sequence[int]:
+        """Numbers of the goals' intersections."""
         ...
 
     @property
     def rules(self) -> Mapping[str, Any]:
-        """Parameters by name; empty if not judged."""
+        """The parameters of the rules by name; empty if the problem is not judged by them."""
         ...
 
 
-class Posed(Protocol):
-    """What labeller and referee ask of an instance (`problem.instance.Instance`)."""
+class JudgedInstance(Protocol):
+    """What this room reads of an instance (`problem.instance.Instance`)."""
 
     @property
-    def problem(self) -> Judged:
-        """What is judged."""
+    def problem(self) -> JudgedProblem:
+        """The problem."""
         ...
 
     @property
     def starts(self) -> Sequence[Pose]:
-        """One pose per car."""
+        """The start of each car, the ego's first."""
+        ...
+
+    @property
+    def names(self) -> Sequence[str]:
+        """The name of each car, the ego's first."""
         ...
 
 
-JudgedT = TypeVar("JudgedT", bound=Judged)
+ProblemT = TypeVar("ProblemT", bound=JudgedProblem)
 
 
-def kinds_of(problems: Sequence[JudgedT]) -> tuple[list[JudgedT], Ints]:
-    """Return problems that stand for all others, and which of them stands for each (B,).
+def distinct_problems(problems: Sequence[ProblemT]) -> tuple[list[ProblemT], Ints]:
+    """Return problems of which no two are alike but for roads, goals and obstacles, and for each the like one, (B,).
 
-    The others differ from them in the roads, the goals and the obstacles at most.
+    What follows from rules, car, radii and rate alone need be computed once for each problem that is returned.
     """
     first, index = distinct(
         [

@@ -1,11 +1,11 @@
-"""Which cars hold on to their labels in a frame, found for all cars of a trial at once (compiled).
+"""The label cache: finds for all cars of a trial at once which cached labels are still valid (compiled).
 
-Cars move a little in a tick. So with its labels a rectangle about a car is kept, a ring about the nearest vertex, and a
-strip of its lane, in which the labels are the same for certain; there only its progress and whether it was still are
-found anew.
+Cars move little in a tick. So with a car's labels regions are kept in which the labels are certain to be the same: a
+rectangle about the car, a ring about the nearest vertex, and a strip of its lane. Within them only the car's progress,
+and whether it is still or lingers, is found anew.
 
-What is kept stands in `Memory.kept`, in columns a fixed number of cars apart, and nothing in the loop over the cars is
-a branch: so the compiler sees that several may be taken at once.
+The regions stand in `Memory.kept`, in columns (`kernels.columns`), and the loops over cars have no branches, so that
+the compiler works on several cars at once.
 """
 
 from __future__ import annotations
@@ -15,28 +15,29 @@ import numpy as np
 from dubins_traffic.cars.rows import TOGETHER, copy_together
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
-from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_look
 from dubins_traffic.roads.lookup import CERTAIN, ValidCell, nearest_arm
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Kept, Memory, TrialRules
+from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Memory, TrialRules, ValidRegions
 
-KEPT = FLAG.LEFT | FLAG.OVERTAKING | FLAG.STOPPED | FLAG.BREACH3
-CALMLY = KEPT | FLAG.ON_ROAD | FLAG.IN_CROSSING | FLAG.CLEAR
-"""Flags of a car that holds on to its labels, except those that others bring about."""
+HELD_FLAGS = FLAG.LEFT | FLAG.OVERTAKING | FLAG.STOPPED | FLAG.BREACH3
+"""Flags that a car keeps from the frame before until something changes them."""
+CACHED_FLAGS = HELD_FLAGS | FLAG.ON_ROAD | FLAG.IN_CROSSING | FLAG.CLEAR
+"""Flags of a car that are valid as long as its cached labels are; other cars may still change some of them."""
 IF_NEAREST = 2.0
-"""Value of `Kept.holds` of a car that holds on to its labels if the nearest of the roads that meet is the same."""
+"""Value of `ValidRegions.holds`: the labels are valid if the nearest of the roads at the vertex is the same."""
 FARTHEST = 100.0
-"""Metres up to which a place is said to be far from any that matters."""
+"""Metres beyond which distances to what changes labels are not told apart."""
 
 
 @jit_inline
-def look_who_holds(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
-    """Note where the cars of trial b are; find who holds on to its labels where no roads fork, and who was still.
+def check_label_caches(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
+    """Find which cars of trial b have valid cached labels, and which are still; store where all cars are.
 
-    Of those who hold on it is found who lingers, too, and their greatest progress is kept.
+    Of cars with valid labels it also finds which linger, and stores their greatest progress.
     """
-    _bring(b, tick, state, own, memory)
+    _load_positions(b, tick, state, own, memory)
     still2 = own.stand_move2 if tick >= own.stand_ticks else -1.0
     growth = memory.growth[b, growth_row(tick, own)]
     count = state.count[b]
@@ -44,13 +45,13 @@ def look_who_holds(b: int, tick: int, state: State, own: TrialRules, memory: Mem
         here = min(count - first, BLOCK)
         last = (here + WIDE - 1) & -WIDE
         block = memory.kept[b, first // BLOCK]
-        _look_who_stays(block, last, own.turn_back)
-        _look_who_moves(block, growth[first : first + last], float(tick), own.linger_growth, still2)
+        _check_valid_regions(block, last, own.turn_back)
+        _check_motion(block, growth[first : first + last], float(tick), own.linger_growth, still2)
 
 
 @jit_inline
-def _look_who_stays(block: Kept, last: int, back: float) -> None:
-    """Find who of the first `last` cars of a block holds on to its labels, its progress, and the most of that.
+def _check_valid_regions(block: ValidRegions, last: int, back: float) -> None:
+    """Find which of the first `last` cars of a block have valid labels, their progress, and its maximum so far.
 
     `back` is how far progress may fall, metres.
     """
@@ -98,11 +99,11 @@ def _look_who_stays(block: Kept, last: int, back: float) -> None:
 
 
 @jit_inline
-def _look_who_moves(block: Kept, growth: Floats, now: float, least: float, still2: float) -> None:
-    """Find who of the first cars of a block was still, by squared metres, and who lingers; keep how far they are.
+def _check_motion(block: ValidRegions, growth: Floats, now: float, least: float, still2: float) -> None:
+    """Find which of the first K cars of a block are still and which linger; store their greatest progress.
 
-    `growth` (K,) holds the greatest progress `linger_time` ago, and then the present one. Who has made less than
-    `least` metres lingers.
+    `growth` (K,) holds the greatest progress `linger_time` ago, and is overwritten by the present one. A car whose
+    greatest progress has grown by less than `least` (m) lingers. A car is still if it has moved at most `still2`, m2.
     """
     here_x, here_y, then_x, then_y = block.here_x, block.here_y, block.then_x, block.then_y
     tops, tops_then, lingers_from = block.top_so_far, block.top_then, block.lingers_from
@@ -120,8 +121,8 @@ def _look_who_moves(block: Kept, growth: Floats, now: float, least: float, still
 
 
 @jit_inline
-def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
-    """Put where the cars are, and where they were `stand_time` ago, beside what is kept of them."""
+def _load_positions(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
+    """Copy the present positions of the cars, and those `stand_time` ago, into the blocks of trial b."""
     depth, places = memory.trail_x.shape[1], memory.trail_x.shape[2]
     now = tick % depth
     then = (now + depth - own.stand_ticks) % depth
@@ -151,28 +152,30 @@ def _bring(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> 
 
 @jit_inline
 def growth_row(tick: int, own: TrialRules) -> int:
-    """Return the row of `Memory.growth` that holds what was `linger_time` ago, until it holds what is now."""
+    """Return the row of `Memory.growth` for frame `tick`; until it is overwritten it holds that `linger_time` ago."""
     return tick % max(own.linger_ticks, 1)
 
 
 @jit_inline
-def still(block: Kept, n: int) -> int:
-    """Return STILL if car n, of this block, is near where it was `stand_time` ago, else 0; after `look_who_holds`."""
+def still(block: ValidRegions, n: int) -> int:
+    """Return STILL if car n of this block is still, else 0; to be called after `check_label_caches`."""
     return FLAG.STILL if block.was_still[n & (BLOCK - 1)] != 0.0 else 0
 
 
 @jit_inline
-def lingers(block: Kept, n: int) -> int:
-    """Return LINGERS if car n, of this block, lingers, else 0.
+def lingers(block: ValidRegions, n: int) -> int:
+    """Return LINGERS if car n of this block lingers, else 0.
 
-    After `look_who_holds`, or `note_growth` for who doesn't hold on.
+    To be called after `check_label_caches`, or, for a car whose labels were not valid, after `note_growth`.
     """
     return FLAG.LINGERS if block.was_lingering[n & (BLOCK - 1)] != 0.0 else 0
 
 
 @jit_inline
-def note_growth(block: Kept, n: int, tick: int, lane: int, fresh: bool, top: float, own: TrialRules) -> None:
-    """Find whether a car lingers that has been located in `lane` (-1: none), which was set in this frame if `fresh`.
+def note_growth(
+    block: ValidRegions, n: int, tick: int, lane: int, fresh: bool, top: float, own: TrialRules
+) -> None:
+    """Find whether car n, just located in `lane` (-1: none), lingers; `fresh`: that lane was set in this frame.
 
     `top` is its greatest progress, metres, which the caller has to write to `Memory.growth`.
     """
@@ -186,11 +189,11 @@ def note_growth(block: Kept, n: int, tick: int, lane: int, fresh: bool, top: flo
     block.was_lingering[k] = 1.0 if long and little else 0.0
 
 
-@jit_inline
-def holds_on(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memory: Memory) -> bool:
+@jit_look
+def relabel_from_cache(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memory: Memory) -> bool:
     """Relabel car n of trial b if its cached labels are valid: update progress and flags only.
 
-    Returns False, and does nothing that matters, where that is not known. After `look_who_holds`.
+    Returns False, and leaves the labels alone, if they may be invalid. To be called after `check_label_caches`.
     """
     block = memory.kept[b, n // BLOCK]
     k = n & (BLOCK - 1)
@@ -207,18 +210,18 @@ def holds_on(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memo
     car.progress = block.way_so_far[k]
     if car.zone != 0:
         car.gap2 = block.away2[k]
-    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CALMLY | still(block, n) | lingers(block, n)
+    labels.bits[b, n] = np.int64(labels.bits[b, n]) & CACHED_FLAGS | still(block, n) | lingers(block, n)
     return True
 
 
 @jit_inline
-def hold(
-    block: Kept, n: int, away2: float, spare: float, cell: ValidCell, car: CarMemory, own: TrialRules
+def keep_region(
+    block: ValidRegions, n: int, away2: float, spare: float, cell: ValidCell, car: CarMemory, own: TrialRules
 ) -> None:
-    """Keep where car n, which has been located, is sure to hold on to its labels, as far as its lane is not asked.
+    """Store the region in which the labels of car n, just located, are valid, apart from its lane's strip.
 
-    It does while it is less than `spare` metres from where it is, in its valid cell, and where the squared distance
-    from its vertex compares with all radii that matter as `away2` does. After `lane_cache.keep_road`.
+    They are valid less than `spare` metres from its present place, in its valid cell, and where the squared distance
+    from its vertex lies between the same radii as `away2`. To be called after `lane_cache.keep_road`.
     """
     k = n & (BLOCK - 1)
     x, y = block.here_x[k], block.here_y[k]
@@ -232,8 +235,8 @@ def hold(
 
 
 @jit_inline
-def _keep_ring(block: Kept, k: int, away2: float, own: TrialRules) -> None:
-    """Keep between which squared distances of its vertex a car is at `away2`: of its discs, and who approaches it."""
+def _keep_ring(block: ValidRegions, k: int, away2: float, own: TrialRules) -> None:
+    """Store the ring about a car's vertex that holds `away2`: between the radii of disc, crossing and approach."""
     low = -1.0
     high = FARTHEST * FARTHEST
     outer2 = max(own.stop2, own.queue2)

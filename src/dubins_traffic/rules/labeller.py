@@ -1,4 +1,4 @@
-"""Labels the frames of a batch of trials, tick by tick, and says who is at fault in their collisions."""
+"""Labels the frames of a batch of trials, tick by tick, and finds who is at fault in their collisions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.table import RoadTable, pack_distinct
 from dubins_traffic.rules.fault import with_fault
 from dubins_traffic.rules.frame import label_frame
-from dubins_traffic.rules.judged import Judged, Posed, kinds_of
+from dubins_traffic.rules.judged import JudgedInstance, JudgedProblem, distinct_problems
 from dubins_traffic.rules.obstacles import ObstacleLanes, place_obstacles
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules, pack_rules, spread
 
 SLACK = 1e-9
-"""Metres by which rounding may fall short of a demand on the roads."""
+"""Tolerance for rounding where lengths of roads are compared, metres."""
 
 
 class Labeller:
@@ -39,7 +39,7 @@ class Labeller:
     labels : Labels
         The propositions of the present frame, (B, N), updated in place.
     memory : Memory
-        All that is remembered from frame to frame: tickets, forfeits, greatest progress, trails.
+        What is kept from frame to frame: tickets, forfeits, greatest progress, trails.
 
     Notes
     -----
@@ -47,11 +47,11 @@ class Labeller:
     its roads; all else is computed everywhere (docs/design/010-propositions.md).
     """
 
-    def __init__(self, instances: Sequence[Posed]) -> None:
+    def __init__(self, instances: Sequence[JudgedInstance]) -> None:
         problems = [instance.problem for instance in instances]
         networks = [problem.network for problem in problems]
         self._roads, nets = pack_distinct(networks, [problem.car.lane_width for problem in problems])
-        kinds, index = kinds_of(problems)
+        kinds, index = distinct_problems(problems)
         parameters = [RuleParameters.from_mapping(problem.rules) for problem in kinds]
         rules = pack_rules(
             parameters,
@@ -76,7 +76,7 @@ class Labeller:
         return self.labels
 
     def begin(self, trials: int, cars: int) -> None:
-        """Forget everything: labels and memory are as before the first frame of `trials` x `cars` cars."""
+        """Reset labels and memory to those before the first frame of `trials` x `cars` cars."""
         depth = int(max(self._rules["stop_ticks"].max(), self._rules["stand_ticks"].max())) + 1
         linger = max(1, int(self._rules["linger_ticks"].max()))
         self.memory = Memory.empty(trials, cars, depth, self._heads, linger)
@@ -88,7 +88,7 @@ class Labeller:
     def update(
         self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
     ) -> Sequence[Sequence[Contact]]:
-        """Label frame `tick`, one after the last, and return the contacts of the tick before it with `at_fault`.
+        """Label frame `tick`, the next one, and return `contacts`, those of the tick that led to it, with `at_fault`.
 
         Raises
         ------
@@ -143,7 +143,7 @@ class Labeller:
         return self.memory.car["rank"]
 
     def seeing(self, state: State) -> LabelTables:
-        """Return all that `label_frame` takes, of a batch in this state."""
+        """Return the tables that `label_frame` takes, for a batch in this state."""
         if self._tables is None or self._tables.state is not state:
             self._tables = LabelTables(state, *self.tables, self.labels, self.memory)
         return self._tables
@@ -152,8 +152,10 @@ class Labeller:
         self._look(self._tick, self.seeing(state))
 
 
-def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:
-    """Tell of each problem whether it asks for the rules and rule 3 is defined there (docs/rules.md#room)."""
+def _judged3(
+    problems: Sequence[JudgedProblem], parameters: Sequence[RuleParameters], index: Ints
+) -> list[bool]:
+    """Tell for each problem whether it asks for the rules and rule 3 is defined on its roads (docs/rules.md#room)."""
     known: dict[tuple[int, int], bool] = {}
     judged: list[bool] = []
     kinds: list[int] = index.tolist()
@@ -165,7 +167,7 @@ def _judged3(problems: Sequence[Judged], parameters: Sequence[RuleParameters], i
     return judged
 
 
-def _defined3(problem: Judged, own: RuleParameters) -> bool:
+def _defined3(problem: JudgedProblem, own: RuleParameters) -> bool:
     """Tell whether rule 3 is defined on the roads of a problem."""
     radius, reach = problem.intersection_radius, problem.car.body.reach
     if problem.sensing_radius < 2.0 * (radius + reach + own.sensing_slack) - SLACK:

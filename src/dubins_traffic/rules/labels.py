@@ -1,10 +1,10 @@
-"""Labels as words, as in 2016: `<car>_s_x0_y0_x1_y1` and `<car>_t_x_y`."""
+"""Labels as texts, in the form of 2016: `<car>_s_x0_y0_x1_y1` and `<car>_t_x_y`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from dubins_traffic.cars.state import Frames, Labels
+from dubins_traffic.cars.state import Labels
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -38,7 +38,7 @@ def words(network: RoadNetwork, names: Sequence[str], segment: Ints, at: Ints) -
 
 
 class Caption:
-    """The labels that hold in the latest frame of a trial, worded anew only when they change.
+    """The labels, as texts, that hold in the latest frame of a trial; they are made anew only when they change.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Caption:
         self.words: list[str] = []
 
     def update(self, labels: Labels) -> bool:
-        """Take the labels of trial 0 of a batch; return whether other words hold than before."""
+        """Take the labels of trial 0 of a batch; return whether the texts have changed."""
         segment, at = labels.segment[0], labels.at[0]
         shown = (segment.tobytes(), at.tobytes())
         if shown == self._shown:
@@ -62,12 +62,3 @@ class Caption:
         self._shown = shown
         self.words = list(words(self._network, self._names, segment, at))
         return True
-
-
-def labels_2016(network: RoadNetwork, names: Sequence[str], frames: Frames) -> Iterator[tuple[str, ...]]:
-    """Yield the labels of each frame of a block (see `words`).
-
-    The radius is the instance's intersection radius, by which `Frames.at` has been found.
-    """
-    for segment, at in zip(frames.segment, frames.at, strict=True):
-        yield words(network, names, segment, at)

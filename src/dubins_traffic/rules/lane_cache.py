@@ -1,32 +1,32 @@
-"""Where along its road, and beside it, a car's labels are the same for certain (compiled).
+"""The strip of its road in which a car's cached labels are valid (compiled).
 
-`rules.label_cache` looks in every frame for whether a car is still there.
+`rules.label_cache` checks in every frame whether the car is still in it.
 """
 
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.roads.bends import nearest_piece
 from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell, lane_direction, straight_start
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.tables import Kept, TrialRules
+from dubins_traffic.rules.tables import TrialRules, ValidRegions
 
 HUGE = 1e300
 BISECTED = 1e-4
-"""Metres, about, from where two roads are equally near: nearer to it the nearest is looked for in every frame."""
+"""About how near to the line where two roads are equally near the nearest one is looked for in every frame, metres."""
 
 
 @jit_inline
 def keep_road(
-    block: Kept, n: int, lane: int, segment: int, vertex: int, lateral: float, outside: float, t: RoadTable,
+    block: ValidRegions, n: int, lane: int, segment: int, vertex: int, lateral: float, outside: float, t: RoadTable,
     own: TrialRules,
 ) -> bool:  # fmt: skip
-    """Keep the vertex of car n of a `block` (columns), its segment, and where along and beside it labels are the same.
+    """Store for car n, in a `block` (columns), its vertex and segment and the strip in which its labels are valid.
 
-    `lateral` is its lateral offset in `lane` (-1: none), metres; its labels are not the same within `outside` (m) of
-    the end of that. Progress is measured as `roads.lookup.lane_coordinates` does. Tells whether the car is on the road,
-    or off it, in all these places as it is now; if not, that is not known.
+    `lateral` is the car's lateral offset in `lane` (-1: none), metres; the strip ends `outside` (m) before the end of
+    the lane. Progress is measured as in `roads.lookup.lane_coordinates`. Tells whether in the whole strip the car is on
+    the road, or off it, as it is now; False if that is not known.
     """
     k = n & (BLOCK - 1)
     net = own.net
@@ -50,11 +50,11 @@ def keep_road(
     return _keep_sides(block, k, length, t.half_width[net])
 
 
-@jit
+@jit_rare
 def _keep_piece(
-    block: Kept, k: int, lane: int, lateral: float, row: int, t: RoadTable, own: TrialRules
+    block: ValidRegions, k: int, lane: int, lateral: float, row: int, t: RoadTable, own: TrialRules
 ) -> bool:
-    """Do what `keep_road` does on a segment that bends: on its lines, on the road. Elsewhere nothing is kept."""
+    """Do as `keep_road` on a segment that bends, for a car on the road beside one of its lines; else store nothing."""
     net = own.net
     place, _ = nearest_piece(t.piece, t.segment[row], block.here_x[k], block.here_y[k])
     piece = t.piece[place]
@@ -77,9 +77,9 @@ def _keep_piece(
 
 @jit_inline
 def _keep_strip(
-    block: Kept, k: int, back: bool, lateral: float, outside: float, length: float, half: float, own: TrialRules
+    block: ValidRegions, k: int, back: bool, lateral: float, outside: float, length: float, half: float, own: TrialRules
 ) -> None:  # fmt: skip
-    """Keep how far to the left of its segment a car is on the road as it is now and not left, and where that holds.
+    """Store the strip in which a car is on the road, or off it, as it is now, and not left.
 
     The segment is `length` metres long and its road reaches `half` metres to each side.
     """
@@ -106,11 +106,11 @@ def _keep_strip(
 
 
 @jit_inline
-def _keep_sides(block: Kept, k: int, length: float, half: float) -> bool:
-    """Keep on which side of the edges of its road a car without lane state is; tell whether that can be told.
+def _keep_sides(block: ValidRegions, k: int, length: float, half: float) -> bool:
+    """Store the strip in which a car without lane state stays on its side of the road's edges; tell if there is one.
 
-    It can beside the segment, which is `length` metres long and whose road reaches `half` metres to each side; beyond
-    its ends the edge is round.
+    There is one beside the segment, which is `length` metres long and whose road reaches `half` metres to each side;
+    beyond its ends the edge is round.
     """
     rx = block.here_x[k] - block.from_x[k]
     ry = block.here_y[k] - block.from_y[k]
@@ -134,13 +134,13 @@ def _keep_sides(block: Kept, k: int, length: float, half: float) -> bool:
 
 @jit_inline
 def keep_arm(
-    block: Kept, n: int, segment: int, away2: float, cell: ValidCell, t: RoadTable, net: int
+    block: ValidRegions, n: int, segment: int, away2: float, cell: ValidCell, t: RoadTable, net: int
 ) -> None:
-    """Keep in `block` (columns) where `segment` is the nearest of the roads that meet in the vertex of car n.
+    """Store in `block` (columns) where `segment` is the nearest of the roads that meet at the vertex of car n.
 
-    With unit vectors along the roads, u of this one and w of another, and r the way from the vertex: if r.u > 0 and
-    r.(u - w) > 0, this one is nearer. It is enough to look at the two that are next to it by their bearing. All that
-    holds while r is shorter than each of the roads; `away2` (m^2) is its square. After `label_cache.hold`.
+    Let u be the unit vector along this road, w along another, and r the vector from the vertex to the car. If r.u > 0
+    and r.(u - w) > 0, this road is nearer. Only the two roads next to it by bearing need be compared. All that holds
+    while r, whose square is `away2` (m^2), is shorter than each road. To be called after `label_cache.keep_region`.
     """
     k = n & (BLOCK - 1)
     _trust(block, k, -1.0)
@@ -170,8 +170,8 @@ def keep_arm(
 
 
 @jit_inline
-def _trust(block: Kept, k: int, least: float) -> None:
-    """Keep that the nearest road is the same everywhere if `least` is below 0, else that this is never known."""
+def _trust(block: ValidRegions, k: int, least: float) -> None:
+    """Store that the nearest road is the same everywhere (`least` < 0), or that it has to be looked for always."""
     block.arm_x[k] = block.arm_y[k] = block.right_x[k] = block.right_y[k] = 0.0
     block.left_x[k] = block.left_y[k] = 0.0
     block.arm_least[k] = least

@@ -1,6 +1,6 @@
-"""Where a car is in a frame: segment, disc and lane state; and the lists by which others find it.
+"""Locates a car in a frame: segment, disc and lane state; and keeps the lists by which others find it (compiled).
 
-Most cars hold on to what they had in the frame before (`rules.label_cache`); this is for the others.
+Most cars have valid cached labels (`rules.label_cache`); this is for the others.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import BLOCK
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_look
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
     CERTAIN,
@@ -27,9 +27,9 @@ from dubins_traffic.roads.lookup import (
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.label_cache import (
     FARTHEST,
-    KEPT,
+    HELD_FLAGS,
     growth_row,
-    hold,
+    keep_region,
     lingers,
     note_growth,
     still,
@@ -47,8 +47,8 @@ RULE3 = FLAG.STOPPED | FLAG.CLEAR | FLAG.AHEAD
 def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     """Find segment, disc and lane state of car n of trial b, whether it was still and lingers; enter it in the lists.
 
-    Of the flags of the frame before those that hold on are kept, and BREACH3 is judged by them. Tells whether the car
-    crosses another vertex than before, or one or none for the first time.
+    HELD_FLAGS of the frame before are kept, and BREACH3 is judged by that frame's flags. Tells whether the disc that
+    the body meets has changed, or is known for the first time.
     """
     state, t, labels, memory = tables.state, tables.roads, tables.labels, tables.memory
     own, car, cell, block = tables.rules[b], memory.car[b, n], memory.cell[b, n], memory.kept[b, n // BLOCK]
@@ -74,7 +74,7 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
         lane, car.top, car.progress, car.lateral, turned = along_lane(
             t, net, lane, fresh, car.top, own.turn_back, pose
         )
-    bits = _entry(tick, t, own, crosses, crossed, lane_before, before)
+    bits = _entry_flags(tick, t, own, crosses, crossed, lane_before, before)
     if off2 <= half_road * half_road:
         bits |= FLAG.ON_ROAD
     if turned:
@@ -97,24 +97,30 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
         spare = 0.0
     if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
         spare = min(spare, abs(sqrt(off2) - half_road))
-    hold(block, n, away2, spare, cell, car, own)
+    keep_region(block, n, away2, spare, cell, car, own)
     keep_arm(block, n, segment, away2, cell, t, net)
     return _change_crossing(crossed, crosses, memory.head[b])
 
 
 @jit_inline
 def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell) -> tuple[int, float]:
-    """Return the nearest segment and the squared distance from it, by `cell`, which is renewed if need be.
+    """Return the nearest segment and the squared distance from it, by `cell`, which is found anew if it is not valid.
 
-    `cell.vertex` is the nearest vertex if the body, or the disc about it, may meet its disc.
+    `cell.vertex` is the nearest vertex if the disc about the body may meet that vertex's disc.
     """
     net = own.net
-    if not (cell.low_x < x < cell.high_x and cell.low_y < y < cell.high_y):
+    if not _is_in(cell, x, y):
         valid_cell(t, net, x, y, sqrt(own.cross2) + own.half_length + own.half_width, cell)
     segment = cell.segment
     if segment >= 0:
         return segment, distance2(t, net, segment, x, y)
     return nearest_arm(t, net, cell.vertex, x, y)
+
+
+@jit_look
+def _is_in(cell: ValidCell, x: float, y: float) -> bool:
+    """Tell whether a point is in the rectangle in which `cell` is valid."""
+    return cell.low_x < x < cell.high_x and cell.low_y < y < cell.high_y
 
 
 @jit_inline
@@ -162,21 +168,21 @@ def _reach(
 
 @jit_inline
 def _distance2_to_vertex(t: RoadTable, own: TrialRules, v: int, pose: Pose) -> float:
-    """Return the squared distance of an intersection from a body without its rounding."""
+    """Return the squared distance of intersection v from a body without its rounding, square metres."""
     row = int(t.vert_off[own.net]) + v
     px, py = t.vertex[row].x, t.vertex[row].y
     return distance2_to_body(px, py, pose.x, pose.y, pose.c, pose.s, own.half_length, own.half_width)
 
 
 @jit_inline
-def _entry(
+def _entry_flags(
     tick: int, t: RoadTable, own: TrialRules, crosses: int, crossed: int, lane_before: int, before: Any
 ) -> Any:
-    """Return the flags that hold on of those of the frame `before`, and those of the disc that the body meets.
+    """Return HELD_FLAGS of the flags of the frame `before`, and the flags of the disc that the body meets.
 
     The body meets the disc of vertex `crosses` and met that of `crossed`, -1 for none; an entry is judged by `before`.
     """
-    bits = before & KEPT
+    bits = before & HELD_FLAGS
     if crosses < 0:
         return bits & ~FLAG.BREACH3
     crossing = t.degree[t.vert_off[own.net] + crosses] >= own.crossing_degree
@@ -195,7 +201,7 @@ def _entry(
 
 @jit_inline
 def moved2(b: int, n: int, tick: int, ago: int, x: float, y: float, memory: Memory) -> float:
-    """Return the squared distance of the centre (x, y) from where it was `ago` ticks before; huge before that."""
+    """Return the squared distance of the centre (x, y) from where it was `ago` ticks before; huge in earlier ticks."""
     if tick < ago:
         return 1e300
     then = (tick - ago) % memory.trail_x.shape[1]
@@ -206,7 +212,7 @@ def moved2(b: int, n: int, tick: int, ago: int, x: float, y: float, memory: Memo
 
 @jit_inline
 def _change_crossing(crossed: int, crosses: int, head: Rows[Heads]) -> bool:
-    """Count a car that crosses another vertex, or one or none for the first time; tell whether it does."""
+    """Update `Heads.crossers` if the vertex that a car crosses has changed from `crossed`; tell whether it has."""
     if crosses == crossed:
         return False
     if crossed >= 0:
@@ -218,7 +224,7 @@ def _change_crossing(crossed: int, crosses: int, head: Rows[Heads]) -> bool:
 
 @jit
 def _change_lists(n: int, before: int, lane: int, cars: Rows[CarMemory], head: Rows[Heads]) -> None:
-    """Take car n from the list of the lane `before` to that of `lane`; -1 for none."""
+    """Move car n from the list of the lane `before` to that of `lane`; -1 for none."""
     if before >= 0:
         other = head[before].lane
         if other == n:
@@ -234,7 +240,7 @@ def _change_lists(n: int, before: int, lane: int, cars: Rows[CarMemory], head: R
 
 @jit
 def put_in_order(first: Heads, cars: Rows[CarMemory]) -> None:
-    """Bring the list of the cars (N,) of a lane that begins with `first.lane` into order, foremost first."""
+    """Sort the list of the cars (N,) of a lane, which begins with `first.lane`, foremost first."""
     n = first.lane
     first.lane = -1
     while n >= 0:
@@ -245,7 +251,7 @@ def put_in_order(first: Heads, cars: Rows[CarMemory]) -> None:
 
 @jit_inline
 def _enter_in_lane(n: int, first: Heads, cars: Rows[CarMemory]) -> None:
-    """Put car n into the list of its lane, foremost first."""
+    """Insert car n into the sorted list of its lane."""
     car = cars[n]
     progress = car.progress
     behind = first.lane

@@ -11,7 +11,7 @@ from typing import Any
 from dubins_traffic.errors import InputError
 
 EDITION = 2
-"""The edition of the rules of the road that this package judges. Edition 1 had no `lingers`, and other E3 to E6."""
+"""The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class RuleParameters:
                 "another edition of the rules of the road",
                 field="edition",
                 value=self.edition,
-                expected=f"{EDITION}, the one that is judged here, or left out",
+                expected=f"{EDITION}, or left out",
             )
         for field in fields(self):
             _check(field.name, getattr(self, field.name), whole=isinstance(field.default, int))
@@ -119,7 +119,7 @@ class RuleParameters:
                 raise InputError("not a switch", field=field.name, value=value, expected="0 or 1")
         if self.left_release > self.left_set:
             raise InputError(
-                "left would fall where it rises",
+                "`left` would be cleared before it is set",
                 field="left_release",
                 value=self.left_release,
                 expected=f"at most left_set ({self.left_set})",
@@ -132,7 +132,7 @@ class RuleParameters:
         Raises
         ------
         InputError
-            If a name is none of ours, or a value is refused (above).
+            If a name is no parameter, or a value is refused as the class says.
         """
         values = tuple(rules.values())
         if all(type(value) in (int, float) for value in values):
@@ -146,7 +146,7 @@ class RuleParameters:
 
 @lru_cache(maxsize=256)
 def _checked(names: tuple[str, ...], values: tuple[float, ...], _types: tuple[type, ...]) -> RuleParameters:
-    """Return the parameters of these names and values; trials share them, and checking all takes its time."""
+    """Return the parameters of these names and values; equal ones are checked once and shared."""
     return _made(dict(zip(names, values, strict=True)))
 
 
@@ -154,7 +154,7 @@ def _made(rules: Mapping[str, Any]) -> RuleParameters:
     known = {field.name for field in fields(RuleParameters)}
     for name in rules:
         if name not in known:
-            raise InputError("no parameter of the rules", field=name, expected=f"one of {sorted(known)}")
+            raise InputError("unknown parameter of the rules", field=name, expected=f"one of {sorted(known)}")
     return RuleParameters(**rules)
 
 
@@ -164,4 +164,4 @@ def _check(name: str, value: object, *, whole: bool) -> None:
         number = False
     if not number or not math.isfinite(value) or value < 0:  # pyright: ignore  # a number by then
         kind = "a whole number >= 0" if whole else "a finite number >= 0"
-        raise InputError("not a value of this parameter", field=name, value=value, expected=kind)
+        raise InputError("out of range", field=name, value=value, expected=kind)

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 
 class _Flag(NamedTuple):
-    """What holds of a car in a frame, bits of `Labels.bits`."""
+    """The flags, each a bit of `Labels.bits`."""
 
     ON_ROAD: int = 1
     """The centre is within 2w of a segment."""
@@ -30,13 +30,13 @@ class _Flag(NamedTuple):
     CLEAR: int = 256
     """No other car crosses the crossing ahead, or, without one ahead, the crossing that the car is in."""
     AHEAD: int = 512
-    """Stopped, and somebody is before this car in the order of the crossing."""
+    """Stopped, and another car is before this one in the order of the crossing."""
     IN_CROSSING: int = 1024
     """The body meets the disc of a crossing."""
     BREACH3: int = 2048
     """In the disc of a crossing entered against rule 3, and not left since."""
     FIRST: int = 4096
-    """Stopped, and nobody is before this car in the order of the crossing."""
+    """Stopped, and no car is before this one in the order of the crossing."""
     FORFEITED: int = 8192
     """Stopped, and has got a new ticket in this wait: by a forfeit, or by stopping again."""
     EXCUSED: int = 16384

@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import lane_end_direction
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import CarMemory, TrialRules
 
 RIGHT: float = 1e-9
-"""Sine of the angle from which an arm counts as to the right: arms in one line are not, whatever the rounding."""
+"""Least sine of the angle at which an arm counts as to the right, so that rounding never makes opposite arms count."""
 
 
 @jit
 def foremost(n: int, first: int, cars: Rows[CarMemory], own: TrialRules) -> bool:
-    """Tell whether no car (N,) of a lane with larger progress than car n has its body outside the disc ahead.
+    """Tell whether car n is foremost: no car of its lane with larger progress has its body outside the disc ahead.
 
-    The list of the cars of the lane begins with car `first`.
+    `cars` (N,) are those of the trial; the list of those in the lane begins with car `first` (index, -1: none).
     """
     progress = cars[n].progress
     k = first
@@ -33,7 +33,7 @@ def foremost(n: int, first: int, cars: Rows[CarMemory], own: TrialRules) -> bool
 
 @jit
 def on_the_right(t: RoadTable, net: int, lane: int, other: int) -> bool:
-    """Tell whether a car that comes by the lane `other` is on the right of one that comes by `lane`.
+    """Tell whether a car that comes by the lane `other` (lane) is on the right of one that comes by `lane`.
 
     Their arms are (0, 180) degrees apart counter-clockwise, both arms pointing away from the vertex.
     """
@@ -44,9 +44,9 @@ def on_the_right(t: RoadTable, net: int, lane: int, other: int) -> bool:
 
 @jit
 def gather(first: int, cars: Rows[CarMemory], members: Ints) -> int:
-    """List the cars (N,) of the queue that begins with car `first` in `members` (N,), lowest index first.
+    """List the cars of the queue that begins with car `first` (index) in `members` (N,), lowest index first.
 
-    Returns how many there are.
+    `cars` (N,) are those of the trial. Returns how many are listed.
     """
     count = 0
     n = first
@@ -62,10 +62,10 @@ def gather(first: int, cars: Rows[CarMemory], members: Ints) -> int:
 
 
 class Queue(NamedTuple):
-    """A queue before a crossing while it is put in order.
+    """A queue before a crossing, while it is put in order.
 
-    `cars` (N,): what is remembered of the cars of the trial; `lanes` (N,): their lane states, those of the members end
-    at the crossing; `members` (N,): indices of the members, lowest first, and `count` how many there are.
+    `cars` (N,): the memory of the cars of the trial. `lanes` (N,): their lane states; those of the members end at the
+    crossing. `members` (N,): indices of the `count` members, lowest first.
     """
 
     cars: Rows[CarMemory]
@@ -76,16 +76,16 @@ class Queue(NamedTuple):
 
 @jit
 def rank_queue(t: RoadTable, net: int, queue: Queue, group_ticks: int) -> int:
-    """Write the places of the members of a queue into their `rank`; return who is first.
+    """Write the places of the members of a queue into their `rank`; return the index of the first car.
 
     Parameters
     ----------
     t, net
         The roads.
     queue
-        The members.
+        The queue.
     group_ticks
-        How much later than the first of a group its last may come.
+        Most ticks between the first and the last ticket of a group.
     """
     cars, members, count = queue.cars, queue.members, queue.count
     front: int = members[0]
@@ -118,9 +118,9 @@ def rank_queue(t: RoadTable, net: int, queue: Queue, group_ticks: int) -> int:
     return front
 
 
-@jit
+@jit_rare
 def _open_group(queue: Queue, group_ticks: int) -> int:
-    """Put the unplaced member with the earliest ticket, and all just after, into a group; return its size."""
+    """Group the unplaced member of the earliest ticket with all up to `group_ticks` later; return how many."""
     earliest = -1
     for k in range(queue.count):
         n: int = queue.members[k]
@@ -139,7 +139,7 @@ def _open_group(queue: Queue, group_ticks: int) -> int:
 
 @jit
 def _yields(t: RoadTable, net: int, queue: Queue, n: int) -> bool:
-    """Tell whether a member of the present group, not placed yet, is on the right of member n."""
+    """Tell whether an unplaced member of the present group is on the right of member n."""
     for k in range(queue.count):
         other: int = queue.members[k]
         if other == n or queue.cars[other].in_group == 0 or queue.cars[other].rank >= 0:
@@ -151,9 +151,9 @@ def _yields(t: RoadTable, net: int, queue: Queue, n: int) -> bool:
 
 @jit
 def keep_order(t: RoadTable, own: TrialRules, queue: Queue, clear: bool, tick: int) -> None:
-    """Bring a queue into order; who forfeits gets the present tick as ticket.
+    """Order a queue; a member that forfeits its place gets the present tick as its new ticket.
 
-    `clear` tells whether nobody crosses the vertex.
+    `clear` (bool) tells whether no car crosses the vertex.
     """
     cars = queue.cars
     front = rank_queue(t, own.net, queue, own.group_ticks)

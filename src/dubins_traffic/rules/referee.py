@@ -1,16 +1,19 @@
-"""The referee: which rules of docs/rules.md are broken, by whom, when, since when and where, live or from frames."""
+"""The referee: finds which rules of docs/rules.md are broken, by which car, when, since when and where.
+
+It judges trials as they run, or recorded frames.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.cars.near import unknown
+from dubins_traffic.cars.near import unknown_spacing
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
@@ -28,7 +31,7 @@ from dubins_traffic.rules.breach_log import (
 )
 from dubins_traffic.rules.duties import find_ways
 from dubins_traffic.rules.fault import with_fault
-from dubins_traffic.rules.judged import Judged, Posed, kinds_of
+from dubins_traffic.rules.judged import JudgedInstance, JudgedProblem, distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
@@ -40,31 +43,13 @@ _PENDING = (
     ("E4", "exit_counts"),
     ("E5", "rest_since"),
 )
-"""Rules that will be broken if all stays as it is, and the clocks of `JudgedCar` that run then."""
+"""Rules that a car breaks if nothing changes for long enough, and the field of `JudgedCar` whose run tells so."""
 _ROOMY = 64
-"""For how many frames of one trial in which all goes wrong there is room before a block is interrupted."""
-
-
-class WithGoals(Judged, Protocol):
-    """What the referee asks of a problem (`problem.instance.Problem`)."""
-
-    @property
-    def goal_vertices(self) -> Sequence[int]:
-        """Numbers of the goals' intersections."""
-        ...
-
-
-class Arraigned(Posed, Protocol):
-    """What the referee asks of an instance (`problem.instance.Instance`)."""
-
-    @property
-    def problem(self) -> WithGoals:
-        """What is judged."""
-        ...
+"""Frames, each with all breaches that are possible, for which the log has rows when a block is judged."""
 
 
 class Breach(NamedTuple):
-    """A rule was broken: `rule` (a name in `RULES`) by the car with index `car`, in frame `tick`.
+    """A breach of `rule` (a name in `RULES`) by the car with index `car`, in frame `tick`.
 
     `since` is the frame in which what led to it began. (x, y) is the centre of the car in frame `tick`, or the point
     of a contact; `vertex` the intersection that it is about and `lane` the car's lane state (-1: none).
@@ -82,9 +67,9 @@ class Breach(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """What hangs over the cars after the last frame judged: obligations not met yet, by the rules' names.
+    """Pending obligations after the last frame judged, by the rules' names.
 
-    `ego` and `others` tell of the ego and of any e-agent which of these rules would be broken if all stayed as it is.
+    `ego` has the rules that the ego will break if nothing changes, `others` those that some e-agent will break.
     """
 
     ego: frozenset[str]
@@ -92,13 +77,13 @@ class Pending:
 
 
 NOTHING = Pending(frozenset(), frozenset())
-"""What hangs over the cars before the first frame."""
+"""No pending obligations, as before the first frame."""
 
 
 class Referee:
     """Judges a batch of trials, tick by tick, or the frames of one trial, block by block; the same code does both.
 
-    Trials whose problem carries no rules are passed over.
+    Trials whose problem carries no rules are skipped.
 
     Parameters
     ----------
@@ -106,10 +91,10 @@ class Referee:
         One instance per trial of the batch.
     labeller : Labeller, optional
         The labeller of the same instances that labels every frame before it is judged. Without one the referee
-        labels the frames for himself, from poses alone.
+        labels the frames itself, from poses alone.
     """
 
-    def __init__(self, instances: Sequence[Arraigned], labeller: Labeller | None = None) -> None:
+    def __init__(self, instances: Sequence[JudgedInstance], labeller: Labeller | None = None) -> None:
         problems = [instance.problem for instance in instances]
         self._own = labeller is None
         self._labeller = labeller or Labeller(instances)
@@ -125,7 +110,7 @@ class Referee:
             self._labeller.reset(state)
         trials, cars = state.x.shape
         self._log = BreachLog.empty(trials, cars, self._goals)
-        self._spacing = unknown(trials, cars)
+        self._spacing = unknown_spacing(trials, cars)
         self._tables = None
         self._judge_frame = bound(judge_frame)
         self._judge(0, state)
@@ -161,10 +146,12 @@ class Referee:
         Raises
         ------
         ValueError
-            If the referee has a whole batch or a labeller of others, or frames have been left out.
+            If the referee judges a batch or was given a labeller, or frames have been left out.
         """
         if not self._own or len(self._judged) != 1:
-            raise ValueError("a block of frames is of one trial, whose labels are the referee's own")
+            raise ValueError(
+                "judge() takes the frames of one trial, and only from a referee without a labeller"
+            )
         if not len(frames):
             return [], frames.contacts
         before, bits, breaches = self._block(frames)
@@ -177,21 +164,18 @@ class Referee:
         return sorted(breaches, key=order), contacts
 
     @property
-    def running(self) -> Sequence[Pending]:
-        """What hangs over the cars of each trial."""
-        return running(np.arange(len(self._judged)), self._terms, self._log)
+    def pending(self) -> Sequence[Pending]:
+        """The pending obligations of each trial."""
+        return pending_of(np.arange(len(self._judged)), self._terms, self._log)
 
     @property
     def entries(self) -> Rows[EntryMargins]:
-        """By how much the ego of each trial has kept rule 3."""
+        """The least margins by which the ego of each trial has kept rule 3, (B,)."""
         return self._log.entry
 
     @property
     def may_leave(self) -> npt.NDArray[np.bool_]:
-        """Which e-agents meet, with their bodies, a disc out of which some exit is free, and their time counts (E4).
-
-        Of shape (B, N).
-        """
+        """Which e-agents are, with their bodies, in a disc with a free exit in ticks that count (E4), (B, N)."""
         return self._log.car["exit_counts"] >= 0
 
     @property
@@ -201,7 +185,7 @@ class Referee:
         return (since >= 0) & (self._tick - since - paused >= self._terms["exit_ticks"][:, None])
 
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
-        """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, of these poses."""
+        """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, that of `state`."""
         found = np.zeros(state.x.shape, dtype=np.bool_)
         find_ways(self._tick, self._seeing(state), found)
         return found
@@ -242,12 +226,14 @@ class Referee:
         if frames.first == 0:
             self._state = State.zeros(1, cars)
             self._log = BreachLog.empty(1, cars, self._goals, _ROOMY)
-            self._spacing = unknown(1, cars)
+            self._spacing = unknown_spacing(1, cars)
             self._next = 0
             own.begin(1, cars)
             self._tables = None
         if self._state is None or frames.first != self._next:
-            raise ValueError(f"frames must follow one another: got {frames.first}, and none before it")
+            raise ValueError(
+                f"frames must follow one another: got a block from frame {frames.first} on before frame 0"
+            )
         self._next += len(frames)
         columns = (frames.x, frames.y, frames.c, frames.s, frames.speed, frames.yaw_rate)
         x, y, c, s, speed, yaw_rate = (np.ascontiguousarray(column) for column in columns)
@@ -267,9 +253,9 @@ class Referee:
         return before, bits, breaches
 
 
-def terms_of(problems: Sequence[WithGoals]) -> tuple[Rows[RefereeParameters], Ints]:
-    """Return the terms by which the trials of some problems are judged, (B,), and the vertices of their goals, (G,)."""
-    kinds, index = kinds_of(problems)
+def terms_of(problems: Sequence[JudgedProblem]) -> tuple[Rows[RefereeParameters], Ints]:
+    """Return the parameters by which trials of `problems` are judged, (B,), and the vertices of all goals, (G,)."""
+    kinds, index = distinct_problems(problems)
     kind_terms = pack_terms(
         [RuleParameters.from_mapping(problem.rules) for problem in kinds],
         [bool(problem.rules) for problem in kinds],
@@ -287,8 +273,8 @@ def terms_of(problems: Sequence[WithGoals]) -> tuple[Rows[RefereeParameters], In
     return terms, np.array(goals, dtype=np.int64)
 
 
-def running(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog) -> list[Pending]:
-    """Return what hangs over the cars of some trials."""
+def pending_of(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog) -> list[Pending]:
+    """Return the pending obligations of some trials."""
     runs = np.stack([breach_log.car[clock][trials] >= 0 for _, clock in _PENDING], axis=-1)
     goal: list[bool] = (breach_log.goal["since"] >= 0).tolist()
     begins, ends = terms["goals_begin"].tolist(), terms["goals_end"].tolist()
@@ -296,14 +282,14 @@ def running(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog)
     egos: list[list[bool]] = runs[:, EGO].tolist()
     others: list[list[bool]] = np.logical_or.reduce(runs[:, EGO + 1 :], axis=1).tolist()
     return [
-        _hanging(tuple(ego), tuple(other), goal_taken)
+        _pending(tuple(ego), tuple(other), goal_taken)
         for ego, other, goal_taken in zip(egos, others, taken, strict=True)
     ]
 
 
 @cache
-def _hanging(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Pending:
-    """Return what hangs over the cars whose clocks of `_PENDING` run; the trials of a batch share the few there are."""
+def _pending(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Pending:
+    """Return the pending obligations of cars of which these runs of `_PENDING` go on; equal ones are shared."""
     return Pending(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
 
 
@@ -312,13 +298,13 @@ def _named(runs: Sequence[bool]) -> frozenset[str]:
 
 
 def breach_of(found: FoundBreach, x: float, y: float) -> Breach:
-    """Return a breach of the log, of a car at (x, y)."""
+    """Return a row of the log as a Breach by a car at (x, y)."""
     car, tick, since = int(found.car), int(found.tick), int(found.since)
     return Breach(RULES[found.rule], car, tick, since, x, y, int(found.vertex), int(found.lane))
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:
-    """Return the breaches that lie in contacts: any of the ego's, and an e-agent's fault in any."""
+    """Return the breaches of rule 1 and E2 that contacts are: any contact of the ego, any e-agent's fault."""
     breaches: list[Breach] = []
     for contact in contacts:
         place = (contact.tick, contact.tick, contact.x, contact.y, NONE, NONE)

@@ -1,4 +1,4 @@
-"""The referee's look at one frame of a batch: which rules are broken in it, by whom, since when, where."""
+"""Judges one frame of a batch: which rules are broken in it, by which car, since when, where (compiled)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from dubins_traffic.cars.near import list_near
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.arrays import Bits
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
 from dubins_traffic.roads.lookup import distance2, lane_end
-from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, RefereeTables
+from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, JudgedCar, RefereeTables
 from dubins_traffic.rules.breaches import judge_entry, judge_lane, judge_road
 from dubins_traffic.rules.duties import judge_agent, judge_goals
 from dubins_traffic.rules.entry_margins import measure_entry
@@ -19,12 +19,12 @@ from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN, LabelTables, Memory, TrialRules
 
-ENTERS = FLAG.ENTERED | FLAG.IN_CROSSING
+ENTERS_CROSSING = FLAG.ENTERED | FLAG.IN_CROSSING
 
 
 @jit
 def judge_frame(tick: int, tables: RefereeTables) -> None:
-    """Add the breaches that begin in frame `tick`, which has been labelled, to the log."""
+    """Append the breaches that begin in frame `tick`, which has been labelled, to the log."""
     for b in range(tables.state.count.shape[0]):
         if tables.terms[b].judged != 0:
             judge_trial(b, tick, tables)
@@ -32,7 +32,7 @@ def judge_frame(tick: int, tables: RefereeTables) -> None:
 
 @jit
 def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
-    """Do as `judge_frame`, of trial b."""
+    """Append the breaches of trial b that begin in frame `tick`, which has been labelled, to the log."""
     labels, log = tables.labels, tables.log
     first = log.filled[0]
     count = _list_due(b, tick, tables.state.count[b], labels, tables.memory, log)
@@ -63,28 +63,39 @@ def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
 
 @jit_inline
 def _list_due(b: int, tick: int, cars: int, labels: Labels, memory: Memory, log: BreachLog) -> int:
-    """List the cars of which something may begin, end or be due in this frame in `log.look`; return how many.
+    """List the cars to be judged in this frame in `log.look`; return how many there are.
 
-    These are cars whose labels are not those of the frame before, who have got a ticket, or whose time has come; and
-    all in discs, if the ego's body comes into one or leaves it.
+    These are cars whose labels have changed, that have got a ticket, or whose `due` has come; and all cars in discs if
+    the ego's body has come into a disc or left one.
     """
     look, row = log.look, log.car[b]
     joins = labels.crosses[b, EGO] != row[EGO].crosses
     count = 0
     for n in range(cars):
         car = row[n]
-        other = (np.int64(labels.bits[b, n]) ^ car.bits) | (labels.lane[b, n] ^ car.lane)
-        other |= (labels.crosses[b, n] ^ car.crosses) | (labels.at[b, n] ^ car.at)
-        ticket = memory.car[b, n].ticket == tick
-        look[count] = n
         joined = joins & (labels.crosses[b, n] >= 0)
-        count += 1 if (other != 0) | ticket | (tick >= car.due) | joined else 0
+        look[count] = n
+        count += 0 if _is_as_before(b, n, tick, joined, car, labels, memory) else 1
     return count
+
+
+@jit_look
+def _is_as_before(
+    b: int, n: int, tick: int, joined: bool, car: JudgedCar, labels: Labels, memory: Memory
+) -> bool:
+    """Tell whether a car need not be judged: no label has changed, it has no new ticket, it is not due nor `joined`.
+
+    `joined` tells whether the car is in a disc and the ego has come into a disc or left one.
+    """
+    other = (np.int64(labels.bits[b, n]) ^ car.bits) | (labels.lane[b, n] ^ car.lane)
+    other |= (labels.crosses[b, n] ^ car.crosses) | (labels.at[b, n] ^ car.at)
+    ticket = memory.car[b, n].ticket == tick
+    return not ((other != 0) | ticket | (tick >= car.due) | joined)
 
 
 @jit_inline
 def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
-    """Judge a car of which something may have begun, and find when it has to be looked at again."""
+    """Judge car n, and set `JudgedCar.due`, the tick in which it has to be judged again."""
     labels, log, own = tables.labels, tables.log, tables.rules[b]
     car = log.car[b, n]
     bits = np.int64(labels.bits[b, n])
@@ -97,7 +108,7 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
         car.left_since = -1
         car.free_since = -1
         car.unblocked_since = -1
-    if bits & ENTERS == ENTERS:
+    if bits & ENTERS_CROSSING == ENTERS_CROSSING:
         stopped = False
         if car.bits & FLAG.STOPPED != 0:
             stopped = lane_end(tables.roads, own.net, car.lane) == v
@@ -116,14 +127,14 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
 
 @jit_inline
 def _surely_left(bits: Any, reach: float, was: bool, own: TrialRules) -> bool:
-    """Tell whether a car is left, and was or not before, by limits that are eased for it."""
+    """Tell whether a car is left by limits eased by GRAIN in its favour; `was`: it was left in the frame before."""
     limit = own.left_release if was else own.left_set
     return bits & FLAG.LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
 
 
-@jit
+@jit_rare
 def _by_the_road(b: int, tables: RefereeTables) -> bool:
-    """Tell whether the ego is off the road by no more than rounding can be."""
+    """Tell whether the ego is off the road by no more than GRAIN."""
     roads, net = tables.roads, tables.rules[b].net
     far = roads.half_width[net] + GRAIN
     x, y = float(tables.state.x[b, EGO]), float(tables.state.y[b, EGO])
@@ -132,7 +143,7 @@ def _by_the_road(b: int, tables: RefereeTables) -> bool:
 
 @jit
 def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: RefereeTables) -> None:
-    """Rule 3, of a car that enters crossing v and had `stopped` there in the frame before, or not."""
+    """Judge rule 3 for car n, which enters crossing v; of the ego, also measure the margins."""
     roads, spacing = tables.roads, tables.spacing
     row: int = roads.vert_off[tables.rules[b].net] + v
     far = tables.terms[b].lone + 2.0 * spacing.drift[b]
@@ -153,10 +164,10 @@ def judge_frames(
     labelling: LabelTables,
     judging: RefereeTables,
 ) -> int:
-    """Label and judge frames of one trial from row `begin` on; return the row after the last.
+    """Label and judge frames of one trial from row `begin` (row) on; return the row after the last.
 
-    Row f, frame `first` + f, of `poses` (F, N) says where the cars are. The flags found are written to `bits` (F, N).
-    Ends early when there may not be room in the log for another frame, which needs `room` rows.
+    Row f of `poses` (F, N) is frame `first` (tick) + f. The flags found are written to `bits` (F, N). It ends early
+    when the log may have too few rows for another frame, which needs `room` (rows).
     """
     state, log, flags = judging.state, judging.log, judging.labels.bits
     for f in range(begin, bits.shape[0]):

@@ -1,4 +1,4 @@
-"""The body of a car against discs and lanes."""
+"""Geometry of a car's body relative to discs and lanes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dubins_traffic.kernels.compile import jit
 def distance2_to_body(
     px: float, py: float, x: float, y: float, c: float, s: float, half_length: float, half_width: float
 ) -> float:
-    """Return the squared distance of (px, py) from a body without its rounding."""
+    """Return the squared distance of (px, py) from a body without its rounding, square metres."""
     qx, qy = nearest_in_box(px, py, Box(x, y, c, s, half_length, half_width, 0.0))
     return (px - qx) * (px - qx) + (py - qy) * (py - qy)
 
@@ -19,7 +19,7 @@ def distance2_to_body(
 def half_extent(
     tx: float, ty: float, c: float, s: float, half_length: float, half_width: float, rounding: float
 ) -> float:
-    """Return half the extent of a body across the direction (tx, ty)."""
+    """Return half the extent of a body across the direction (tx, ty), metres."""
     along = abs(c * ty - s * tx)
     across = abs(c * tx + s * ty)
     return along * half_length + across * half_width + rounding

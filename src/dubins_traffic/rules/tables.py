@@ -1,4 +1,4 @@
-"""What the kernels of this room read and write: the rules of each trial, and what the cars' past has left behind."""
+"""The labeller's tables: the rules of each trial, and the memory of cars and trials."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 GRAIN = 1e-9
-"""Metres by which limits that a judgement compares are eased for the car that would be in breach.
+"""Metres by which the limits of a judgement are eased in favour of the car that would be in breach.
 
-The tolerance of docs/rules.md#tolerance. It is added to the distance of `still`, and taken from that of `lingers`, too:
-cars often go exactly that far, and rounding must not decide.
+The tolerance of docs/rules.md#tolerance. It is also added to the distance of `still` and taken from that of `lingers`,
+since cars often drive exactly that far and rounding must not decide.
 """
 NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
@@ -35,10 +35,10 @@ NEVER_AGAIN = 1e300
 
 @record
 class TrialRules:
-    """The rules of one trial: metres, but for those that end in 2, square metres, and those that end in ticks."""
+    """The rules of one trial: metres; square metres where the name ends in 2; ticks where it ends in ticks."""
 
     radius: float
-    """R, of the intersections' discs."""
+    """R, the radius of the intersections' discs."""
     half_length: float
     half_width: float
     rounding: float
@@ -51,17 +51,17 @@ class TrialRules:
     left_set: float
     left_release: float
     cross2: float
-    """Squared distance of the body, without its rounding, from a vertex, nearer than which it meets the disc."""
+    """The body meets a disc if its squared distance from the vertex, without its rounding, is less."""
     approach2: float
-    """As `cross2`: up to there it approaches."""
+    """As `cross2`, for `approach`."""
     stop2: float
-    """As `cross2`: up to there it may stop."""
+    """As `cross2`, for getting `stopped`."""
     queue2: float
-    """As `cross2`: up to there it keeps its place."""
+    """As `cross2`, for keeping the place in the queue."""
     stop_move2: float
-    """Squared distance up to which a car has moved that has stopped."""
+    """A car that has moved at most this far in `stop_ticks`, squared, has stopped."""
     stand_move2: float
-    """Squared distance up to which a car has moved that is still."""
+    """A car that has moved at most this far in `stand_ticks`, squared, is still."""
     excuse: float
     blocked_ahead: float
     overtaking_behind: float
@@ -69,7 +69,7 @@ class TrialRules:
     linger_growth: float
     """A car whose greatest progress has grown by less in `linger_ticks` lingers."""
     hem2: float
-    """Squared distance of the centre of a car up to which it may hem in one that overtakes."""
+    """A car may hem in one that overtakes if the squared distance of their centres is at most this."""
     net: int
     """Number of the trial's roads in the table of the batch."""
     stop_ticks: int
@@ -80,12 +80,12 @@ class TrialRules:
     crossing_degree: int
     """Least degree of a vertex that is a crossing."""
     judged3: int
-    """Whether entries against rule 3 count."""
+    """Whether entries against rule 3 count as breaches, 0 or 1."""
 
 
 @record
 class CarMemory:
-    """What the propositions remember of one car: metres in its lane state, 0 without one; ticks, -1: there is none."""
+    """The labeller's memory of one car: metres in its lane (0 without lane state), and ticks (-1 for none)."""
 
     top: float
     """Greatest progress since the lane state was set."""
@@ -110,58 +110,64 @@ class CarMemory:
     left_since: int = -1
     """Tick in which it became left."""
     stirred: int = -1
-    """Latest tick in which it was not still, of those in which anybody is left."""
+    """Latest tick in which it was not still, of those in which some car is left."""
     rank: int = -1
     """Place in the order of the crossing ahead, 0 first; -1 without a ticket."""
     zone: int = -1
-    """Whether it is where cars approach and queue, 0 or 1; -1 before the first frame."""
+    """Whether it is near enough to a crossing to approach or queue, 0 or 1; -1 before the first frame."""
     next_in_lane: int = -1
     next_on_segment: int = -1
     next_in_queue: int = -1
     """The car after this one in the list of its lane, its segment, its queue; -1: none. All but the first: scratch."""
     in_group: int = 0
-    """Scratch: whether its ticket has come into a group while a queue is put in order."""
+    """Scratch: whether it is in a group while its queue is put in order."""
 
 
 @record
 class Heads:
-    """The first cars of lists, -1: none. Row k: of lane k, of segment k, of the queue at vertex k."""
+    """The first cars of lists, -1: none. Row k holds those of lane k, of segment k, and of the queue at vertex k.
+
+    Attributes
+    ----------
+    lane, segment, queue : int
+        A car, 0 to N - 1; the last two are scratch.
+    crossers : int
+        How many cars cross vertex k.
+    """
 
     lane: int = -1
     segment: int = -1
-    """Scratch."""
     queue: int = -1
-    """Scratch."""
     crossers: int = 0
-    """How many cars cross vertex k."""
 
 
 @columns(BLOCK)
-class Kept:
-    """Of BLOCK cars, number by number: where what a car's place says is the same, and what is found of it in a frame.
+class ValidRegions:
+    """The regions in which the cached labels of BLOCK cars are valid, and what a frame's check of them has found.
 
-    The loop over the cars of `rules.label_cache.look_who_holds` reads and writes these columns several cars at once.
+    `rules.label_cache.check_label_caches` reads and writes these columns for several cars at once. Lengths are in
+    metres.
     """
 
     valid_low_x: Floats
     valid_high_x: Floats
     valid_low_y: Floats
     valid_high_y: Floats
-    """A rectangle in which labels are the same, as far as the nearest segment is."""
+    """The labels are valid in this rectangle, and ..."""
     vertex_x: Floats
     vertex_y: Floats
     ring_low: Floats
     ring_high: Floats
-    """They are so, too, at squared distances from a vertex between these two only."""
+    """... where the squared distance from this vertex is between `ring_low` and `ring_high`, ..."""
     from_x: Floats
     from_y: Floats
     axis_x: Floats
     axis_y: Floats
     base: Floats
     sign: Floats
-    """How far a car is in its lane: `base` and `sign` times the metres from a point along an axis."""
+    """Progress in the lane is `base` plus `sign` times the distance from (`from_x`, `from_y`) along the axis."""
     top_so_far: Floats
-    """The most of that so far."""
+    """The greatest progress so far."""
     arm_x: Floats
     arm_y: Floats
     right_x: Floats
@@ -169,60 +175,59 @@ class Kept:
     left_x: Floats
     left_y: Floats
     arm_least: Floats
-    """Where the nearest of the roads that meet in the vertex is the same: where all three products of these vectors and
-    the way from the vertex are greater than the last, metres."""
+    """... where the nearest road at the vertex is the same: the products of each of these three vectors with that from
+    the vertex to the car are greater than `arm_least` (m), ..."""
     aside_low: Floats
     aside_high: Floats
     along_low: Floats
     along_high: Floats
-    """Between which metres to the left of the axis, and along it, a car is on the road and not left as it is now."""
+    """... and between these offsets to the left of the axis, and along it."""
     here_x: Floats
     here_y: Floats
     then_x: Floats
     then_y: Floats
-    """Where it is in this frame and where it was `stand_time` ago."""
+    """Where the car is in this frame, and where it was `stand_time` ago."""
     away2: Floats
-    """Its squared distance from the vertex."""
+    """Its squared distance from the vertex in this frame."""
     way_so_far: Floats
-    """Its progress."""
+    """Its progress in this frame."""
     holds: Floats
-    """Whether it holds on to its labels: 0, 1, or `rules.label_cache.IF_NEAREST`."""
+    """Whether its cached labels are valid: 0, 1, or `rules.label_cache.IF_NEAREST`."""
     was_still: Floats
     top_then: Floats
     """The greatest progress `linger_time` ago."""
     lingers_from: Floats
-    """The tick from which on that says whether the car lingers."""
+    """The tick from which on a car with little growth since `top_then` lingers."""
     was_lingering: Floats
 
 
 class Memory(Tables):
-    """What the propositions remember, all of it explicit.
+    """The labeller's memory from frame to frame.
 
     Attributes
     ----------
     car : (B, N) CarMemory
-        What is remembered of each car.
+        The memory of each car.
     cell : (B, N) ValidCell
-        A rectangle about the place where the centre was last looked up, in which nearest segment and vertex are the
-        same for certain.
-    kept : (B, ceil(N / BLOCK)) Kept
-        Where labels are the same for certain, in columns: car n is number n % BLOCK of block n // BLOCK.
+        A rectangle in which the nearest segment and vertex, as last looked up, are certain to be the same.
+    kept : (B, ceil(N / BLOCK)) ValidRegions
+        Regions in which cached labels are valid, in columns: car n is number n % BLOCK of block n // BLOCK.
     trail_x, trail_y : (B, M, N) float64
         Positions at the last M ticks, metres, tick k in row k mod M.
     growth : (B, L, P) float64
         `top` of the cars, in P places, a multiple of WIDE, at the last ticks, as many as `linger_time` has in the
         trial: tick k in row k mod that number.
     head : (B, H) Heads
-        Where the lists of cars begin.
+        The first cars of the lists.
     due : (B, N) int64
-        Scratch: which cars are to be looked at in this frame, in order.
+        Scratch: the cars that may be near a crossing in this frame, by index.
     member : (B, N) int64
         Scratch: the members of a queue, lowest index first.
     """
 
     car: Grid[CarMemory]
     cell: Grid[ValidCell]
-    kept: Grid[Kept]
+    kept: Grid[ValidRegions]
     trail_x: Floats
     trail_y: Floats
     growth: Floats
@@ -239,7 +244,7 @@ class Memory(Tables):
         return Memory(
             car=table(CarMemory, (trials, cars)),
             cell=table(ValidCell, (trials, cars)),
-            kept=table(Kept, (trials, -(-cars // BLOCK))),
+            kept=table(ValidRegions, (trials, -(-cars // BLOCK))),
             trail_x=np.zeros((trials, depth, cars)),
             trail_y=np.zeros((trials, depth, cars)),
             growth=np.zeros((trials, linger, -(-cars // WIDE) * WIDE)),
@@ -250,7 +255,7 @@ class Memory(Tables):
 
 
 class LabelTables(Tables):
-    """All that labels of a batch are found from, and the labels: what `rules.frame.label_frame` takes."""
+    """The tables that `rules.frame.label_frame` takes: the state of a batch, its roads and rules, memory and labels."""
 
     state: State
     roads: RoadTable
@@ -266,7 +271,7 @@ def ticks(duration: float, rate: float) -> int:
 
 
 def spread(rows: Rows[R], index: Ints) -> Rows[R]:
-    """Return the rows of these numbers, (B,), as a table of their own."""
+    """Return a new table (B,) whose row b is row `index[b]` of `rows`."""
     return cast(Any, rows)[index]
 
 

@@ -29,41 +29,21 @@ docs/rules.md#E6. A problem without rules has the task of 2016: every goal again
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterable, Sequence
 
 from dubins_traffic.logic.exports import Specification
 from dubins_traffic.logic.formula import Formula, conj, disj, implies, negation, prop, propositions
 from dubins_traffic.logic.temporal import always, eventually, yesterday
-from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.judged import JudgedProblem
 from dubins_traffic.rules.parameters import RuleParameters
 
 Point = tuple[float, float]
 
 _OF_ENVIRONMENT = ("overtaking", "hemmed", "clear", "ahead")
-"""What is said of the ego but is up to the others."""
+"""Propositions about the ego whose truth depends on the other cars."""
 
 
-class Stated(Protocol):
-    """What the task depends on in a problem (`problem.instance.Problem`)."""
-
-    @property
-    def network(self) -> RoadNetwork:
-        """The roads."""
-        ...
-
-    @property
-    def goals(self) -> Sequence[Point]:
-        """Lattice points."""
-        ...
-
-    @property
-    def rules(self) -> Mapping[str, Any]:
-        """Parameters by name; empty if not judged."""
-        ...
-
-
-def task(problem: Stated, names: Sequence[str]) -> Specification:
+def task(problem: JudgedProblem, names: Sequence[str]) -> Specification:
     """Return the task: what is assumed of the e-agents, and what the ego must guarantee.
 
     Parameters

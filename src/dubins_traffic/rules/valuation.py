@@ -1,9 +1,9 @@
-"""Which propositions hold in which frame: what `rules.vocabulary` names, found from poses and contacts."""
+"""Finds which propositions of `rules.vocabulary` hold in which frame, from poses and contacts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,11 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.rules.exceptions import Exceptions
+from dubins_traffic.rules.judged import JudgedInstance
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG, NAMES
-from dubins_traffic.rules.referee import Arraigned, Breach, Referee
+from dubins_traffic.rules.referee import Breach, Referee
 from dubins_traffic.rules.vocabulary import (
     AT,
     FREE,
@@ -30,20 +31,11 @@ from dubins_traffic.rules.vocabulary import (
 Mask = npt.NDArray[np.bool_]
 
 _E1: Final = ("2", "3")
-"""How the names of the rules begin that e-agents break as E1."""
-
-
-class Named(Arraigned, Protocol):
-    """What is asked of an instance (`problem.instance.Instance`)."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the cars, the ego's first."""
-        ...
+"""First characters of the names of the rules that make up E1."""
 
 
 class _Scene(NamedTuple):
-    """What is known of a block of frames, (F, N) each; `bits` as in `Labels`."""
+    """What has been found in a block of frames, arrays (F, N); `bits` as in `Labels`."""
 
     at: Ints
     crosses: Ints
@@ -85,7 +77,7 @@ class _Scene(NamedTuple):
 class Valuation:
     """Finds propositions in the frames of one trial, block by block from frame 0.
 
-    Labels and faults are found again from the poses, as the referee does, whoever recorded the trial.
+    Labels and faults are found again from the poses, as the referee does; those in a record are not used.
 
     Parameters
     ----------
@@ -97,10 +89,10 @@ class Valuation:
     Raises
     ------
     FormulaError
-        If the problem lacks one of them.
+        If the problem has no proposition of one of these names.
     """
 
-    def __init__(self, instance: Named, names: Sequence[str]) -> None:
+    def __init__(self, instance: JudgedInstance, names: Sequence[str]) -> None:
         problem = instance.problem
         vocabulary = Vocabulary(problem, instance.names)
         self._wanted = [vocabulary[name] for name in names]

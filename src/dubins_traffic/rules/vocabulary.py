@@ -1,4 +1,4 @@
-"""The propositions of which formulas about the trials of a problem may be made.
+"""The propositions that formulas about the trials of a problem may use.
 
 i stands for the name of a car, x and y for a lattice point. Beside those of the task (`rules.task`) there are:
 
@@ -22,19 +22,19 @@ only of e-agents.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 from dubins_traffic.cars.state import EGO, NONE
 from dubins_traffic.logic.formula import FormulaError
-from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.judged import JudgedProblem
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import NAMES
 
 OF_CAR: Final = (*NAMES, "collision", "at_fault")
 OF_JUDGED: Final = ("way", "exit", "stays", "renewed", "excess")
-"""There are these only where the rules are judged."""
+"""Propositions of problems that are judged by the rules only."""
 OF_INTERSECTION: Final = ("cross", "enter", "clear", "visit")
 OF_CROSSING: Final = ("approach", "stopped", "ahead", "first", "forfeited")
 AT: Final = "at"
@@ -44,11 +44,11 @@ FREE: Final = "free"
 VISIT: Final = "visit"
 
 _MOST_CARS: Final = 20
-"""How many cars are looked through for a name like an unknown one."""
+"""Most cars among whose propositions a name similar to an unknown one is looked for."""
 
 
 class Proposition(NamedTuple):
-    """What a proposition says: `word` of the car with index `car` (-1: of none) and of a place.
+    """A parsed proposition: `word` about the car with index `car` (-1: none) and a place.
 
     `place` is the number of an intersection, for `SEGMENT` of a segment and for `LANE` of a lane; -1 if there is none.
     """
@@ -56,20 +56,6 @@ class Proposition(NamedTuple):
     word: str
     car: int
     place: int
-
-
-class Peopled(Protocol):
-    """What the propositions depend on in a problem (`problem.instance.Problem`)."""
-
-    @property
-    def network(self) -> RoadNetwork:
-        """The roads."""
-        ...
-
-    @property
-    def rules(self) -> Mapping[str, Any]:
-        """Parameters by name; empty if not judged."""
-        ...
 
 
 class Vocabulary:
@@ -83,7 +69,7 @@ class Vocabulary:
         Names of the cars, the ego's first.
     """
 
-    def __init__(self, problem: Peopled, names: Sequence[str]) -> None:
+    def __init__(self, problem: JudgedProblem, names: Sequence[str]) -> None:
         network = problem.network
         rules = RuleParameters.from_mapping(problem.rules)
         self._cars = {name: car for car, name in enumerate(names)}
@@ -147,11 +133,11 @@ class Vocabulary:
             yield Proposition(LANE, car, 2 * back + 1)
 
     def _car(self, rest: str, name: str) -> int | None:
-        """Return the index of the car called `rest`, None if nothing was taken off `name` or there is no such car."""
+        """Return the index of the car called `rest`; None if there is none, or if `rest` is all of `name`."""
         return None if rest == name else self._cars.get(rest)
 
     def _like(self, name: str) -> str:
-        """Return a name that there is, as much like `name` as can be found."""
+        """Return the existing name that is most similar to `name`."""
         place = re.search(r"(_\d+_\d+)?$", name)
         end = place[0] if place else ""
         cars = list(self._cars)[:_MOST_CARS]

@@ -1,1 +1,1 @@
-"""Putting a run together: what a path holds, which trials come of it, and how they are run one by one."""
+"""Runs: what a path holds, which trials follow from it, and how they are run one by one or in processes."""

@@ -1,4 +1,4 @@
-"""What there is to choose from, with all parameters, read off the code: for people, machines and a page."""
+"""The catalogue of all that can be chosen (e-agents, rules, controllers, ...), with parameters, read from the code."""
 
 from __future__ import annotations
 
@@ -35,13 +35,14 @@ UNITS: Final = {
     "_degree": "roads",
     "tickets": "tickets",
     "exceptions": "breaches",
+    "edition": "",
 }
-"""What a parameter of the rules is counted in, by the end of its name; the rest are metres, and switches."""
+"""The unit of a parameter of the rules, by the end of its name; all others are in metres, or switches."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter: its name, its default (None where it must be given or is null), whether it must be, its meaning."""
+    """A parameter: name, default (None if it is required or null), whether it is required, unit and meaning."""
 
     name: str
     default: Any
@@ -56,7 +57,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something to choose: its name, a line of description, its parameters, and remarks."""
+    """Something that can be chosen: its name, a line of description, its parameters, and remarks."""
 
     name: str
     line: str
@@ -129,7 +130,7 @@ def simulators() -> tuple[Entry, ...]:
 
 
 def metrics() -> tuple[Entry, ...]:
-    """Return the metrics of this and other packages that are told where they are asked for, with what they tell."""
+    """Return the optional metrics of this and other packages, with the columns that each adds."""
     found: list[Entry] = []
     for name, line in metric_names().items():
         told = (f"{own.name}: {own.meaning or own.heading}" for own in columns([name]))
@@ -154,7 +155,7 @@ def _unit(name: str) -> str:
 
 
 def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
-    """Return the strings that stand below the attributes of a class."""
+    """Return the docstrings of the attributes of a class, by name."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
     found: dict[str, str] = {}
@@ -170,7 +171,7 @@ def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
 
 
 def _line(configuration: Configuration) -> str:
-    """Return what a configuration asks for, in a line."""
+    """Return a configuration as one line of text."""
     own = configuration.settings
     goals = _bounds([len(own.goals)] * 2 if own.goals is not None else own.number_goals_bounds)
     seconds = _bounds([own.duration] * 2 if own.duration is not None else own.duration_bounds)

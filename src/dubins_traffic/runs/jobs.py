@@ -1,4 +1,4 @@
-"""Many trials, in this process or in several, with the same results in any order."""
+"""Runs many trials, in this process or in several; the results do not depend on processes or order."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import TYPE_CHECKING
 
 from dubins_traffic.controllers import registry as controllers
@@ -19,6 +20,7 @@ from dubins_traffic.errors import DubinsTrafficError, WorkerLostError
 from dubins_traffic.files import locked
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.runs.parent_watch import prepare_worker
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.simulators import registry as simulators
 
@@ -29,17 +31,19 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.protocols import Ending
 
+DEAF_TO = (signal.SIGINT, signal.SIGTERM)
+"""Signals that are held back while workers are started."""
 MOST_BARREN = 3
-"""Processes are not started again after so many that ended in a row without a result."""
+"""Number of crews of processes in a row that may end without a result before none is started again."""
 MOST_NAMED = 10
-"""So many trials are named in a message, at most."""
+"""Most trials that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """One trial to run: an instance, or the configuration, seed and number to draw it from.
 
-    `instance` is drawn where the job runs, so that jobs are small to send.
+    Without `instance` it is drawn where the job runs, so that jobs are small to send to processes.
     """
 
     trial: int
@@ -75,31 +79,31 @@ class Job:
 
     @property
     def called(self) -> str:
-        """What messages call the job."""
+        """The job's name in messages."""
         return f"trial {self.trial}" if self.record is None else f"trial {self.trial} ({self.record.name})"
 
 
 class _Watch:
-    """A sink that interrupts its trial when the campaign has been interrupted."""
+    """A sink that interrupts its trial once `cancelled` is set."""
 
     def __init__(self, cancelled: Event) -> None:
         self._cancelled: Event | None = cancelled
 
     def begin(self, instance: Instance) -> None:
-        """Nothing has run yet."""
+        """Do nothing."""
 
     def frames(self, frames: Frames) -> None:  # noqa: ARG002  # what they hold is no matter here
-        """Look once a simulated second, and interrupt once."""
+        """Raise KeyboardInterrupt, once, if `cancelled` is set; called for every simulated second."""
         if self._cancelled is not None and self._cancelled.is_set():
             self._cancelled = None
             raise KeyboardInterrupt
 
     def end(self, ending: Ending) -> None:
-        """Nothing is left to interrupt."""
+        """Do nothing."""
 
 
 def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
-    """Run `jobs` and yield their results as they come.
+    """Run `jobs` and yield the result of each when it has ended.
 
     With one worker they run here, in order; with more, in that many processes. What a trial does never depends on
     where or when it ran. On Ctrl-C running trials end as interrupted, nothing new begins, and KeyboardInterrupt
@@ -108,8 +112,8 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     Raises
     ------
     WorkerLostError
-        If processes ended in the middle of trials, whose controllers left them so or which were killed. All other
-        trials have been run then; the message names those that came to nothing.
+        If processes ended in the middle of trials: the controller ended its process, or the process was killed. All
+        other trials have been run then; the message names those without a result.
     InputError
         If a folder in which records are to be kept is in use by another process.
     """
@@ -124,7 +128,7 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
 
 
 def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """Run jobs in processes; the jobs that were under way when a process died run again, each by itself."""
+    """Run jobs in processes; jobs that were under way when a process died are run again, one at a time."""
     waiting, suspects, dead = deque(jobs), deque[Job](), list[Job]()
     barren = 0
     crew = _Crew(min(workers, len(jobs)))
@@ -138,7 +142,9 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
             barren = 0 if results else barren + len(lost[:1])
         barren = 0
         while suspects and barren < MOST_BARREN:
-            crew.submit(replace(suspects[0], overwrite=True))  # what it may find there is its own
+            crew.submit(
+                replace(suspects[0], overwrite=True)
+            )  # a record that exists already is one that this job began
             results, lost = crew.wait()
             yield from results
             dead += [suspects.popleft()] if lost else []
@@ -152,7 +158,7 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
 
 
 def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
-    """Return the message on jobs whose processes ended in the middle of them; for that `left` jobs were not run."""
+    """Return the message about jobs whose processes ended in their middle; `left` other jobs were therefore not run."""
     named = ", ".join(job.called for job in dead[:MOST_NAMED])
     more = f" and {len(dead) - MOST_NAMED} more" if len(dead) > MOST_NAMED else ""
     rest = f"; {left} trials were not run" if left else ""
@@ -160,7 +166,7 @@ def _lost_jobs_text(dead: Sequence[Job], left: int) -> str:
 
 
 class _Crew:
-    """Processes that run jobs. When a process has died, all are replaced, and the jobs under way are lost."""
+    """A pool of processes that run jobs. When one dies, all are replaced and the jobs under way are lost."""
 
     def __init__(self, workers: int) -> None:
         self.under_way: dict[Future[Result], Job] = {}
@@ -170,7 +176,7 @@ class _Crew:
         self._pool = self._new()
 
     def submit(self, job: Job) -> None:
-        """Let a job be run; if the processes have just ended it is lost, as `wait` will tell."""
+        """Submit a job; if the processes have just died it is lost, and `wait` returns it as such."""
         try:
             with deaf_to_interrupts():
                 future = self._pool.submit(_run, job)
@@ -180,7 +186,7 @@ class _Crew:
         self.under_way[future] = job
 
     def wait(self) -> tuple[list[Result], list[Job]]:
-        """Return results as soon as there are some, and the jobs that were lost with a process."""
+        """Wait until there are results or losses; return the results, and the jobs that were lost with a process."""
         done, _ = wait(self.under_way, return_when=FIRST_COMPLETED)
         broken = any(isinstance(future.exception(), BrokenProcessPool) for future in done)
         if broken:
@@ -199,7 +205,7 @@ class _Crew:
         return results, sorted(lost, key=lambda job: job.trial)
 
     def close(self) -> None:
-        """Interrupt what is under way, after at most one simulated second, and end the processes."""
+        """Interrupt the jobs under way, after at most one simulated second, and end the processes."""
         self._cancelled.set()
         self._pool.shutdown(cancel_futures=True)
 
@@ -211,21 +217,37 @@ class _Crew:
 
 @contextmanager
 def deaf_to_interrupts() -> Generator[None]:
-    """Hold Ctrl-C back while workers are started; workers inherit this, so Ctrl-C reaches the parent alone."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Hold Ctrl-C and SIGTERM back while workers are started; what came is heard afterwards.
+
+    Workers inherit this, so Ctrl-C reaches the parent alone; `prepare_worker` lets them hear SIGTERM again. Other
+    threads of this process may take a signal in the meantime, so that holding it back in this one is not enough.
+    """
+    came: list[int] = []
+    heard = (
+        {number: signal.getsignal(number) for number in DEAF_TO} if current_thread() is main_thread() else {}
+    )
+    handlers = {number: handler for number, handler in heard.items() if callable(handler)}
+    for number in handlers:
+        signal.signal(number, lambda number, _frame: came.append(number))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, DEAF_TO)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in came[:1]:
+            handlers[signal.Signals(number)](number, None)
 
 
 _cancelled: Event | None = None
 
 
 def _begin(cancelled: Event) -> None:
-    """Prepare a worker: the parent alone hears Ctrl-C and passes it on."""
+    """Prepare a worker process: Ctrl-C interrupts the parent alone, which sets `cancelled`."""
     global _cancelled  # noqa: PLW0603  # a worker's only state, set once
     _cancelled = cancelled
+    prepare_worker()
 
 
 def _run(job: Job) -> Result:
@@ -233,5 +255,5 @@ def _run(job: Job) -> Result:
         return job.run(_cancelled)
     except KeyboardInterrupt:
         raise DubinsTrafficError(f"trial {job.trial} was interrupted") from None
-    except SystemExit as error:  # handed on, it would end the program as if all were well
+    except SystemExit as error:  # passed on, SystemExit would end the worker as if nothing had gone wrong
         raise DubinsTrafficError(f"{job.called} ended its process (status {error.code})") from error

@@ -1,19 +1,31 @@
-"""Processes that end with the one that started them, however that one ends."""
+"""Ends a process when its parent process has ended, however that has happened."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import sys
 import threading
 from multiprocessing import connection
+from multiprocessing.util import Finalize
+
+from dubins_traffic.runs.left_threads import end_despite_threads
 
 
-def end_with_parent() -> None:
-    """End this process, at once, when its parent has ended: nobody is left to take results."""
-    threading.Thread(target=_wait, daemon=True).start()
+def prepare_worker() -> None:
+    """Let this process, which runs trials for another one, end with that one and whatever controllers leave behind.
+
+    What controllers print goes to standard error.
+    """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    sys.stdout = sys.stderr
+    Finalize(None, end_despite_threads, exitpriority=0)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _wait() -> None:
+def _end_with_parent() -> None:
+    """Wait until the parent has ended and no one is left to take results, and end at once."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])

@@ -1,8 +1,8 @@
 """Plans of runs: the jobs that run the trials of a configuration, an instance or a record.
 
-All of them are known beforehand, each can run in any process and in any order. A session over a transport is another
-thing, though a user names its trials alike (`sessions.plan`): its trials are drawn one after another, without end if
-need be, for whoever drives, and share one line to them. What is the same of both stands here.
+All jobs of a plan are known beforehand, and each can run in any process and in any order. A session over a transport
+has a plan of another kind (`sessions.plan`), though the user names its trials in the same way: its trials are drawn one
+after another, endlessly if asked, and share one connection to the drivers. What both need stands here.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration
@@ -31,13 +32,16 @@ from dubins_traffic.simulators import registry as simulators
 
 DEFAULT_CONTROLLER = "lanes"
 MOST_RUNS = 1_000_000
+DUBINS_ONLY = ("rules", "synthesized")
+"""Built-in controllers that support the Dubins car only; the shield does, too."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be run: `jobs`, in order; what they are drawn from, if from a configuration; and since when.
+    """The jobs to run, in order, and what is needed to conclude them.
 
-    `before` is how many trials are not run since their records are there.
+    `configuration` is the one from which trials are drawn, if any; `data` the trial data file to write; `before` the
+    number of runs that are left out since their records exist; `began` the time at which the plan was made.
     """
 
     jobs: tuple[Job, ...]
@@ -93,7 +97,7 @@ def plan(
     sandbox: str | None = None,
     metrics: Sequence[str] = (),
 ) -> Plan:
-    """Return what is to be run, checked as far as can be before anything runs.
+    """Return the plan of a run, with everything checked that can be checked before a trial runs.
 
     Parameters
     ----------
@@ -102,48 +106,50 @@ def plan(
     controller : str, optional
         A built-in name, ``module:Class`` or ``path/to/file.py:Class``; by default `lanes`, and for a record its own.
     trials : int, optional
-        How many trials of a configuration, from number 0; by default as many as it says.
+        Number of trials of a configuration, from number 0 on; by default as many as it says.
     repeat : int
-        How many times each trial is run.
+        Number of times that each trial is run.
     seed : int, optional
-        Of a configuration, or of an instance that has none; 0 by default.
+        Seed of a configuration's trials, or of an instance document without one; 0 by default.
     rnd : path, optional
-        A road network description instead of the configuration's.
+        A road network description that replaces the configuration's.
     data : path, optional
-        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+        File for the trial data of a configuration; refused if it exists unless `overwrite_data`.
     records : path, optional
         Folder for the records, made if missing: ``trial-0000.mcap`` for trial 0; with `repeat`,
         ``trial-0000-0000.mcap`` for its first run. A folder that holds records is refused, unless one of the following.
     overwrite : bool
-        Whether records that the folder holds are removed before.
+        Whether to remove the records that the folder holds first.
     append : bool
-        Whether they stay, and their trials are not run again; they must be of the same controller and instances.
+        Whether to keep the records that the folder holds and run only the other trials; they must be of the same
+        controller and instances.
     deadline : float, optional
         Wall-clock seconds within which each `act` must answer.
     simulator : str, optional
-        Its name, instead of that in the source.
+        Name of the simulator; by default that in the source.
     show : bool
         Whether the simulator shows the trials in a window of its own, at the pace of the clock.
     shield : bool
         Whether the controller drives under the shield (`controllers.shield`).
     sandbox : str, optional
-        What it may use in a box (`controllers.registry.sandboxed`); by default it drives in this process.
+        Limits of the box in which the controller drives (`controllers.registry.sandboxed`); by default it drives in
+        this process.
     metrics : sequence of str
         Further metrics: names, ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises
     ------
     InputError
-        If anything of this is wrong; then nothing has been written.
+        If an argument or the source is wrong; nothing has been written then.
     """
     found = load_runnable(source, rnd=rnd, seed=seed or 0)
-    own = found.controller if isinstance(found, Record) else None
-    named = own or DEFAULT_CONTROLLER if controller is None else controller
+    named = _default_controller(found) if controller is None else controller
     controller = controllers.dressed(named, shield=shield, sandbox=sandbox)
     controllers.load(controller)
     scores.columns(metrics)
     _check_deadline(deadline)
     check_choice(records, data, overwrite=overwrite, append=append)
+    configuration = None
     if isinstance(found, Configuration):
         configuration = found if simulator is None else found.with_simulator(simulator)
         count = found.number_trials if trials is None else trials
@@ -151,28 +157,27 @@ def plan(
         jobs = _drawn(configuration, controller, count, seed or 0)
     else:
         _check_count(1, repeat)
-        configuration = None
         given = found.instance if isinstance(found, Record) else found
-        instance = replace(given, simulator=simulator or given.simulator)
-        other_seed = None if seed == instance.seed else seed
+        other_seed = None if seed == given.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
+        instance = replace(given, simulator=simulator or given.simulator)
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if (first := jobs[0].instance) is not None:
-        check_simulator("--simulator" if simulator else os.fspath(source), first.simulator, show=show)
+        _check_first(os.fspath(source), first, controller, named=simulator is not None, show=show)
     target = None if data is None else check_data_file(Path(data), overwrite_data)
     jobs = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job in jobs]
     if records is None:
         return Plan(tuple(job for job in jobs for _ in range(repeat)), configuration, target)
     folder = check_folder(records)
     kept = claim(folder, controller, _instances(jobs, seed or 0), overwrite=overwrite, append=append)
-    left = [job for job in _recorded(jobs, folder, repeat) if job.record and job.record.name not in kept]
-    return Plan(tuple(left), configuration, target, len(jobs) * repeat - len(left))
+    remaining = [job for job in _recorded(jobs, folder, repeat) if job.record and job.record.name not in kept]
+    return Plan(tuple(remaining), configuration, target, len(jobs) * repeat - len(remaining))
 
 
 def load_runnable(
     source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None, seed: int
 ) -> Configuration | Instance | Record:
-    """Return what `sources.load` does, if trials can be run of it.
+    """Return what `sources.load` returns, unless it is a road network, of which no trials can be run.
 
     Raises
     ------
@@ -186,22 +191,27 @@ def load_runnable(
     return found
 
 
+def _default_controller(found: Configuration | Instance | Record) -> str:
+    """Return the controller that drives by default: that of a record, otherwise `DEFAULT_CONTROLLER`."""
+    return (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
+
+
 def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:
-    """Return a function that makes the instance of a trial of the source of `jobs`."""
+    """Return a function that returns the instance of a trial, by its number, from the source of `jobs`."""
 
     def make(trial: int) -> Instance:
         first = jobs[0]
         if first.configuration is not None:
             return draw(first.configuration, seed, trial)
         if first.instance is None or trial != first.trial:
-            raise InputError("no such trial", value=trial)
+            raise InputError("no such trial", field="trial", value=trial, expected=str(first.trial))
         return first.instance
 
     return make
 
 
 def _drawn(configuration: Configuration, controller: str, trials: int, seed: int) -> list[Job]:
-    """Return a job per trial; the first is drawn here, so that a configuration that can't be is refused early."""
+    """Return a job per trial; the first instance is drawn here, to refuse early a configuration that can't be drawn."""
     jobs = [Job(trial, seed, controller, configuration=configuration) for trial in range(trials)]
     if jobs:
         jobs[0] = replace(jobs[0], instance=draw(configuration, seed, 0))
@@ -230,6 +240,21 @@ def _refuse(source: str, options: dict[str, object]) -> None:
             )
 
 
+def _check_first(source: str, first: Instance, controller: str, *, named: bool, show: bool) -> None:
+    """Refuse a simulator or car model with which the first trial can't be run.
+
+    `named` tells whether the simulator is named by an option or by the source. A car model that the controller or the
+    shield does not support would end every trial as a fault.
+    """
+    check_simulator("--simulator" if named else source, first.simulator, show=show)
+    if controller not in DUBINS_ONLY and not controllers.is_shielded(controller):
+        return
+    try:
+        require_dubins(first.problem.car, f"{controller!r} is known to be right")
+    except InputError as error:
+        raise error.within(file=source) from None
+
+
 def check_simulator(source: str, name: str, *, show: bool = False) -> None:
     """Raise InputError, naming `source`, if there is no simulator called `name` or it can't be used here."""
     try:
@@ -252,7 +277,7 @@ def _check_deadline(deadline: float | None) -> None:
 
 
 def check_data_file(path: Path, overwrite: bool) -> Path:
-    """Return `path` if a file can be written there; InputError if not, or if one exists and may not be replaced."""
+    """Return `path` if a file can be written there; InputError if not, or if one exists and `overwrite` is false."""
     if path.exists() and not overwrite:
         raise InputError(
             "exists", file=str(path), expected="a new file; --overwrite-trial-data (-F) overwrites"

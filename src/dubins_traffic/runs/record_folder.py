@@ -1,4 +1,4 @@
-"""The folder for the records of a run: one without records, or a choice between overwriting and appending."""
+"""The folder for the records of a run: it holds none, or they are overwritten or appended to."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.wall import remove_record
 
 OURS: Final = re.compile(r"trial-(\d{4,})(?:-(\d+))?\.mcap")
-"""Names that runs and sessions give their records: the number of the trial, and of its run where there are several."""
+"""File names of records: the number of the trial, and of its run if there are several."""
 BROKEN_OFF: Final = (End.INTERRUPTED, End.TRANSPORT_LOST)
-"""Ends that say nothing of who drives: such a trial is run again."""
+"""Ends that are not due to the driver: such a trial is run again."""
 WAYS: Final = "a folder without records; --overwrite removes those that are there, --append goes on with them"
 
 
@@ -45,7 +45,7 @@ def check_choice(
 
 
 def check_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return `folder`, made if missing; InputError if that can't be, or nothing can be written there."""
+    """Return `folder`, made if missing; InputError if it can't be made or written to."""
     expected = "a folder, or a place for one"
     if not os.fspath(folder):
         raise InputError("no folder", file="--records", value=folder, expected=expected)
@@ -70,29 +70,29 @@ def claim(
     append: bool = False,
     placed: bool = False,
 ) -> frozenset[str]:
-    """Make a folder ready for the records of a run; return the names of those that stay and are not to be run again.
+    """Prepare a folder for the records of a run; return the names of records that are kept and not run again.
 
     Parameters
     ----------
     folder : Path
-        The folder, which is there.
+        The folder, which exists.
     controller : str
         Name of the run's controller.
     instance_of : callable
-        Makes the instance of a trial by its number; it may raise InputError where there is no such trial.
+        Returns the instance of a trial by its number; raises InputError if there is no such trial.
     overwrite : bool
-        Whether records of runs that are there are removed, with their sidecars.
+        Whether to remove existing records, with their sidecars.
     append : bool
-        Whether they stay: then they must be of the same controller and instances. Those that were cut off, interrupted
-        or lost with their transport are run again.
+        Whether to keep existing records; they must be of the same controller and instances. Trials whose records were
+        cut off, interrupted or lost with their transport are run again.
     placed : bool
-        Whether cars may have been put elsewhere before a trial: then records of other starts are of the same instance.
+        Whether cars may have been moved before a trial; then a record of the same instance may have other starts.
 
     Raises
     ------
     InputError
-        If the folder holds records and neither is said, or both; if a record is of something else; or if another
-        process writes there.
+        If the folder holds records and neither or both of `overwrite` and `append` are given; if a record is of
+        another run; or if another process writes there.
     """
     if overwrite and append:
         raise InputError("both at once", file="--overwrite, --append", expected="one of them")
@@ -110,7 +110,7 @@ def claim(
 
 
 def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance], placed: bool) -> bool:
-    """Tell whether a record is of the same run, whole; InputError if it is of another run."""
+    """Tell whether a record of this run is complete; InputError if it is of another run."""
     match = OURS.fullmatch(path.name)
     trial = int(match[1]) if match else 0
     try:
@@ -138,14 +138,14 @@ def _stays(path: Path, controller: str, instance_of: Callable[[int], Instance], 
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """How far the session has come whose records are in a folder already.
+    """How far an earlier session has come, by its records in a folder.
 
     Parameters
     ----------
     over : frozenset of int
-        Numbers of the instances whose trials are over.
+        Numbers of the instances whose trials have ended.
     runs : mapping of int to int
-        Of the other instances that have records: the run, 0 for the first, that was broken off.
+        For the other instances that have records: the number of the run, from 0, that was broken off.
     """
 
     over: frozenset[int] = frozenset()
@@ -153,7 +153,7 @@ class Earlier:
 
     @classmethod
     def of(cls, folder: Path, kept: frozenset[str]) -> Earlier:
-        """Look at a folder in which the records named `kept` are whole."""
+        """Return what the records in a folder say; those named in `kept` are complete."""
         last: dict[int, tuple[int, bool]] = {}
         for path in folder.glob("*.mcap"):
             if match := OURS.fullmatch(path.name):

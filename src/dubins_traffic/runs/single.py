@@ -1,4 +1,4 @@
-"""A trial put together: the instance's simulator, the built-in e-agents, a record, a score."""
+"""One trial with all its parts: the instance's simulator, the built-in e-agents, a record, a score."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from dubins_traffic.agents.fleet import Fleet
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.display import Tabulated
 from dubins_traffic.errors import InputError
+from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
@@ -29,20 +30,20 @@ from dubins_traffic.viewer.paths import Paths
 
 
 class Trial(BareTrial):
-    """A trial of one instance, stepped by its user.
+    """A trial of one instance, stepped by its caller.
 
     Parameters
     ----------
     instance : Instance
-        What is run.
+        The instance to run.
     sinks : sequence of Sink
-        Receive instance, frames and ending; a `RecordWriter`, a `Scorer`, or one's own.
+        Receive instance, frames and ending: a `RecordWriter`, a `Scorer`, or a class of your own.
     record : Path or str, optional
-        Where to write a record.
+        File of the record to write.
     simulator : Simulator, optional
-        Instead of the one that the instance names.
+        Replaces the simulator that the instance names.
     link : Link, optional
-        To the drivers of remote cars.
+        Connects to the drivers of remote cars.
 
     Raises
     ------
@@ -81,35 +82,36 @@ class Trial(BareTrial):
     def fork(
         self, seed: int | None = None, *, record: Path | str | None = None, overwrite: bool = False
     ) -> Self:
-        """Return a trial that goes on from the present frame by itself.
+        """Return an independent copy of this trial at its present frame.
 
-        Driven alike it goes on to the bit as this one does, whichever of the two is stepped first. It has no
-        controller: drive it by `step`, or hand it one with `run`.
+        Given the same commands both go on equally to the bit, whichever is stepped first. The fork has no controller:
+        call `step`, or `run` with a controller.
 
         Parameters
         ----------
         seed : int, optional
-            From which all follows that is drawn from here on, the noise of the present observation too; what e-agents
-            have chosen before stays. By default that of the instance. A fork with another seed notes that as an event,
-            and its instance has that seed.
+            Seed of all random numbers drawn from here on, including the noise of the present observation; what
+            e-agents have chosen before stays. By default that of the instance. A fork with another seed has an event
+            that says so, and its instance has that seed.
         record : Path or str, optional
-            Where to write the record of the fork, from the first frame on; this trial must have a record, and
-            the seed be the same. By default a fork has none.
+            File of the fork's record, which begins with the first frame of this trial; this trial must have a
+            record, and the seed must be the same. By default a fork has none.
         overwrite : bool
             Whether an existing record may be replaced.
 
         Returns
         -------
         Trial
-            Its `sinks` are copies of those of this trial that can go on twice (`protocols.Forks`): a `Scorer` can, and
-            what writes files does not.
+            Its `sinks` are copies of those of this trial that can be copied (`protocols.Forks`): a `Scorer` can,
+            sinks that write files can't.
 
         Raises
         ------
         DubinsTrafficError
             If the trial has ended.
         InputError
-            If something of the trial can't go on twice: another simulator, e-agents elsewhere; or its record can't.
+            If a part of the trial can't be copied, such as a simulator or an e-agent in another process; or if the
+            record is impossible.
 
         Examples
         --------
@@ -128,24 +130,27 @@ class Trial(BareTrial):
         return twin
 
     def run(self, controller: str | Controller, deadline: float | None = None) -> Ending:
-        """Let a controller drive from the present frame to the end; it is started first.
+        """Start a controller in the present frame and let it drive to the end of the trial.
 
-        The parameters are those of `run_trial`. What the controller does wrong ends the trial and is not raised.
+        The parameters are those of `run_trial`. A fault of the controller ends the trial and is not raised.
         """
         driver = controllers.load(controller) if isinstance(controller, str) else controller
         ending, _ = run(self, driver, deadline)
         return ending
 
     def _writer(self, seed: int | None) -> RecordWriter:
-        """Return what writes the record of this trial; InputError if that of a fork can't be one."""
+        """Return the writer of this trial's record; InputError if there is none, or a fork's seed differs."""
         writers = [sink for sink in self.sinks if isinstance(sink, RecordWriter)]
         if not writers:
             raise InputError(
-                "this trial has no record to go on with", field="record", expected="a trial with one"
+                "this trial has no record to continue", field="record", expected="a trial with a record"
             )
         if seed not in (None, self.instance.seed):
             raise InputError(
-                "a record follows from one seed", field="seed", value=seed, expected="none, with record"
+                "a fork with another seed can't have a record",
+                field="seed",
+                value=seed,
+                expected="no seed with `record`",
             )
         return writers[0]
 
@@ -154,10 +159,10 @@ def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
     remote = [agent for agent in instance.e_agents if agent.kind == REMOTE]
     if remote and link is None:
         raise InputError(
-            f"{remote[0].name} is driven by a program elsewhere, and none can be reached",
+            f"{remote[0].name} is driven by a program elsewhere, and this run has no transport to one",
             field="e-agents",
             value=remote[0].type,
-            expected="a type of ours, or a run over a transport, such as dubins-traffic ros1 run",
+            expected="a built-in type, or a run over a transport, such as dubins-traffic ros1 run",
         )
     local: list[Driver] = [Fleet()] if len(remote) < len(instance.e_agents) else []
     return local if link is None or not remote else [*local, RemoteAgents(link)]
@@ -165,9 +170,9 @@ def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
 
 @dataclass(frozen=True, slots=True)
 class Result(Tabulated):
-    """What came of a trial: its ending, score, wall-clock figures, and where its record is.
+    """The result of a trial: instance, ending, score, wall-clock figures, and the path of its record.
 
-    `paths` is a sketch of the ways of the cars, for pictures.
+    `paths` is a sketch of the paths of the cars, for pictures.
     """
 
     instance: Instance
@@ -222,14 +227,14 @@ def run_trial(
     sinks : sequence of Sink
         Further sinks.
     link : Link, optional
-        To the drivers of remote cars. If the ego is one, `controller` matters only if it is a name that ends in
-        ``+shield``: then that ego drives under the shield.
+        Connects to the drivers of remote cars. If the ego is one, of `controller` only an ending ``+shield`` matters:
+        then that ego drives under the shield.
     simulator : Simulator, optional
-        Instead of the one that the instance names; closed when the trial is over.
+        Replaces the simulator that the instance names; closed when the trial is over.
     sketch : bool
-        Whether the result keeps a sketch of the ways of the cars, for pictures: some kilobytes for each car.
+        Whether the result has a sketch of the paths of the cars, for pictures: some kilobytes for each car.
     name : str, optional
-        What record and score call the controller; by default the name by which it was given, or that of its class.
+        Name of the controller in record and score; by default the name by which it was given, or that of its class.
     metrics : sequence of str or callable
         Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md).
 
@@ -247,7 +252,10 @@ def run_trial(
     first = () if writer is None else (writer,)
     drawn = (paths,) if sketch else ()
     try:
-        with Trial(instance, sinks=(*first, *drawn, scorer, *sinks), link=link, simulator=simulator) as trial:
+        with (
+            put_back(),
+            Trial(instance, sinks=(*first, *drawn, scorer, *sinks), link=link, simulator=simulator) as trial,
+        ):
             try:
                 ending, measured = run(trial, driver, deadline)
             finally:
@@ -266,7 +274,7 @@ def run_trial(
 
 
 def _driver(controller: str | Controller, link: Link | None) -> tuple[str, Controller]:
-    """Return what the ego's controller is called, and the controller."""
+    """Return the name of the ego's controller, and the controller."""
     if link is not None and link.ego:
         name, driver = link.transport.name, RemoteController(link)
         if isinstance(controller, str) and controllers.is_shielded(controller):

@@ -1,4 +1,4 @@
-"""Whatever a path may hold: a road network, a trials configuration, an instance or a record."""
+"""Loads what a path holds, told by its content: a road network, a trials configuration, an instance or a record."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def load(
     seed: int = 0,
     map_format: str | MapFormat | None = None,
 ) -> RoadNetwork | Configuration | Instance | Record:
-    """Return what is at `source`, told by its content.
+    """Return what `source` holds, told by its content.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def load(
     rnd : path, optional
         A road network description that overrides that of a configuration.
     seed : int
-        For what an instance does not give and is therefore drawn.
+        Seed of what an instance document leaves out and is therefore drawn.
     map_format : str or MapFormat, optional
-        A map format that is asked before the registered ones: ``module:Class``, ``path/to/file.py:Class``, or the
-        format itself (docs/extending/map-format.md).
+        A map format that is tried before the registered ones: ``module:Class``, ``path/to/file.py:Class``, or an
+        object (docs/extending/map-format.md).
 
     Raises
     ------
     InputError
-        If there is nothing or nothing known at `source`, something in it is wrong, or `rnd` is given with anything
-        other than a configuration.
+        If `source` does not exist, is of no known kind or is wrong, or `rnd` is given with anything other than a
+        configuration.
     """
     form = formats.load(map_format) if isinstance(map_format, str) else map_format
     found = _load(source, rnd, seed, form)

@@ -1,4 +1,4 @@
-"""Blocks of frames put together, since metrics cost less on few long blocks than on many short ones."""
+"""Joins and cuts blocks of frames: metrics cost less on few long blocks than on many short ones."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def joined(blocks: Sequence[Frames]) -> Frames:
 
 
 class Seconds:
-    """Cuts the frames of a trial, however they come, into blocks of ``int(rate)`` frames, with what happened in them.
+    """Cuts the frames of a trial, whatever blocks they come in, into blocks of ``int(rate)`` frames with their events.
 
-    A block is ready when a frame after it has come, since events of its last frame come no later. Its arrays are its
-    own, in C order, and can't be written to.
+    A block is ready when a later frame has come, since events of its last frame come before that. Its arrays are
+    copies in C order that can't be written to.
     """
 
     def __init__(self, rate: float) -> None:
@@ -67,7 +67,7 @@ class Seconds:
         self._waiting = [cut(whole, begin, len(whole))]
 
     def rest(self) -> Frames | None:
-        """Return what is left, None if that is nothing."""
+        """Return the remaining frames as a block, None if there are none."""
         waiting, self._waiting, self._count = self._waiting, [], 0
         if not waiting:
             return None
@@ -78,7 +78,7 @@ class Seconds:
 def cut(frames: Frames, begin: int, end: int) -> Frames:
     """Return the frames from place `begin` up to before `end` of a block, with their contacts and events.
 
-    What happened before the block's first frame stands with the first ones, what happened after its last with the last.
+    Events before the block's first frame go to the part with that frame, events after its last to the part with that.
     """
     low = -math.inf if begin == 0 else frames.first + begin
     high = math.inf if end >= len(frames) else frames.first + end

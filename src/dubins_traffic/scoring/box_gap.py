@@ -1,4 +1,4 @@
-"""How far two oriented boxes are apart, compiled: the gaps that the metrics of a batch look at."""
+"""The distance between two oriented boxes, for the metrics of a batch (compiled)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tables tell of a verdict: the ruling, its excuse, and how often each rule was broken."""
+"""The columns of a verdict: the ruling, its excuse, and how often each rule was broken."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _of_verdict(value: Callable[[Verdict], Value]) -> Callable[[Score], Value]:
-    """Return what takes a value from a score's verdict; None where there is none."""
+    """Return a function that takes a value from a score's verdict, None if there is no verdict."""
     return lambda score: None if score.verdict is None else value(score.verdict)
 
 

@@ -1,4 +1,4 @@
-"""How near the ego came to anything."""
+"""The metric `min_clearance_m`: the smallest gap between the ego and any other body."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 _Gap = Callable[[np.ndarray, np.ndarray], Floats]
 _SLACK = 1e-9
-"""Metres by which rounding may make a bound larger than the gap: what is found never depends on the order of looks."""
+"""Metres by which rounding may make a bound exceed its gap; so the order of pairs does not change the result."""
 
 
 class Clearance:
@@ -26,7 +26,7 @@ class Clearance:
     """
 
     def begin(self, instance: Instance) -> None:
-        """Start without anything near."""
+        """Start with no gap."""
         car = pack_cars([instance.problem.car])
         self._half = np.array([car.half_length[0], car.half_width[0]])
         self._rounding = float(car.rounding[0])
@@ -114,7 +114,7 @@ def _corners_to_box(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> Flo
 
 
 def _overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> np.ndarray:
-    """Whether no side of either box separates them."""
+    """Tell whether no side of either box separates them."""
     x, y = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1]
     c = np.abs(a[:, 2] * b[:, 2] + a[:, 3] * b[:, 3])
     s = np.abs(a[:, 2] * b[:, 3] - a[:, 3] * b[:, 2])

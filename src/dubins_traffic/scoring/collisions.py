@@ -14,7 +14,7 @@ from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """The ego touched something, at `time` seconds, in the tick that ends in frame `tick`.
+    """A contact of the ego with another body at `time` seconds, in the tick that ends in frame `tick`.
 
     `partner` names the other car, or is ``obstacle k``. `at_fault` tells whether the ego was at fault and
     `partner_at_fault` whether the other was; an obstacle never is.
@@ -75,7 +75,7 @@ class Collisions:
 
 
 def _faults(collisions: Sequence[Collision], *, ego: bool, other: bool) -> int:
-    """Return at how many collisions the ego, and the other, are at fault."""
+    """Return how many collisions there are in which the ego is at fault or not, and the other is or not, as given."""
     return sum((one.at_fault, one.partner_at_fault) == (ego, other) for one in collisions)
 
 

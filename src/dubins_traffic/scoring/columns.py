@@ -37,19 +37,19 @@ _FIRST_IN_TABLES = (
     "min_clearance_m", "collisions", "collisions_ego_fault", "collisions_other_fault", "collisions_both_fault",
     "collisions_among_others", "excuse", "excuse_sensed",
 )  # fmt: skip
-"""Columns whose places in tables are kept since files have them; the rest follow as the parts do."""
+"""Columns that come first in tables, in an order that is kept since files have it; the others follow by part."""
 _FIRST_IN_REPORTS = (
     "clean", "counted_rounds", "rounds", "goals_visited", "longest_gap_s", "breaches", "breaches_of_others",
     "assumption_broken", "collisions", "collisions_ego_fault", "collisions_other_fault", "collisions_both_fault",
     "collisions_among_others", "min_clearance_m", "distance_m", "standing_share", "off_road_s", "off_road_share",
     "lane_departures", "interventions", "duration_s",
 )  # fmt: skip
-"""What ranks controllers first; the rest follow, the score of 2016 last."""
+"""Columns that come first in reports, those that rank controllers; the others follow, the score of 2016 last."""
 _KNOWN = {own.column.name: own for part in _PARTS for own in part}
 
 SCORES: Final[Mapping[str, ScoreColumn]] = {name: _KNOWN[name] for name in (*_FIRST_IN_TABLES, *_KNOWN)}
-"""What is kept of every score, by name, in the order of tables; None where a score has none."""
+"""The columns of every score, by name, in the order of tables; a value is None where a score has none."""
 REPORTED: Final[tuple[Column, ...]] = tuple(
     _KNOWN[name].column for name in dict.fromkeys((*_FIRST_IN_REPORTS, *SCORES)) if _KNOWN[name].column.label
 )
-"""Of which of them reports have a line, in their order."""
+"""Those columns that have a line in reports, in that order."""

@@ -1,4 +1,4 @@
-"""How the ego drove: distance, standing, time off the road, departures from its lane."""
+"""The metrics of the ego's driving: distance, standing, time off the road, departures from its lane."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Driven:
 
 
 class Driving:
-    """Sums over the ticks of a trial."""
+    """Sums these metrics over the ticks of a trial."""
 
     def begin(self, instance: Instance) -> None:
         """Start counting."""

@@ -8,7 +8,7 @@ from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 def planned_ticks(instance: Instance) -> int:
-    """Return the ticks of a trial that runs to its planned end; a trial has one at least."""
+    """Return the number of ticks of a trial that runs to its planned end, at least 1."""
     return max(1, instance.ticks)
 
 
@@ -18,11 +18,11 @@ def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
     Parameters
     ----------
     instance : Instance
-        What was run.
+        The instance that was run.
     ending : Ending or None
         How the trial ended; None while it runs, and for a record that was cut off.
     last : int
-        Number of the last frame that is there.
+        Number of the last frame that there is.
     """
     return (
         ending is not None

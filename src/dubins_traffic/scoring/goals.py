@@ -1,4 +1,4 @@
-"""Visits of the goals: which, how often, with what gaps, and completed rounds."""
+"""The metrics of goals: visits, gaps between them, and completed rounds."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class GoalDiscs:
 
 
 class Rounds:
-    """Counts rounds: whenever all of `goals` goals are done, one round is added and all are to do again."""
+    """Counts rounds: when all of `goals` goals are done, a round is counted and all become undone."""
 
     def __init__(self, goals: int) -> None:
         self.count = 0
@@ -110,7 +110,7 @@ class Visiting:
         self._last_frame = frames.first + len(frames) - 1
 
     def _visits_among(self, entered: Mask, frames: Frames) -> Mask:
-        """Count the visits of each goal, and return which of the entries of its disc, (F, goals), they are."""
+        """Count the visits of each goal; return which of the entries of its disc, (F, goals), are visits."""
         at = self._discs.at(frames)
         for goal, vertex in enumerate(self._discs.vertices):
             elsewhere = frames.first + np.flatnonzero((at >= 0) & (at != vertex))
@@ -121,7 +121,7 @@ class Visiting:
         return entered
 
     def _visit(self, goal: int, tick: int, elsewhere: Ints) -> bool:
-        """Count the entry of a goal's disc in frame `tick`, if it is a visit; return whether it is.
+        """Count the entry of a goal's disc in frame `tick` if it is a visit; return whether it is.
 
         `elsewhere` are the frames of this block in which the ego is in another disc, in order.
         """
@@ -136,7 +136,7 @@ class Visiting:
 
     @property
     def now(self) -> list[bool]:
-        """Of which goals a visit began in the last frame."""
+        """For each goal whether a visit began in the last frame."""
         return [
             bool(count) and last == self._last_frame
             for count, last in zip(self._visits, self._last, strict=True)

@@ -1,4 +1,4 @@
-"""How often a shield has stepped in."""
+"""The metric `interventions`: the number of ticks in which a shield has stepped in."""
 
 from __future__ import annotations
 

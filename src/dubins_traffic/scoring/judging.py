@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Judging:
     """A sink that judges a trial whose problem carries rules.
 
-    Labels and faults are found again from the poses, so that a trial is judged by this code whoever recorded it.
+    Labels and faults are found again from the poses, so that every trial is judged by this code, whatever recorded it.
     """
 
     def begin(self, instance: Instance) -> None:
@@ -35,7 +35,7 @@ class Judging:
         Raises
         ------
         InputError
-            If the problem asks for the rules and they are not defined on it; names the place.
+            If the problem asks for the rules and they are not defined on its roads; the message names the place.
         """
         problem = instance.problem
         self._instance = instance
@@ -80,7 +80,7 @@ class Judging:
             self._last = frames.first + len(frames) - 1
 
     def end(self, ending: Ending) -> None:
-        """Keep the named end, since only a trial that ran its whole duration can be satisfied."""
+        """Keep the ending: only a trial that ran its whole duration can be satisfied."""
         self._ending = ending
 
     def result(self) -> Verdict | None:
@@ -96,7 +96,7 @@ class Judging:
             self._visiting.now,
             self._was_sensed,
             lambda car, tick: self._was_sensed(car, tick, tick),
-            self._referee.running[0] if self._last >= 0 else NOTHING,
+            self._referee.pending[0] if self._last >= 0 else NOTHING,
             self._margins.result() | self._entries(),
             whole=ran_whole(self._instance, self._ending, self._last),
         )

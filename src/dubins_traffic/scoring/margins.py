@@ -1,4 +1,4 @@
-"""How far the ego stays from breaking the rules: collisions, road, lane, way back, entries of crossings, and rounds."""
+"""Margins: by how much the ego keeps or breaks each rule."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ LIVENESS: Final = "1.goal"
 MARGINS: Final = ("1.collision", *MEASURED, *ENTERED, LIVENESS)
 """The columns of `margins_of`."""
 UNITS: Final = {"3.stop": "s", "3.order": "s", LIVENESS: "s"}
-"""What a margin is measured in, if not in metres."""
+"""Units of the margins that are not in metres."""
 SURE: Final = 1e-9
-"""Margins are at least so far from 0 in `margins_of`, on the side on which the verdict is."""
+"""Least absolute value of a margin in `margins_of`, with the sign of the verdict."""
 
 
 class Judged(Protocol):
-    """What margins are read from: a score (`scoring.score.Score`)."""
+    """What `margins_of` reads of a score (`scoring.score.Score`)."""
 
     @property
     def verdict(self) -> Verdict | None:
@@ -114,7 +114,7 @@ def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | Non
     Parameters
     ----------
     found
-        What the referee has found.
+        The margins that the referee has found.
     period
         Seconds of a tick.
     """
@@ -125,12 +125,12 @@ def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | Non
 
 
 def margins_of(scores: Iterable[Judged]) -> Floats:
-    """Return by how much the ego of each trial kept each rule, or broke it: what a search looks at.
+    """Return by how much the ego of each trial kept or broke each rule; a search minimises these.
 
     Parameters
     ----------
     scores
-        Of trials whose problems carry rules.
+        Scores of trials whose problems carry rules.
 
     Returns
     -------
@@ -158,6 +158,6 @@ def _row(score: Judged) -> list[float]:
 
 
 def margins_by_rule(gap: float | None, found: Sequence[float]) -> dict[str, float | None]:
-    """Return the margins by the rules' names, given the smallest gap and what `find_margins` finds, in order."""
+    """Return the margins by the rules' names, from the smallest gap (m) and the margins of `find_margins`, in order."""
     named = zip(MEASURED, found, strict=True)
     return {"1.collision": gap} | {rule: value if math.isfinite(value) else None for rule, value in named}

@@ -1,4 +1,4 @@
-"""How far the ego of a trial stays from breaking rules 1 and 2, compiled: the least values over its frames."""
+"""The margins of rules 1 and 2 of an ego: the least values over its frames (compiled)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @record
 class MarginRules:
-    """What the margins of one trial depend on."""
+    """The parameters on which the margins of one trial depend."""
 
     left_set: float
     left_release: float
@@ -52,7 +52,7 @@ class EgoFrame:
 
 @record
 class EgoMargins:
-    """What is found of one trial, metres; infinite where nothing could break the rule."""
+    """The margins of one trial, metres; infinite where nothing could break the rule."""
 
     road: float
     line: float
@@ -61,7 +61,7 @@ class EgoMargins:
 
 
 class MarginTables(Tables):
-    """What the margins of a batch are found from: `rules` (B,), `roads` and `cars`; `signal` (F,) is scratch."""
+    """The tables from which a batch's margins are found: `rules` (B,), `roads`, `cars`; `signal` (F,) is scratch."""
 
     rules: Rows[MarginRules]
     roads: RoadTable
@@ -70,7 +70,7 @@ class MarginTables(Tables):
 
 
 def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], index: Ints) -> Rows[MarginRules]:
-    """Return what the margins of trials depend on; trial b has the rules and the period (s) of number index[b]."""
+    """Return the parameters of the margins of trials; trial b has the rules and the period (s) of number index[b]."""
     found: Any = table(MarginRules, len(index))
     numbers: list[int] = index.tolist()
     found["left_set"] = [rules[k].left_set for k in numbers]
@@ -93,7 +93,7 @@ def find_margins(
     Parameters
     ----------
     trials, frames : (K,)
-        Which trials, and how many frames each has.
+        Numbers of the trials, and of frames that each has.
     ego : (B, F)
         The ego in each frame.
     nets : (B,)
@@ -101,7 +101,7 @@ def find_margins(
     tables
         The tables of all trials; `signal` has room for the frames of any.
     found : (B,)
-        Written to.
+        The margins, written in place.
     """
     for k in range(trials.shape[0]):
         b: int = trials[k]
@@ -123,7 +123,7 @@ def _find_margin(
         x, y, bits = own.x, own.y, own.bits
         if bits & FLAG.ON_ROAD != 0:
             begun = True
-        # No segment is farther than the one that was nearest before, so often none need be looked for.
+        # The nearest segment is no farther than the one of the frame before, so often none need be searched.
         if begun and distance2(roads, net, segment, x, y) > farthest:
             segment, square = nearest_segment(roads, net, x, y)
             farthest = max(farthest, square)
@@ -138,7 +138,7 @@ def _find_margin(
 
 @jit
 def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
-    """Return how far the body reaches over the line that `left` looks at, metres; -inf without a lane state."""
+    """Return how far the body reaches over the line at which `left` changes, metres; -inf without lane state."""
     roads, cars, own = tables.roads, tables.cars, tables.rules[b]
     lane = ego.lane
     if lane < 0:
@@ -155,8 +155,8 @@ def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
 def _least_of_greatest(signal: Floats, count: Any, window: Any) -> Any:
     """Return the least, over all frames, of the greatest value at the frame and up to `window` frames after it.
 
-    The last frame has none after it, and what ends there is no less. Any other span counts only once all of it lies
-    below the least so far, so it is looked at again only then.
+    Spans that the last frame cuts short count with the frames they have. A span can lower the least only if all of its
+    values lie below it, so its greatest value is searched only then.
     """
     least = signal[count - 1]
     high = -1

@@ -1,4 +1,4 @@
-"""What a metric is: a sink that turns the frames of a trial into a few named values."""
+"""The protocol of metrics: sinks that turn the frames of a trial into a few named values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 
 Value: TypeAlias = float | int | bool | str | None
-"""What a metric tells; None where a trial has no such value."""
+"""A value of a metric; None where a trial has no such value."""
 Kind = Literal["float64", "int32", "int64", "bool", "string"]
 KINDS: Final[Mapping[Kind, tuple[type, ...]]] = {
     "float64": (float, int),
@@ -20,19 +20,19 @@ KINDS: Final[Mapping[Kind, tuple[type, ...]]] = {
     "bool": (bool,),
     "string": (str,),
 }
-"""Kinds of values, with the types of Python that are taken for them."""
+"""Kinds of values, each with the types of Python that count as it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One value that is told of each trial: a key in JSON, a column of tables, a line of reports.
+    """The description of one value of a metric: a key in JSON, a column of tables, a line of reports.
 
     Attributes
     ----------
     name : str
         Key and column, such as ``min_clearance_m``: letters, digits and underscores.
     label : str
-        The same for people, without the unit; empty: no line of a report is about it alone.
+        The heading for people, without the unit; if empty, reports have no line for it.
     short : str
         A label for narrow tables; by default `label`.
     unit : str
@@ -40,13 +40,13 @@ class Column:
     better : int
         1 where more is better, -1 where less is, 0 where neither is.
     kind : str
-        Of its values: ``float64``, ``int32``, ``int64``, ``bool`` or ``string``.
+        Kind of its values: ``float64``, ``int32``, ``int64``, ``bool`` or ``string``.
     rare : bool
-        Whether a report tells it only where some trial has more than none of it.
+        Whether a report shows it only if some trial has a value other than 0.
     bounded : bool
-        Whether it is not defined for every trial, which a report then says.
+        Whether it is defined for some trials only, which a report then says.
     meaning : str
-        What it tells, in a sentence.
+        Its meaning, in a sentence.
     """
 
     name: str
@@ -67,35 +67,35 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A value with the column that says what it is."""
+    """A value with the column that describes it."""
 
     column: Column
     value: Value
 
 
 class Metric(Protocol):
-    """A sink with a result; a class without arguments, of which one object sees one trial.
+    """A sink with a result. The constructor takes no arguments; one object sees one trial.
 
-    The frames come in blocks of one simulated second, ``int(rate)`` frames from frame 0 on, the last block with what is
-    left: the same blocks whether the trial runs by itself, in a batch, or is read from a record. So the same sums give
-    the same bits everywhere. The arrays of a block can't be written to.
+    The frames come in blocks of one simulated second, ``int(rate)`` frames from frame 0 on; the last block has the
+    rest. The blocks are the same whether the trial runs by itself, in a batch, or is read from a record, so equal sums
+    have equal bits. The arrays of a block can't be written to.
     """
 
     @property
     def columns(self) -> Sequence[Column]:
-        """What it tells; known before a trial begins and the same for all."""
+        """Its columns; known before a trial begins, and the same for all trials."""
         ...
 
     def begin(self, instance: Instance) -> None:
-        """A trial begins."""
+        """Begin a trial."""
         ...
 
     def frames(self, frames: Frames) -> None:
-        """The next block of frames, with their contacts and events."""
+        """Take the next block of frames, with their contacts and events."""
         ...
 
     def end(self, ending: Ending) -> None:
-        """The trial has ended; a record that was cut off has no ending."""
+        """Take the ending of the trial; not called for a record that was cut off."""
         ...
 
     def result(self) -> Mapping[str, Value]:
@@ -112,6 +112,6 @@ class ScoreColumn:
 
 
 Maker = Callable[[], Metric]
-"""Makes a metric for one trial; the class itself, as a rule."""
+"""Makes a metric for one trial; usually the class itself."""
 MetricSpec: TypeAlias = "str | Maker"
-"""How a metric is asked for: its name, where its class is, or what makes it."""
+"""A metric as users give it: a name, ``module:Class``, ``path/to/file.py:Class``, or a callable that makes it."""

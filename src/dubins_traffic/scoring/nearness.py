@@ -1,4 +1,4 @@
-"""Whether those who broke the assumption were near the ego, each time that it broke a rule (docs/rules.md#near)."""
+"""Whether each breach of the ego followed one by an e-agent near it (docs/rules.md#near)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def is_near(breaches: Sequence[Breach], back: int, seen: Callable[[int, int], bo
     breaches
         All breaches of a trial, in order of time.
     back
-        Ticks from the e-agent's breach to the ego's, at most; the same frame counts.
+        Most ticks from the e-agent's breach to the ego's; the same frame counts.
     seen
-        Asked for (car, tick) of a breach by an e-agent: whether that car was within the sensing radius then.
+        Called with (car, tick) of a breach by an e-agent; tells whether the car was within the sensing radius then.
     """
     last: int | None = None
     for tick, group in groupby(breaches, key=lambda breach: breach.tick):

@@ -1,15 +1,15 @@
-"""What is said once of many trials whose verdicts say little."""
+"""The notice that most verdicts of some trials mean little, since e-agents broke the assumption."""
 
 from __future__ import annotations
 
 
 def assumption_notice(broken: int, judged: int) -> str:
-    """Return the notice on trials of which most have their assumption broken by the e-agents; else an empty text.
+    """Return the notice if e-agents broke the assumption in most trials, else an empty text.
 
     Parameters
     ----------
     broken, judged : int
-        In how many trials the assumption was broken, of how many that were judged.
+        Number of trials in which the assumption was broken, and of all that were judged.
     """
     if 2 * broken <= judged:
         return ""

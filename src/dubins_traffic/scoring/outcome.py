@@ -1,4 +1,4 @@
-"""The score of a trial from what a batch has counted: what `scoring.score.Scorer` finds in its frames."""
+"""The score of a batched trial from its tally; it equals what `scoring.score.Scorer` finds in the frames."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 
 
 class BatchScores:
-    """What a batch has counted of some trials that have ended.
+    """The tallies of some trials of a batch that have ended, from which their scores follow.
 
     Parameters
     ----------
     trials, frames : (K,)
-        Which trials of the batch, and how many frames each has.
+        Numbers of the trials in the batch, and of frames that each has.
     tally, margins
-        What has been counted of the batch, and what its margins depend on (`scoring.margins_kernel`).
+        The tally of the batch, and the parameters of its margins (`scoring.margins_kernel`).
     roads, cars
         The roads and the cars of the batch.
     """
@@ -77,9 +77,9 @@ class BatchScores:
     ) -> Score:
         """Return the score of trial b, which ended with `ending`, whose ego was driven by `controller`.
 
-        `contacts`, with `at_fault`, and the `breaches` of the breach_log are in order of time; `seen` holds (car, tick)
-        of each breach by an e-agent that was within the sensing radius then; `running` is what hung over the cars in
-        the last frame, `entry` by how much the ego kept rule 3.
+        `contacts`, with `at_fault`, and `breaches`, those of the breach log, are in order of time. `seen` holds (car,
+        tick) of each breach by an e-agent that was within the sensing radius then. `running` are the pending
+        obligations after the last frame, `entry` the margins of rule 3.
         """
         own, margins = self._tally.trial[b], self._found[b]
         rate, ticks = instance.problem.rate, ending.ticks

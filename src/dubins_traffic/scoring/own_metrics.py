@@ -1,4 +1,4 @@
-"""The metrics of a trial that are asked for by name or are the user's own: fed in blocks of one second, and checked."""
+"""The further metrics of a trial, by name or a user's own: fed in blocks of one second, and checked."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from dubins_traffic.scoring.metric import KINDS, Column, Maker, Measured, Metric
 
 
 class OwnMetrics:
-    """A sink that shows a trial to metrics of `Metric`, in the same blocks wherever the frames come from.
+    """A sink that hands a trial to further metrics, in the same blocks wherever the frames come from.
 
-    What a metric raises is no fault of the trial: it becomes an `InputError` that names the metric.
+    An error of a metric does not end the trial: it becomes an `InputError` that names the metric.
     """
 
     def __init__(self, makers: Sequence[Maker]) -> None:
@@ -36,7 +36,7 @@ class OwnMetrics:
             self._show(block)
 
     def end(self, ending: Ending) -> None:
-        """Show what is left, and the ending."""
+        """Hand the remaining frames and the ending to the metrics."""
         self._show_rest()
         for metric in self._metrics:
             _guarded(metric, "end", ending)
@@ -47,7 +47,7 @@ class OwnMetrics:
         Raises
         ------
         InputError
-            If a metric raises, or tells anything but a value of its kind for each of its columns.
+            If a metric raises, or its result is not a value of the right kind for each of its columns.
         """
         self._show_rest()
         return tuple(own for metric in self._metrics for own in _values(metric))
@@ -79,7 +79,7 @@ def _values(metric: Metric) -> list[Measured]:
     if not isinstance(found, Mapping) or set(cast("Mapping[str, Any]", found)) != set(names):
         raise _fault(
             metric,
-            "tells other values than its columns",
+            "returns other values than its columns",
             cast("object", found),
             f"a mapping of {', '.join(names)}",
         )
@@ -87,7 +87,7 @@ def _values(metric: Metric) -> list[Measured]:
 
 
 def _value(metric: Metric, column: Column, value: Any) -> Value:
-    """Return a value as a plain one of Python."""
+    """Return a value as a plain Python value."""
     plain = value.item() if hasattr(value, "item") and getattr(value, "shape", None) == () else value
     if plain is None:
         return None
@@ -100,7 +100,7 @@ def _value(metric: Metric, column: Column, value: Any) -> Value:
         fits = abs(plain) < 2 ** (int(column.kind[3:]) - 1)
     if not fits:
         raise _fault(
-            metric, f"tells no {column.kind} for {column.name}", value, f"a finite {column.kind}, or None"
+            metric, f"returns no {column.kind} for {column.name}", value, f"a finite {column.kind}, or None"
         )
     return plain
 

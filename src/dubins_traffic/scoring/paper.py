@@ -1,4 +1,4 @@
-"""The score of the paper: the formula of the benchmark's description, as it is written there.
+"""The score of the paper: the formula in the benchmark's description, to the letter.
 
 Source: *Proposal for a benchmark: Traffic network of Dubins cars*, section II.E: -1 if the ego collides with another
 vehicle, else

@@ -1,7 +1,7 @@
 """Metrics by name: those that come with the package, those of other packages, and a user's own.
 
-The scores that every trial has stand in `scoring.score.Score`. These are told beside them where they are asked for. A
-new one is a file beside this one and a line in `BUILT_IN`, or a class outside the package (docs/extending/metric.md).
+The values that every score has stand in `scoring.score.Score`; the metrics here are added on request. A new one is a
+file beside this one and a line in `BUILT_IN`, or a class outside the package (docs/extending/metric.md).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BUILT_IN = {
 }
 """The metrics of this package by name: module and class."""
 GROUP = "dubins_traffic.metrics"
-"""Entry points of other packages."""
+"""Group of the entry points by which other packages offer metrics."""
 OPTION = "--metric"
 _SEAM = Seam(
     OPTION,
@@ -39,7 +39,7 @@ def names() -> Mapping[str, str]:
 
 
 def load(spec: MetricSpec) -> Maker:
-    """Return what makes a metric, having made one.
+    """Return the callable that makes a metric, after a trial call.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def load(spec: MetricSpec) -> Maker:
     Raises
     ------
     InputError
-        If there is none, or it lacks something of `scoring.metric.Metric`.
+        If there is no such metric, or it lacks a member of `scoring.metric.Metric`.
     """
     maker = _maker(spec)
     _columns_of(maker, spec)
@@ -57,7 +57,7 @@ def load(spec: MetricSpec) -> Maker:
 
 
 def columns(specs: Sequence[MetricSpec], taken: Sequence[str] = ()) -> tuple[Column, ...]:
-    """Return what some metrics tell, in their order; `taken` are names that other columns have.
+    """Return the columns of some metrics, in their order; `taken` are names that other columns have.
 
     Raises
     ------
@@ -74,14 +74,14 @@ def columns(specs: Sequence[MetricSpec], taken: Sequence[str] = ()) -> tuple[Col
 
 
 def makers(specs: Sequence[MetricSpec]) -> tuple[Maker, ...]:
-    """Return what makes some metrics, each found once; the exceptions are those of `columns`."""
+    """Return the callables that make some metrics; the exceptions are those of `columns`."""
     found = tuple(_maker(spec) for spec in specs)
     columns(found)
     return found
 
 
 def forget() -> None:
-    """Look for the metrics of other packages anew when next they are asked for."""
+    """Forget the metrics of other packages, so that the next call looks for them again."""
     _registered.cache_clear()
 
 
@@ -126,5 +126,5 @@ def _registered() -> Mapping[str, Maker]:
 
 
 def _line(maker: Maker) -> str:
-    """Return the first line of what a class says of itself."""
+    """Return the first line of a class's docstring."""
     return (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".")

@@ -1,4 +1,4 @@
-"""The score of a trial: every metric, from one pass over its frames, live or from a record."""
+"""The score of a trial: all its metrics, from one pass over its frames, live or from a record."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Score(Tabulated):
     Attributes
     ----------
     trial, seed : int
-        Number of the trial and the seed from which it follows.
+        Number and seed of the trial.
     end : str or None
         Why the trial ended; None for a record that was cut off.
     controller, record : str or None
@@ -72,9 +72,9 @@ class Score(Tabulated):
     icra2016 : float or None
         The score of ICRA 2016 (`dubins_traffic.scoring.icra2016`); None where it is not defined.
     interventions : int
-        In how many ticks a shield has stepped in (docs/shield.md).
+        Number of ticks in which a shield has stepped in (docs/shield.md).
     metrics : tuple of Measured
-        What further metrics tell, those that were asked for (docs/extending/metric.md).
+        The values of further metrics (docs/extending/metric.md).
     """
 
     trial: int
@@ -138,10 +138,10 @@ class Score(Tabulated):
 
 
 class Scorer:
-    """A sink that holds all metrics of one trial.
+    """A sink that computes all metrics of one trial.
 
-    It shows them frames by `_BLOCK` at least, not by the second; no metric depends on how the frames are cut. A copy of
-    it goes on in a fork of its trial.
+    It collects frames into blocks of at least `_BLOCK` for the built-in metrics, which don't depend on how frames are
+    cut. A copy of it goes on in a fork of its trial.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class Scorer:
             self._show()
 
     def end(self, ending: Ending) -> None:
-        """Keep the named end of the trial."""
+        """Keep the ending of the trial."""
         self._show()
         self._ending = ending
         for metric in self._metrics:
@@ -209,7 +209,7 @@ class Scorer:
         record : Path or str, optional
             Where the record is.
         wall : Wall, optional
-            What was measured on the wall clock.
+            Wall-clock figures of the trial.
         """
         self._show()
         visits, verdict = self._visiting.result(), self._judging.result()
@@ -260,7 +260,7 @@ class ScoreSheet(Pictured, Tabulated):
 
     @property
     def summary(self) -> str:
-        """The scores in a few words: how many there are, and how many of each verdict, or else of each end."""
+        """The scores in a few words: their number, and the number of each verdict, or, unjudged, of each end."""
         found = Counter(
             (own.end or "cut off") if own.verdict is None else own.verdict.verdict.value
             for own in self.trials
@@ -275,7 +275,7 @@ class ScoreSheet(Pictured, Tabulated):
 
     @property
     def counted_rounds_sum(self) -> int:
-        """The rounds of all clean trials that ran their whole durations."""
+        """Sum of the rounds of all clean trials that ran their whole durations."""
         return sum(score.counted_rounds for score in self.trials)
 
     @property
@@ -285,13 +285,13 @@ class ScoreSheet(Pictured, Tabulated):
 
     @property
     def icra2016_sum(self) -> float | None:
-        """The final score of ICRA 2016: the sum over trials, correctly rounded; None if one of them has none."""
+        """The final score of ICRA 2016: the sum over trials, correctly rounded; None if a trial has no such score."""
         found = [score.icra2016 for score in self.trials if score.icra2016 is not None]
         return math.fsum(found) if len(found) == len(self.trials) else None
 
     @property
     def assumption_broken(self) -> tuple[int, int]:
-        """In how many of the judged trials the e-agents broke the assumption, and how many these are."""
+        """Number of judged trials in which the e-agents broke the assumption, and of all judged trials."""
         found = [score.verdict.assumption_broken for score in self.trials if score.verdict is not None]
         return sum(found), len(found)
 
@@ -306,12 +306,12 @@ class ScoreSheet(Pictured, Tabulated):
 
 
 def is_clean(verdict: Verdict | None, collisions: Sequence[Collision]) -> bool:
-    """Tell whether the ego broke nothing; of a trial that is not judged, whether it touched nothing."""
+    """Tell whether the ego broke no rule; if the trial is not judged, whether it touched no body."""
     return not collisions if verdict is None else verdict.clean
 
 
 def score(record: Record, metrics: Sequence[MetricSpec] = ()) -> Score:
-    """Score a record: the same numbers as a `Scorer` that saw the trial; also of one that was cut off.
+    """Return the score of a record, which may be cut off; it equals that of a `Scorer` that saw the trial.
 
     `metrics` are further metrics, as for `Scorer`.
     """

@@ -1,29 +1,25 @@
-"""The metrics of a batch, counted tick by tick in one compiled pass: the numbers that the sinks find in frames."""
+"""The metrics of batched trials, counted tick by tick (compiled); they equal what the sinks find in frames."""
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dubins_traffic.cars.near import ticks_within
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.box_gap import box_gap
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
-
-if TYPE_CHECKING:
-    pass
 from dubins_traffic.scoring.tally_tables import Counted, Tally, TrialCounts
 
 ROUNDING = 1e-6
-"""What rounding can't make up, metres."""
+"""A distance that rounding errors never reach, metres."""
 FARTHEST = 100.0
-"""Metres beyond which it does not matter how far something is."""
+"""Metres beyond which distances are not told apart."""
 
 
 @jit
@@ -52,13 +48,19 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
     at = labels.at[b, EGO]
     if at >= 0 and at != own.last_at:
         _freshen(b, at, tally)
-    if tick >= own.again:
+    if not _is_far(tick, own):
         spare = _count_goals(b, tick, x, y, roads, tally)
         spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
         own.again = tick + ticks_within(spare - ROUNDING, spacing, b)
     for n in range(state.count[b]):
         tally.before_x[b, n] = state.x[b, n]
         tally.before_y[b, n] = state.y[b, n]
+
+
+@jit_look
+def _is_far(tick: int, own: TrialCounts) -> bool:
+    """Tell whether the ego is certain not to have reached a goal's disc, or the edge of the road of 2016."""
+    return tick < own.again
 
 
 @jit_inline
@@ -68,7 +70,7 @@ def _moved(b: int, n: int, state: State, tally: Tally) -> float:
     return sqrt(dx * dx + dy * dy)
 
 
-@jit
+@jit_rare
 def _others_move(b: int, state: State, tally: Tally) -> bool:
     moves = 0
     for n in range(1, state.count[b]):
@@ -78,7 +80,7 @@ def _others_move(b: int, state: State, tally: Tally) -> bool:
 
 @jit_inline
 def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally) -> None:
-    """Keep the smallest gap to the cars, who was sensed when, and whether anyone came too near by the rules of 2016."""
+    """Update the smallest gap to the cars, when each was sensed, and whether one came too near by the rules of 2016."""
     own = tally.trial[b]
     x, y = state.x[b, EGO], state.y[b, EGO]
     reach = own.clearance + 2.0 * cars.reach[b] + 1e-9
@@ -100,7 +102,7 @@ def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally)
 
 @jit
 def _look_closer(b: int, near2: float, state: State, cars: CarTable, tally: Tally) -> None:
-    """Look at the cars whose squared distance from the ego is up to `near2`."""
+    """Do so for the cars whose squared distance from the ego is up to `near2` (m2)."""
     own = tally.trial[b]
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - state.x[b, EGO]
@@ -120,11 +122,11 @@ def _car_gap(b: int, n: int, state: State, cars: CarTable) -> float:
     return apart - 2.0 * cars.rounding[b]
 
 
-@jit
+@jit_rare
 def _look_at_obstacles(
     b: int, state: State, cars: CarTable, obstacles: ObstacleTable, own: TrialCounts
 ) -> None:
-    """Keep the smallest gap to the obstacles."""
+    """Update the smallest gap to the obstacles."""
     x, y = state.x[b, EGO], state.y[b, EGO]
     for k in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[k]
@@ -138,7 +140,7 @@ def _look_at_obstacles(
 
 @jit_inline
 def _freshen(b: int, at: int, tally: Tally) -> None:
-    """Note that the ego is in the disc of `at`: coming into that of any other goal will be a visit."""
+    """Note that the ego is in the disc of `at`: coming into that of any other goal is then a visit."""
     own = tally.trial[b]
     own.last_at = at
     for g in range(own.first_goal, own.last_goal):
@@ -182,7 +184,7 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
 
 @jit_inline
 def _count_rounds(own: TrialCounts, tally: Tally) -> None:
-    """Count a round of samples, and one of visits, if all goals are done, which are then to do again."""
+    """Count a round of samples, and one of visits, if all goals are done; all goals then become undone."""
     sampled, visited = 1, 1
     for g in range(own.first_goal, own.last_goal):
         sampled &= tally.goal[g].sample_done

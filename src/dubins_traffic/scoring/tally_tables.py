@@ -1,4 +1,4 @@
-"""What is counted of the trials of a batch, as tables: of each trial, of its goals, of its cars."""
+"""The tally of a batch: what is counted of each trial, its goals and its cars."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.icra2016 import counts as counts_in_2016
 from dubins_traffic.scoring.margins_kernel import EgoFrame
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @record
 class TrialCounts:
-    """What is counted of a trial, and what that depends on."""
+    """The counts of a trial, and the parameters on which they depend."""
 
     net: int
     """The trial's road network."""
@@ -72,7 +72,7 @@ class TrialCounts:
 
 @record
 class GoalCounts:
-    """What is counted of a goal of a trial."""
+    """The counts of a goal of a trial."""
 
     vertex: int
     """Its intersection."""
@@ -93,7 +93,7 @@ class GoalCounts:
 
 
 class Tally(Tables):
-    """What is counted of each trial: `trial` (B,), and `goal` (G,), the goals of one trial after another, each once.
+    """The counts of each trial, `trial` (B,), and of its goals, `goal` (G,), one trial's after another's, each once.
 
     `counts` (B, N): 1 for the e-agents that count in the score of 2016; `sensed` (B, N): the last tick at which the car
     was within the ego's sensing radius, -1 before; `before_x`, `before_y` (B, N): where the cars were in the frame
@@ -115,7 +115,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     trial = table(TrialCounts, trials)
     trial["net"] = nets
     counts = np.zeros((trials, cars), dtype=np.int64)
-    kinds, index = kinds_of([instance.problem for instance in instances])
+    kinds, index = distinct_problems([instance.problem for instance in instances])
     rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
     trial["still"] = np.array([own.still_speed / kind.rate for own, kind in zip(rules, kinds, strict=True)])[
         index
@@ -145,7 +145,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
 
 
 class Counted(Tables):
-    """All that is counted from, and what is counted."""
+    """All tables that counting takes: the frame, roads, cars and obstacles, and the tally."""
 
     state: State
     labels: Labels

@@ -1,4 +1,4 @@
-"""How soon the ego would have met another car had nobody turned or braked.
+"""The metric `time_to_collision`: how soon the ego would have met another car if no car had turned or braked.
 
 Sources: J. C. Hayward, *Near-miss determination through use of a scale of danger*, 1972 (time to collision);
 M. M. Minderhoud, P. H. L. Bovy, *Extended time-to-collision measures for road traffic safety assessment*, 2001 (time

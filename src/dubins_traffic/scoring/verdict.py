@@ -30,13 +30,13 @@ EGO_RULES = tuple(rule for rule in breach_log.RULES if not rule.startswith("E"))
 HELD: Final[Status] = "presumably true"
 PENDING: Final[Status] = "presumably false"
 BROKEN: Final[Status] = "false"
-"""What is said of formulas that no finite run can make true."""
+"""Verdicts on formulas that no finite run can make true."""
 ASSUMPTIONS = ("E1", "E2", "E3", "E4", "E5", "E6")
 _SWITCHES = tuple((name, f"assume_{name.lower()}") for name in ASSUMPTIONS)
 
 
 class Ruling(StrEnum):
-    """What is said of a trial (docs/rules.md#verdicts)."""
+    """The ruling on a trial (docs/rules.md#verdicts)."""
 
     SATISFIED = "satisfied"
     VIOLATED = "violated"
@@ -92,7 +92,7 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class Excuse:
-    """What excuses the ego: the breach with which the assumption fell, and of which part of it (`assumption`).
+    """What excuses the ego: the first breach of the assumption, and the part of it that was broken (`assumption`).
 
     `sensed` tells whether that car was within the sensing radius at some frame of the last `witness_time` before the
     ego's first breach.
@@ -123,10 +123,10 @@ class Verdict:
     clean : bool
         Whether the ego broke nothing, whatever others did.
     excuse : Excuse or None
-        Of an excused trial.
+        The excuse of an excused trial.
     near : bool or None
-        Of an excused trial: whether each breach of the ego had a breach by a car within the sensing radius in the
-        same frame or the `witness_time` before it. It informs, and ranks nothing.
+        Of an excused trial: whether before each breach of the ego, by at most `witness_time`, there was a breach by an
+        e-agent within the sensing radius. It does not enter any ranking.
     violations : tuple of Violation
         Every breach of every car, in order of time.
     collisions : tuple of Collision
@@ -135,9 +135,9 @@ class Verdict:
         Rounds of visits; `longest_gap_s` is the longest gap between visits of a goal (None without goals) and
         `gap_limit_s` the longest that `satisfied` allows (None if there is no round through all goals).
     formulas : dict
-        What holds of each formula so far, in four values.
+        The verdict on each formula so far, in four values.
     robustness : dict
-        How far the ego stayed from breaking rules 1 and 2, metres (`dubins_traffic.scoring.margins`).
+        Margins of rules 1 and 2, metres (`dubins_traffic.scoring.margins`).
     """
 
     verdict: Ruling
@@ -204,22 +204,22 @@ def reach_verdict(
     Parameters
     ----------
     instance, rules
-        What has been run, and the parameters of its rules.
+        The instance that was run, and the parameters of its rules.
     breaches
-        All that was broken, in order.
+        All breaches, in order.
     collisions, visits
         The ego's.
     visited_now
         For each goal, once, whether a visit of the ego's begins in the last frame.
     was_sensed
-        Asked for (car, first, last), where last is the ego's first breach: whether the car was within the sensing
-        radius at a frame from first to last.
+        Called with (car, first, last), where last is the frame of the ego's first breach; tells whether the car was
+        within the sensing radius at a frame from first to last.
     seen
-        Asked for (car, tick) of a breach by an e-agent: whether that car was within the sensing radius then.
+        Called with (car, tick) of a breach by an e-agent; tells whether the car was within the sensing radius then.
     running
-        What hangs over the cars after the last frame.
+        The pending obligations after the last frame.
     margins
-        How far the ego stayed from breaking rules 1 and 2.
+        The margins of the ego, by rule.
     whole
         Whether the trial ran its whole planned duration.
     """
@@ -308,7 +308,7 @@ def assumed(rules: RuleParameters) -> tuple[str, ...]:
 
 
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
-    """Return which part of the assumption falls first, and with which breach; None if it holds.
+    """Return the part of the assumption that is broken first, with its breach; None if the assumption holds.
 
     Breaches of E1 that a car is allowed (`rules.exceptions`) don't count.
     """

@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -95,11 +95,6 @@ def phase_of(session: Session, slug: str, name: str) -> Phase | None:
     """Return a phase by the address of its competition and its name."""
     query = select(Phase).join(Competition).where(Competition.slug == slug, Phase.name == name)
     return session.scalars(query.options(joinedload(Phase.competition))).first()
-
-
-def limits_of(phase: files.Phase) -> Mapping[str, object]:
-    """Return what a submission may use in a trial, by the names of the competition file."""
-    return phase.limits.model_dump()
 
 
 def default_key(folder: Path) -> Path:

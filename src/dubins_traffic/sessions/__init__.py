@@ -1,1 +1,1 @@
-"""Sessions: trials whose ego, e-agents or world are other processes."""
+"""Sessions: trials in which other processes drive the ego or e-agents, or move the world."""

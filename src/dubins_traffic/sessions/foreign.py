@@ -1,4 +1,4 @@
-"""Trials whose maestro is not ours: simulator and referee are here, problems and the ends of trials come from there."""
+"""Trials under a maestro in another process, which sends problems and ends trials; simulator and referee run here."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from dubins_traffic.transports.foreign import ForeignMaestro
 from dubins_traffic.transports.link import Link
 
 LONGEST = 3_600.0
-"""Seconds of a trial that its maestro never ends."""
+"""Longest duration of a trial that its maestro does not end, seconds."""
 SHORT = 0.5
 """Seconds by which a trial may be shorter than the shortest duration and still count as whole."""
 TOPIC = "the other maestro's problem instance"
 
 
 class _Kept:
-    """A sink that keeps a trial until its duration is known, which the maestro tells by ending it."""
+    """A sink that keeps the frames of a trial until its duration is known: when the maestro ends it."""
 
     def __init__(self) -> None:
         self._blocks: list[Frames] = []
 
     def begin(self, instance: Instance) -> None:
-        """Wait for the duration."""
+        """Do nothing yet: the duration is unknown."""
 
     def frames(self, frames: Frames) -> None:
         """Keep a block."""
         self._blocks.append(frames)
 
     def end(self, ending: Ending) -> None:
-        """Keep nothing: the session knows."""
+        """Do nothing: the session sets the ending."""
 
     def pour(self, instance: Instance, ending: Ending, sinks: Sequence[Sink]) -> None:
-        """Feed the trial to `sinks`, as a trial of `instance`."""
+        """Hand the kept frames to `sinks`, as a trial of `instance`."""
         for sink in sinks:
             sink.begin(instance)
             for block in self._blocks:
@@ -56,9 +56,9 @@ class _Kept:
 def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Iterator[Result]:
     """Run the trials that `maestro` starts and yield their results.
 
-    Cars, e-agents and bounds are those of the session's instances; network, goals and radius those that the maestro
-    tells. A trial lasts until the maestro ends it, and that is its duration; one that it ends more than half a second
-    before the `shortest` duration (seconds) has been reset.
+    Cars, e-agents and bounds are those of the session's instances; network, goals and radius come from the maestro. A
+    trial lasts until the maestro ends it, and that is its duration. A trial that the maestro ends more than half a
+    second before the `shortest` duration (seconds) counts as reset.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Ite
 
 
 def _look(link: Link, maestro: ForeignMaestro) -> None:
-    """End the trial that runs if the maestro has ended it; else let who waits look again."""
+    """End the running trial if the maestro has ended it; otherwise wake those who wait."""
     if link.running and maestro.over:
         link.inbox.stop(End.DURATION, "")
     else:
@@ -92,7 +92,7 @@ def _look(link: Link, maestro: ForeignMaestro) -> None:
 
 
 def _await_problem(session: Session, maestro: ForeignMaestro, instance: Instance, which: str) -> Instance:
-    """Show the world until the maestro tells a problem; return what is to be run."""
+    """Show the world until the maestro sends a problem; return the instance to run."""
     link, inbox = session.link, session.link.inbox
     session.say(f"{which}: waiting for a problem instance from the other maestro")
     try:
@@ -114,12 +114,12 @@ def _await_problem(session: Session, maestro: ForeignMaestro, instance: Instance
 
 
 def with_problem(instance: Instance, text: str) -> Instance:
-    """Return `instance` with the network, goals and radius of the problem that `text` tells.
+    """Return `instance` with the network, goals and radius of the problem in `text`.
 
     Raises
     ------
     InputError
-        If it tells none.
+        If `text` is no problem.
     """
     document = parse_json(text, TOPIC)
     more: dict[str, Any] = {"version": 1, "duration": 1.0, "e-agents": []}
@@ -135,7 +135,7 @@ def with_problem(instance: Instance, text: str) -> Instance:
 
 
 def _settled(result: Result, kept: _Kept, shortest: float, path: Path | None) -> Result:
-    """Return the result of a trial whose duration is known by now, and write its record."""
+    """Return the result of a trial, with the duration that is now known, and write its record."""
     ending = result.ending
     seconds = max(1, ending.ticks) / result.instance.problem.rate
     duration = seconds

@@ -18,13 +18,13 @@ def run_over_lcm(
     Parameters
     ----------
     session_plan : SessionPlan
-        What is run.
+        The plan of the session.
     pace : Pace
-        How drivers are waited for.
+        Its clock, and how long drivers are waited for.
     url : str, optional
         An LCM URL; by default that of ``LCM_DEFAULT_URL``, else multicast within this machine.
     wait : bool
-        Whether a trial begins when a program asks START; else it begins at once.
+        Whether each trial waits for a message START; otherwise it begins at once.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def run_over_lcm(
     MissingExtraError
         If the extra `lcm` is not installed.
     InputError
-        If the URL is none of LCM, or an instance can't be drawn.
+        If the URL is not one of LCM, or an instance can't be drawn.
     """
     maestro = Maestro() if wait else None
     transport = Lcm(url, maestro)

@@ -12,16 +12,16 @@ from dubins_traffic.transports.lines import Lines
 def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
-    A trial begins when the one before is over.
+    Each trial begins when the one before is over.
 
     Parameters
     ----------
     session_plan : SessionPlan
-        What is run.
+        The plan of the session.
     pace : Pace
-        How drivers are waited for.
+        Its clock, and how long drivers are waited for.
     port : int
-        Where to listen on the loopback interface; 0 takes any free port, which is said.
+        Port on the loopback interface; 0 takes any free port, which is then printed.
 
     Raises
     ------

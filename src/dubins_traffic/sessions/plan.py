@@ -1,6 +1,6 @@
-"""Sessions over a transport, from what a user names: a configuration, an instance or a record.
+"""Plans of sessions over a transport, from a configuration, an instance or a record.
 
-Unlike the jobs of a run (`runs.plan`), the trials of a session are drawn one after another, and share one line.
+Unlike the jobs of a run (`runs.plan`), the trials of a session are drawn one after another, and share one connection.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.patience import Patience
 
 REHEARSAL = 1.2
-"""Seconds: more than a block of frames."""
+"""Duration of the trial that `rehearse` runs, seconds: more than a block of frames."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How a session meets its drivers in time.
+    """The pace of a session: its clock, and how long drivers are waited for.
 
     Parameters
     ----------
     lockstep : bool
-        Whether the simulation waits for a command of every remote car each tick; else it runs in real time.
+        Whether the simulation waits for a command of every remote car in each tick; otherwise it runs in real time.
     factor : float
-        How many times as fast as the wall clock, in real time.
+        Speed of simulated time relative to the wall clock, in real time.
     deadline : float
         Seconds within which a command must come in lockstep.
     patience : Patience
@@ -61,7 +61,7 @@ class Pace:
     Raises
     ------
     InputError
-        If there is no such clock.
+        If a value is out of range.
     """
 
     lockstep: bool = False
@@ -70,7 +70,7 @@ class Pace:
     patience: Patience = field(default_factory=Patience)
 
     def __post_init__(self) -> None:
-        """Refuse what is no clock before anything is opened."""
+        """Refuse values of which no clock can be made, before a transport is opened."""
         self.clock()
 
     def clock(self) -> Clock:
@@ -80,11 +80,11 @@ class Pace:
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What a session runs: where its instances come from, how many trials, and where things are written.
+    """What a session runs: the source of its instances, the number of trials, and where results are written.
 
-    `trials` is None for trials without end. `controller` is None if the ego is driven elsewhere. `shield` tells whether
-    the ego drives under the shield. `say` is told, in lines for people, what the session does and waits for.
-    `overwrite` and `append` say what becomes of records that are there (`claim`), and `earlier` what those were.
+    `trials` is None for an endless session. `controller` is None if another process drives the ego. `shield` tells
+    whether the ego drives under the shield. `say` is called with lines for people on what the session does and waits
+    for. `overwrite` and `append` decide about existing records (`claim`); `earlier` is what those are.
     """
 
     supply: Callable[[int], Instance]
@@ -102,7 +102,7 @@ class SessionPlan:
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def claim(self, transport: str) -> SessionPlan:
-        """Return this session over the transport of that name, with its folder for records made ready.
+        """Return this plan for the transport of that name, after preparing the folder for records.
 
         Raises
         ------
@@ -134,11 +134,11 @@ class SessionPlan:
         at: Callable[[], str] | None = None,
         foreign: ForeignMaestro | None = None,
     ) -> Iterator[Result]:
-        """Run it over `transport`, which is closed however that ends; see `remote.run_remote`.
+        """Run the session over `transport`, which is closed in any case; see `remote.run_remote`.
 
-        Once the transport is open, `world` makes the simulator, instead of the one that instances name, and `at`
-        returns a line for people that says where the transport is. `foreign` starts and ends the trials if it is given,
-        see `foreign.run_under`.
+        Once the transport is open, `world` makes the simulator, in place of the one that instances name, and `at`
+        returns a line for people with the transport's address. `foreign`, if given, starts and ends the trials; see
+        `foreign.run_under`.
         """
         held = ExitStack()
         try:
@@ -183,25 +183,25 @@ class SessionPlan:
         maestro: Maestro | None = None,
         at: Callable[[], str] | None = None,
     ) -> Iterator[Result]:
-        """Do all that a session is over a transport that needs nothing else: claim the folder, compile, run.
+        """Claim the folder, compile and run: all of a session over a transport that needs nothing else.
 
         Parameters
         ----------
         transport : Transport
-            Not yet open; closed at the end.
+            The transport, not yet open; it is closed at the end.
         pace : Pace
-            How drivers are waited for.
+            The clock, and how long drivers are waited for.
         maestro : Maestro, optional
-            Whose leave every trial awaits; without one a trial begins when the one before is over.
+            Starts every trial; without one each trial begins when the one before is over.
         at : callable, optional
-            Returns a line for people that says where the transport is, once it is open.
+            Returns a line for people with the transport's address, once that is open.
         """
         claimed = self.claim(transport.name)
         claimed.rehearse()
         yield from claimed.run(transport, pace, maestro, at=at)
 
     def rehearse(self) -> None:
-        """Compile all that trials need, before anyone waits for them."""
+        """Compile the kernels that trials need, before drivers wait for them."""
         self.say("compiling what trials need; the first time on a machine takes minutes")
         began = monotonic()
         rehearse(self.supply(0), shield=self.shield)
@@ -228,39 +228,40 @@ def session_plan(
     append: bool = False,
     shield: bool = False,
 ) -> SessionPlan:
-    """Return what a session shall run, checked as far as can be before anything is opened.
+    """Return the plan of a session, with everything checked that can be checked before the transport is opened.
 
     Parameters
     ----------
     source : path or str
         A trials configuration (file or shipped name), an instance or a record.
     controller : str, optional
-        Drives the ego in this process; by default it is driven elsewhere.
+        Drives the ego in this process; by default another process drives it.
     trials : int, optional
-        How many trials of a configuration; by default as many as it says.
+        Number of trials of a configuration; by default as many as it says.
     endless : bool
         Whether trials follow each other until the session is interrupted.
     seed : int, optional
-        Of a configuration, or of an instance that has none; 0 by default.
+        Seed of a configuration's trials, or of an instance document without one; 0 by default.
     rnd : path, optional
-        A road network instead of the configuration's.
+        A road network that replaces the configuration's.
     remote : sequence of str
-        Names of e-agents that are driven elsewhere whatever their type says.
+        Names of e-agents that other processes drive, whatever their type says.
     data : path, optional
-        Where to write the trial data file of a configuration; refused if it exists unless `overwrite_data`.
+        File for the trial data of a configuration; refused if it exists unless `overwrite_data`.
     records : path, optional
         Folder for the records, made if missing. One that holds records is refused, unless one of the following.
     overwrite : bool
-        Whether records that the folder holds are removed before.
+        Whether to remove the records that the folder holds first.
     append : bool
-        Whether they stay, and their trials are not run again; they must be of the same driver and instances.
+        Whether to keep the records that the folder holds and run only the other trials; they must be of the same
+        driver and instances.
     shield : bool
-        Whether the ego, wherever it is driven, drives under the shield (`controllers.shield`).
+        Whether the ego drives under the shield (`controllers.shield`), whatever process drives it.
 
     Raises
     ------
     InputError
-        If anything of this is wrong; then nothing has been written.
+        If an argument or the source is wrong; nothing has been written then.
     """
     check_choice(records, data, overwrite=overwrite, append=append)
     found = load_runnable(source, rnd=rnd, seed=seed or 0)
@@ -294,9 +295,9 @@ def session_plan(
 
 
 def rehearse(instance: Instance, *, shield: bool = False) -> None:
-    """Run a second of `instance` with nobody at the wheel, so that nothing is left to compile when time counts.
+    """Run about a second of `instance` without drivers, so that all kernels are compiled before time counts.
 
-    The ego drives under the shield if `shield`, and every laser sweeps once, as when someone listens to it.
+    The ego drives under the shield if `shield`, and every laser sweeps once, as for a peer that receives scans.
     """
     agents = tuple(
         replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
@@ -312,7 +313,7 @@ def rehearse(instance: Instance, *, shield: bool = False) -> None:
 
 
 def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> Instance:
-    """Return instance `number` of `supply`, to be moved by `simulator`."""
+    """Return instance `number` of `supply`, with `simulator` as its simulator."""
     return replace(supply(number), simulator=simulator)
 
 

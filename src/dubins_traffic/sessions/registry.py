@@ -1,6 +1,6 @@
-"""The transports over which sessions run: one entry says all that the command line and a test need of each.
+"""The transports over which sessions run: one entry holds all that the command line and tests need of each.
 
-Nothing heavy is imported here; what runs a session is found by its name when it is asked for.
+No heavy module is imported here; the function that runs a session is imported by name when it is needed.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """An option of a transport's own.
+    """An option of one transport.
 
     Parameters
     ----------
     flag : str
-        As it is typed: ``--port``.
+        The option as it is typed: ``--port``.
     kind : type
         ``bool``, ``int`` or ``str``.
     help : str
         One line.
     name : str
-        The parameter of what runs the session; by default the flag without its hyphens.
+        The parameter of the function that runs the session; by default the flag without its hyphens.
     default : bool, int or str, optional
-        Its value where it is not given.
+        Its value if it is not given.
     metavar : str, optional
-        What stands for its value in the help text.
+        Stands for its value in the help text.
     low, high : int, optional
         Bounds of its value.
     shown : str, optional
-        What the help text says in place of the default.
+        Replaces the default in the help text.
     """
 
     flag: str
@@ -50,13 +50,13 @@ class Option:
 
     @property
     def parameter(self) -> str:
-        """Name of the parameter that is given its value."""
+        """Name of the parameter that gets its value."""
         return self.name or self.flag.removeprefix("--")
 
 
 @dataclass(frozen=True, slots=True)
 class TransportEntry:
-    """What there is to say of a transport.
+    """The registry's entry for a transport.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ class TransportEntry:
     examples : tuple of str
         Command lines, without the program's name.
     options : tuple of Option
-        Of ``run``, beside those that all transports share.
+        Options of ``run``, beside those that all transports share.
     remappings : bool
-        Whether ``name:=value``, as roslaunch adds to a command line, is passed over.
+        Whether ``name:=value``, as roslaunch adds to a command line, is ignored.
     """
 
     runs: Callable[..., Iterator[Result]] | str
@@ -84,7 +84,7 @@ class TransportEntry:
 
     @property
     def runner(self) -> Callable[..., Iterator[Result]]:
-        """What runs a session."""
+        """The function that runs a session."""
         if not isinstance(self.runs, str):
             return self.runs
         module, _, name = self.runs.partition(":")

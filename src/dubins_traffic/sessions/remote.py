@@ -1,4 +1,4 @@
-"""Trials whose ego, or some of whose e-agents, are driven by other processes."""
+"""Runs trials in which other processes drive the ego or some of the e-agents."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ from dubins_traffic.transports.maestro import Maestro, Next, Phase
 
 
 def quiet(_line: str) -> None:
-    """Say nothing."""
+    """Do nothing: for sessions without lines for people."""
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What is run over a transport.
+    """A session over a transport.
 
     Parameters
     ----------
     link : Link
-        To the drivers elsewhere.
+        Connects to the drivers in other processes.
     supply : callable
         Returns instance number n; called with 0, 1, 2, ... as instances are drawn.
     trials : int, optional
-        After how many trials the session ends; None: never by itself.
+        Number of trials after which the session ends; None: never.
     maestro : Maestro, optional
-        Whose leave to start every trial awaits; without one a trial starts when its predecessor is over.
+        Starts every trial; without one each trial starts when the one before is over.
     controller : str or Controller
         Drives the ego if the link does not.
     remote : tuple of str
-        Names of e-agents that are driven elsewhere whatever their type says.
+        Names of e-agents that other processes drive, whatever their type says.
     simulator : Simulator, optional
-        Instead of the one that instances name.
+        Replaces the simulator that instances name.
     records : Path, optional
         Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
     earlier : Earlier
-        What an earlier session has run of it: the trials that are over count, and are not run again.
+        How far an earlier session has come: its ended trials count, and are not run again.
     say : callable
-        Is told, in lines for people, what the session does and waits for.
+        Called with lines for people on what the session does and waits for.
     """
 
     link: Link
@@ -67,7 +67,7 @@ class Session:
 
 
 def run_remote(session: Session) -> Iterator[Result]:
-    """Run the trials of `session` and yield their results, those of trials that were restarted too.
+    """Run the trials of `session` and yield their results, including those of trials that were restarted.
 
     A trial that ends by a peer's fault is a result like any other, and the next one follows. The link is left open.
 
@@ -129,12 +129,12 @@ def check_lost(link: Link) -> None:
 
 
 def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
-    """Return `instance` with the e-agents named in `remote` driven elsewhere.
+    """Return `instance` with the e-agents named in `remote` made remote.
 
     Raises
     ------
     InputError
-        If one of them is none of its e-agents.
+        If it has no e-agent of one of these names.
     """
     wanted = set(remote)
     for name in sorted(wanted - set(instance.names[1:])):
@@ -150,7 +150,7 @@ def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
 
 
 def _await_start(session: Session, instance: Instance, which: str) -> tuple[Next, Instance]:
-    """Show the world until someone starts it or wants another one; return it with its cars where they were put."""
+    """Show the world until a peer starts the trial or asks for another; return the instance with its cars as placed."""
     maestro, link = session.maestro, session.link
     if maestro is None:
         return Next.RUN, instance

@@ -1,4 +1,4 @@
-"""A session over the standard streams of programs that it begins."""
+"""A session over the standard streams of programs that it starts."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def run_over_stdio(
     Parameters
     ----------
     session_plan : SessionPlan
-        What is run.
+        The plan of the session.
     pace : Pace
-        How drivers are waited for.
+        Its clock, and how long drivers are waited for.
     program : str
-        The command line that is begun for each remote car with each trial; in a box what `submission.program_of` takes.
+        The command line that is started for each remote car in each trial; in a box what `submission.program_of` takes.
     sandbox : bool
-        Whether it runs in a box, with the usual limits on memory, processes and files, and what `pace` says of time.
+        Whether it runs in a box, with the default limits on memory, processes and files; `pace` limits its time.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def run_over_stdio(
         If there is no such program, no box can be made, or an instance can't be drawn.
     """
     if not program:
-        raise InputError("missing", file="--program", expected="a command line to begin")
+        raise InputError("missing", file="--program", expected="a command line to start")
     transport = Stdio(_boxed(program) if sandbox else _child(program))
     yield from session_plan.over(transport, pace, at=lambda: f"the standard streams of {program}")
 

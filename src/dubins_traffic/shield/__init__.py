@@ -1,1 +1,1 @@
-"""The shield: the command nearest to the one asked for with which the ego breaks none of rules 1 to 3."""
+"""The shield: replaces a command that would break rules 1 to 3 by the nearest one found that breaks none."""

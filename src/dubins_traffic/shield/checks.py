@@ -1,4 +1,4 @@
-"""Whether a command, held for one tick, leaves the ego where it can stand for ever and break nothing (compiled)."""
+"""Whether after one tick of a command the ego can stand for ever without breaking a rule (compiled)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.tables import REASON, ShieldTables
 
 VERGE = 0.005
-"""What the centre keeps from the edge of the road, metres."""
+"""Distance that the centre keeps from the edge of the road, metres."""
 BRINK = 0.002
-"""What the body keeps from where it counts as left, and from a disc that it may not enter, metres."""
+"""Distance that the body keeps from where it counts as left, and from a disc that it may not enter, metres."""
 TURNING = 0.01
-"""What is kept of the way back that counts as turning round, metres."""
+"""The ego backs up by this much less than what counts as turning round, metres."""
 
 
 @jit_inline
@@ -41,7 +41,7 @@ def bounded(speed: float, yaw_rate: float, vehicle: Vehicle) -> Command:
 
 @jit_inline
 def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch: Scratch) -> int:
-    """List in `scratch.near` the cars that the ego may touch in this tick, of those within sight; return how many.
+    """List in `scratch.near` the cars within sight that the ego may touch in this tick; return how many are listed.
 
     `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
     """
@@ -59,7 +59,7 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
 
 @jit
 def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, vehicle: Vehicle) -> bool:
-    """Tell whether a command could bring about a contact, were the `near` (count) others to do their worst for a tick.
+    """Tell whether a command could lead to a contact in a tick if the `near` (count) listed cars did their worst.
 
     `keeps_clear` looks at five poses of the arc; between two of them no point gets farther from both than an eighth
     of its way, which GUARD covers unless ticks are long.
@@ -80,8 +80,8 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
 
 
 @jit
-def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, guards: ShieldTables) -> int:
-    """Return what a command within bounds would break, in a tick or in those after it if the ego then stands.
+def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, shields: ShieldTables) -> int:
+    """Return the rule (a `REASON`) that a command within bounds would break, in its tick or while the ego then stands.
 
     `near` (count) is how many cars `gather_close` has listed.
 
@@ -109,7 +109,7 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     if found != REASON.NOTHING:
         return found
     at = v if away2 < vehicle.disc * vehicle.disc else -1
-    found = _leaves_lane(b, at, segment, off2, after, traffic, guards)
+    found = _leaves_lane(b, at, segment, off2, after, traffic, shields)
     if found != REASON.NOTHING:
         return found
     return REASON.CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else REASON.NOTHING
@@ -117,7 +117,7 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
 
 @jit
 def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
-    """Return which part of rule 3 an ego that goes to a pose breaks; the nearest intersection to that is v."""
+    """Return which part of rule 3 (a `REASON`) the ego breaks by going to a pose, to which v is the nearest vertex."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     net = drivers.net[b]
@@ -147,19 +147,19 @@ def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
 
 @jit
 def _leaves_lane(
-    b: int, at: int, segment: int, off2: float, pose: Pose, traffic: Traffic, guards: ShieldTables
+    b: int, at: int, segment: int, off2: float, pose: Pose, traffic: Traffic, shields: ShieldTables
 ) -> int:
-    """Return whether an ego that goes to a pose, in the disc of `at` (-1: none), is left there or turns round."""
+    """Return whether the ego is left or turns round (a `REASON`) at a pose in the disc of `at` (-1: none)."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     lane = labels.lane[b, EGO]
-    back = guards.ego[b].turn_back
+    back = shields.ego[b].turn_back
     if at >= 0:
         return REASON.NOTHING
     after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
     after, top, progress, lateral, turned = along_lane(
-        roads, net, after, fresh, guards.ego[b].top, back, pose
+        roads, net, after, fresh, shields.ego[b].top, back, pose
     )
     if turned:
         return REASON.TURN
@@ -171,7 +171,7 @@ def _leaves_lane(
     half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
-        return REASON.RETURN if reach >= guards.ego[b].left_release else REASON.NOTHING
+        return REASON.RETURN if reach >= shields.ego[b].left_release else REASON.NOTHING
     if reach <= vehicle.over - BRINK:
         return REASON.NOTHING
     return (
@@ -181,7 +181,7 @@ def _leaves_lane(
 
 @jit
 def _reach(b: int, lane: int, traffic: Traffic, net: int, vehicle: Vehicle) -> float:
-    """Return the largest lateral coordinate of the ego's body in `lane`, if that is its lane state."""
+    """Return the largest lateral coordinate of the ego's body in `lane`, its lane state, metres."""
     state, labels, roads = traffic.state, traffic.labels, traffic.roads
     if labels.lane[b, EGO] != lane:
         return 0.0

@@ -1,4 +1,4 @@
-"""The shield of one ego, tick by tick: from observations and asked commands to commands that break no rule."""
+"""The shield of one ego, tick by tick: takes observations and commands, returns commands that break no rule."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
-from dubins_traffic.roads.straight import require_straight
 from dubins_traffic.roads.table import pack
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
@@ -19,7 +19,7 @@ from dubins_traffic.shield.tables import (
     ShieldTables,
     check_overtakes,
     egos,
-    guards,
+    shield_tables,
 )
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Intervention(NamedTuple):
-    """A tick in which the shield stepped in: what was asked for, what was done, and the rule that was at stake."""
+    """A tick in which the shield stepped in: the command given, the command done, and the rule at stake."""
 
     tick: int
     asked: tuple[float, float]
@@ -36,7 +36,7 @@ class Intervention(NamedTuple):
 
 
 class ShieldFilter:
-    """Keeps an ego within rules 1 to 3, whatever it is asked to do (`shield.nearest_command`, docs/shield.md).
+    """Keeps an ego within rules 1 to 3, whatever commands it is given (`shield.nearest_command`, docs/shield.md).
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class ShieldFilter:
     Attributes
     ----------
     intervention : Intervention or None
-        Of the last tick; None if its command was let through.
+        That of the last tick; None if its command was let through.
     count : int
-        How many ticks the shield has stepped in.
+        Number of ticks in which the shield has stepped in.
     """
 
     def __init__(self, *, overtakes: Overtakes = "sure") -> None:
@@ -66,24 +66,25 @@ class ShieldFilter:
     def start(self, problem: Problem) -> None:
         """Prepare for a trial; InputError if the car can't keep the rules (`policies.rules.fitness`)."""
         check_fit(problem, owes=False)
-        require_straight(problem.network, "the shield")
         cars = 1 + len(problem.e_agents)
         self.intervention = None
         self.count = 0
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
         self._command = np.zeros((1, cars, 2))
+        bodies = pack_obstacles([problem.obstacles])
         self._traffic = Traffic(
             self._state,
             self._labels,
             pack([problem.network], [problem.car.lane_width]),
-            pack_obstacles([problem.obstacles]),
+            bodies,
             egos([problem], cars, np.zeros(1, dtype=np.int64)),
-            scratch(cars, len(problem.network.segments)),
+            scratch(cars, len(problem.network.segments), bodies),
         )
-        self._guards: ShieldTables = guards([problem], self._traffic, overtakes=self._overtakes)
+        self._shields: ShieldTables = shield_tables([problem], self._traffic, overtakes=self._overtakes)
         self._tick = np.full(1, -1)
-        self._shield()  # compiles, so that nobody waits for that in the first tick
+        self._bound = bound(shield)
+        self._shield()  # called once so that kernels are compiled before the first tick
 
     def filter(self, observation: Observation, command: tuple[float, float]) -> Command:
         """Return `command`, or the nearest one found with which the ego breaks nothing.
@@ -101,7 +102,7 @@ class ShieldFilter:
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
         self._shield()
-        reason = int(self._guards.ego[0].reason)
+        reason = int(self._shields.ego[0].reason)
         given = Command(*self._command[0, EGO].tolist())
         self.intervention = None
         if reason:
@@ -110,4 +111,4 @@ class ShieldFilter:
         return given
 
     def _shield(self) -> None:
-        shield(self._tick, True, self._traffic, self._guards, self._command)
+        self._bound(self._tick, True, self._traffic, self._shields, self._command)

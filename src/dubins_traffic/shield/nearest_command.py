@@ -1,10 +1,10 @@
-"""The shield, compiled: the command nearest to the one asked for with which the ego breaks none of rules 1 to 3.
+"""Finds the command nearest to a given one with which the ego breaks none of rules 1 to 3 (compiled).
 
-A car that stands breaks nothing and is never at fault. So a command is let through if, after one tick of it, the ego
-can stand for ever (`shield.checks`): then nothing goes wrong whatever the others do within E1 and E2. There is
-one exception: a car that is left of the centre line has to return. So nobody crosses that line but as the law of the
-road does (`policies.rules.policy`), where the way back is sure (`shield.way_back`), and the law drives until the ego
-is in its lane again.
+A car that stands breaks no rule and is never at fault. So a command is let through if, after one tick of it, the ego
+can stand for ever (`shield.checks`): then no rule is broken whatever the others do within E1 and E2. There is
+one exception: a car that is left of the centre line has to return. So the ego crosses that line only by commands of the
+law of the road (`policies.rules.policy`), where the way back is sure (`shield.way_back`), and the law drives until the
+ego is in its lane again.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.lists import list_cars, unlist_cars
-from dubins_traffic.policies.rules.passing import BACK, TURNING, along, find_way_past
+from dubins_traffic.policies.rules.passing import along, find_way_past, passing_time
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
+from dubins_traffic.policies.rules.unrolled import bends_ahead, put_back, unroll
 from dubins_traffic.roads.lookup import lane_coordinates
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.propositions import FLAG
@@ -28,16 +29,16 @@ from dubins_traffic.shield.tables import MODE, REASON, ShieldTables
 from dubins_traffic.shield.way_back import copy_memory, drive_alone, drive_by_law, surely_returns
 
 HALVINGS = 6
-"""The speed nearest to the one asked for is found to this many binary digits."""
+"""Number of bisections by which the speed nearest to the given one is found."""
 SHIFTS = 5
-"""Yaw rates are tried that differ from the one asked for by 1/2, 1/4 ... of the largest, so many either way."""
+"""Number of yaw rates tried to either side: they differ from the given one by 1/2, 1/4 ... of the largest."""
 STEPS = 4
-"""With each of them this many speeds are tried."""
+"""Number of speeds tried with each of these yaw rates."""
 
 
 @jit
-def shield(tick: Any, sighted: bool, traffic: Traffic, guards: ShieldTables, commands: Floats) -> None:
-    """Put what each ego does in place of what it was asked to do, `commands[:, 0]`.
+def shield(tick: Any, sighted: bool, traffic: Traffic, shields: ShieldTables, commands: Floats) -> None:
+    """Replace the command of each ego, `commands[:, 0]`, if it would break a rule.
 
     Parameters
     ----------
@@ -45,41 +46,41 @@ def shield(tick: Any, sighted: bool, traffic: Traffic, guards: ShieldTables, com
         The present frame of each trial, -1 for those to leave alone. None may be left out.
     sighted : bool
         Whether the ego sees all cars that there are in `state`; else those within the sensing radius.
-    state, labels, roads, obstacles
-        The trials.
-    drivers, guards, scratch
-        `tables.egos`, what the shield remembers, and room to work in.
+    traffic : Traffic
+        The trials; its drivers are those of `tables.egos`.
+    shields : ShieldTables
+        Memory of the shields; `shields.ego["reason"]` tells afterwards why each has stepped in.
     commands : (B, N, 2)
-        Speed and yaw rate of every car; `guards.ego["reason"]` tells why the shield stepped in.
+        Speed, m/s, and yaw rate, rad/s, of every car.
     """
     for b in range(tick.shape[0]):
         if tick[b] >= 0:
-            sight2 = -1.0 if sighted else guards.ego[b].sight2
-            shield_trial(b, tick[b], sight2, traffic, guards, commands)
+            sight2 = -1.0 if sighted else shields.ego[b].sight2
+            shield_trial(b, tick[b], sight2, traffic, shields, commands)
 
 
 @jit
 def shield_trial(
-    b: int, tick: int, sight2: float, traffic: Traffic, guards: ShieldTables, commands: Floats
+    b: int, tick: int, sight2: float, traffic: Traffic, shields: ShieldTables, commands: Floats
 ) -> None:
-    """Put what the ego of trial b does in place of what it was asked to do; `sight2` (m2) as for `gather_close`."""
+    """Replace the command of the ego of trial b if it would break a rule; `sight2` (m2) as for `gather_close`."""
     state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     asked, asked_yaw = commands[b, EGO, 0], commands[b, EGO, 1]
-    _remember(b, tick, traffic, guards)
+    _remember(b, tick, traffic, shields)
     left = np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0
-    law = _lawful(b, tick, left, sight2, traffic, guards, commands)
+    law = _lawful(b, tick, left, sight2, traffic, shields, commands)
     if not left:
-        guards.ego[b].kept = 0
+        shields.ego[b].kept = 0
     near = gather_close(b, state, sight2, vehicle, scratch)
-    obeys = _may_obey(b, tick, sight2, law, near, traffic, guards)
+    obeys = _may_obey(b, tick, sight2, law, near, traffic, shields)
     near = gather_close(b, state, sight2, vehicle, scratch)
     finite = asked - asked == 0.0 and asked_yaw - asked_yaw == 0.0
     wanted = bounded(asked, asked_yaw, vehicle) if finite else Command(0.0, 0.0)
     reason = REASON.NOTHING if finite else REASON.NUMBER
     if finite and not (obeys and _same(wanted, law)):
-        reason = refusal(b, wanted.speed, wanted.yaw_rate, near, traffic, guards)
-    guards.ego[b].reason = reason
+        reason = refusal(b, wanted.speed, wanted.yaw_rate, near, traffic, shields)
+    shields.ego[b].reason = reason
     if reason == REASON.NOTHING:
         commands[b, EGO, 0] = asked
         commands[b, EGO, 1] = asked_yaw
@@ -87,14 +88,14 @@ def shield_trial(
         if left:
             wanted = law if obeys else Command(0.0, 0.0)
         else:
-            wanted = _nearest(b, wanted, obeys, law, near, traffic, guards)
+            wanted = _nearest(b, wanted, obeys, law, near, traffic, shields)
         commands[b, EGO, 0] = wanted.speed
         commands[b, EGO, 1] = wanted.yaw_rate
     obeyed = _same(wanted, law)
     passes = drivers.car[b, EGO].aside != 0.0 and not left
-    guards.ego[b].strayed = 1 if passes and (guards.ego[b].strayed != 0 or not obeyed) else 0
+    shields.ego[b].strayed = 1 if passes and (shields.ego[b].strayed != 0 or not obeyed) else 0
     if not left and not obeyed:
-        guards.ego[b].kept = 0
+        shields.ego[b].kept = 0
 
 
 @jit_inline
@@ -104,25 +105,25 @@ def _same(one: Command, other: Command) -> bool:
 
 @jit_inline
 def _lawful(
-    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, guards: ShieldTables, commands: Floats
+    b: int, tick: int, left: bool, sight2: float, traffic: Traffic, shields: ShieldTables, commands: Floats
 ) -> Command:
-    """Return the command of the law, within bounds; that which has been rehearsed, if anything has."""
+    """Return the command of the law, within bounds; while the ego returns from the left, the rehearsed one."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
-    if left and guards.ego[b].kept != 0:
-        copy_memory(b, drivers, guards.alone.traffic.drivers)
+    if left and shields.ego[b].kept != 0:
+        copy_memory(b, drivers, shields.alone.traffic.drivers)
         pose = Pose(state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO])
-        law = drive_alone(b, tick, labels.lane[b, EGO], pose, traffic, guards)
-        copy_memory(b, guards.alone.traffic.drivers, drivers)
+        law = drive_alone(b, tick, labels.lane[b, EGO], pose, traffic, shields)
+        copy_memory(b, shields.alone.traffic.drivers, drivers)
         return law
     drive_by_law(b, tick, sight2, traffic, commands)
     return bounded(commands[b, EGO, 0], commands[b, EGO, 1], drivers.vehicle[b])
 
 
 @jit_inline
-def _remember(b: int, tick: int, traffic: Traffic, guards: ShieldTables) -> None:
-    """Keep the greatest progress as the referee does, and let the law begin with the goal nearest to the start."""
+def _remember(b: int, tick: int, traffic: Traffic, shields: ShieldTables) -> None:
+    """Keep the greatest progress as the labeller does; at the start, set the law's first goal, the nearest."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
-    ego = guards.ego[b]
+    ego = shields.ego[b]
     lane = labels.lane[b, EGO]
     if lane >= 0:
         progress, _ = lane_coordinates(roads, drivers.net[b], lane, state.x[b, EGO], state.y[b, EGO])
@@ -145,58 +146,62 @@ def _remember(b: int, tick: int, traffic: Traffic, guards: ShieldTables) -> None
 
 @jit_inline
 def _may_obey(
-    b: int, tick: int, sight2: float, law: Command, near: int, traffic: Traffic, guards: ShieldTables
+    b: int, tick: int, sight2: float, law: Command, near: int, traffic: Traffic, shields: ShieldTables
 ) -> bool:
-    """Tell whether the ego may do as the law says, though that leads to the left: it has a way back in time."""
+    """Tell whether the ego may do as the law says though that makes it left: its way back in time is sure enough."""
     drivers = traffic.drivers
     if may_touch(b, law.speed, law.yaw_rate, near, traffic, drivers.vehicle[b]):
         return False
     if np.int64(traffic.labels.bits[b, EGO]) & FLAG.LEFT != 0:
         return True
-    found = refusal(b, law.speed, law.yaw_rate, near, traffic, guards)
+    found = refusal(b, law.speed, law.yaw_rate, near, traffic, shields)
     if found != REASON.LANE:
         return found == REASON.NOTHING
-    mode = guards.ego[b].mode
+    mode = shields.ego[b].mode
     if drivers.car[b, EGO].aside == 0.0 or mode == MODE.NEVER:
         return False
     if mode == MODE.LAW:
-        return _has_way_back(b, sight2, traffic, guards)
-    sure = surely_returns(b, tick, law.speed, law.yaw_rate, sight2, traffic, guards)
-    guards.ego[b].kept = 1 if sure else 0
+        return _has_way_back(b, sight2, traffic, shields)
+    sure = surely_returns(b, tick, law.speed, law.yaw_rate, sight2, traffic, shields)
+    shields.ego[b].kept = 1 if sure else 0
     return sure
 
 
 @jit_inline
-def _has_way_back(b: int, sight2: float, traffic: Traffic, guards: ShieldTables) -> bool:
-    """Tell whether an ego that passes something can be back in time, as far as the law of the road makes sure of it."""
+def _has_way_back(b: int, sight2: float, traffic: Traffic, shields: ShieldTables) -> bool:
+    """Tell whether an ego that passes something can be back in time, by the law's own estimate."""
     state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
     car = drivers.car[b, EGO]
     vehicle = drivers.vehicle[b]
     way = way_between(roads, drivers.net[b], car.lane, car.next_lane, vehicle.middle, vehicle.disc)
-    if guards.ego[b].strayed != 0:
+    unrolled = bends_ahead(b, EGO, traffic)
+    if unrolled:
+        unroll(b, EGO, traffic)
+    if shields.ego[b].strayed != 0:
         waited = car.waited
         car.aside = 0.0
         list_cars(b, sight2, traffic)
         find_way_past(b, EGO, way, -1, traffic)
         unlist_cars(b, traffic)
         car.waited = waited
-        if car.aside == 0.0:
-            return False
-    to_go = car.until + BACK - along(way, state.x[b, EGO], state.y[b, EGO])
-    return to_go / (0.8 * vehicle.fastest) + TURNING <= guards.ego[b].left_time
+    own = along(way, state.x[b, EGO], state.y[b, EGO])
+    time = passing_time(own, car.until, traffic.scratch.tight[0], vehicle)
+    if unrolled:
+        put_back(b, traffic)
+    return car.aside != 0.0 and time <= shields.ego[b].left_time
 
 
 @jit_inline
 def _nearest(
-    b: int, refused: Command, obeys: bool, law: Command, near: int, traffic: Traffic, guards: ShieldTables
+    b: int, refused: Command, obeys: bool, law: Command, near: int, traffic: Traffic, shields: ShieldTables
 ) -> Command:
-    """Return the command nearest to one that is refused, of those that are looked at, for an ego that is not left.
+    """Return, for an ego that is not left, the command nearest to a refused one among those that are tried.
 
     Distance is that of (speed, yaw rate) in units of the largest speed and yaw rate. To stand is always possible.
     """
     drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
-    best = _slower(b, refused, near, traffic, guards)
+    best = _slower(b, refused, near, traffic, shields)
     least = _apart(refused, best, vehicle)
     if obeys and _apart(refused, law, vehicle) < least:
         best = law
@@ -205,7 +210,7 @@ def _nearest(
     if (
         vehicle.half_length > 0.0
         and _apart(refused, straight, vehicle) < least
-        and refusal(b, straight.speed, 0.0, near, traffic, guards) == REASON.NOTHING
+        and refusal(b, straight.speed, 0.0, near, traffic, shields) == REASON.NOTHING
     ):
         best = straight
         least = _apart(refused, straight, vehicle)
@@ -219,15 +224,15 @@ def _nearest(
                 far = _apart(refused, tried, vehicle)
                 if far >= least:
                     break
-                if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == REASON.NOTHING:
+                if refusal(b, tried.speed, tried.yaw_rate, near, traffic, shields) == REASON.NOTHING:
                     best, least = tried, far
                     break
     return best
 
 
 @jit_inline
-def _slower(b: int, refused: Command, near: int, traffic: Traffic, guards: ShieldTables) -> Command:
-    """Return the command with the greatest share of a speed that is refused; (0, 0) if none will do."""
+def _slower(b: int, refused: Command, near: int, traffic: Traffic, shields: ShieldTables) -> Command:
+    """Return a refused command slowed down as little as needed on the same arc; (0, 0) if no speed will do."""
     drivers = traffic.drivers
     vehicle = drivers.vehicle[b]
     best = Command(0.0, 0.0)
@@ -235,7 +240,7 @@ def _slower(b: int, refused: Command, near: int, traffic: Traffic, guards: Shiel
     share = 0.0
     for _ in range(HALVINGS + 1):
         tried = bounded(share * refused.speed, refused.yaw_rate, vehicle)
-        if refusal(b, tried.speed, tried.yaw_rate, near, traffic, guards) == REASON.NOTHING:
+        if refusal(b, tried.speed, tried.yaw_rate, near, traffic, shields) == REASON.NOTHING:
             best = tried
             low = share
         else:

@@ -1,4 +1,4 @@
-"""What the shield (`shield.nearest_command`) reads and remembers, as arrays over a batch, and why it steps in."""
+"""The shield's tables over a batch: parameters and memory; and the reasons for which it steps in."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class _Reason(NamedTuple):
-    """Why a command was not let through: what it would have broken; `REASONS` says it in words."""
+    """Why a command was not let through: the rule that it would have broken; `REASONS` has the names."""
 
     NOTHING: int = 0
     NUMBER: int = 1
@@ -51,15 +51,15 @@ REASONS: Final = (
     "3.order",
     "3.clear",
 )
-"""Why a command was not let through, by number: what it would have broken, in the names of the referee; `2.turn` is
+"""Names of the reasons, by number: the rule that the command would have broken, as the referee calls it. `2.turn` is
 turning round outside a disc."""
 
 Overtakes = Literal["sure", "law", "never"]
-"""When the ego may cross the centre line: where its return is sure, where the law of the road would, or never."""
+"""When the ego may cross the centre line: if its return is sure, whenever the law of the road would, or never."""
 
 
 class _Mode(NamedTuple):
-    """The same for kernels, in the order of `Overtakes`."""
+    """The values of `Overtakes` as numbers for kernels, in the same order."""
 
     SURE: int = 0
     LAW: int = 1
@@ -71,7 +71,7 @@ MODE: Final = _Mode()
 
 @record
 class Ego:
-    """What the shield knows of the ego of a trial, and what it remembers."""
+    """The shield's parameters and memory of the ego of a trial."""
 
     mode: int
     """When the ego may cross the centre line: `MODE`."""
@@ -106,14 +106,14 @@ class Ego:
 
 
 class Alone(Tables):
-    """An ego that sees no other car: tables of one car per trial, and what the law that drives it remembers."""
+    """The tables by which the law drives an ego that sees no other car: one car per trial, with a memory of its own."""
 
     traffic: Traffic
     commands: Floats
 
 
 class ShieldTables(Tables):
-    """What the shield knows and remembers of each trial's `ego` (B,), `obstacles` in lanes, and the ego `alone`."""
+    """All tables of the shield: `ego` (B,), the `obstacles` in lanes, and the tables of the ego `alone`."""
 
     ego: Rows[Ego]
     obstacles: ObstacleLanes
@@ -121,7 +121,7 @@ class ShieldTables(Tables):
 
 
 def check_overtakes(value: object) -> Overtakes:
-    """Return when the ego may cross the centre line; InputError if it is no such value."""
+    """Return `value` if it is one of `Overtakes`; else raise InputError."""
     for known in get_args(Overtakes):
         if value == known:
             return known
@@ -130,15 +130,17 @@ def check_overtakes(value: object) -> Overtakes:
     )
 
 
-def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> ShieldTables:
-    """Return what the shield knows of trials that have not begun.
+def shield_tables(
+    problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure"
+) -> ShieldTables:
+    """Return the shield's tables for trials before their first frame.
 
     Parameters
     ----------
     problems
         One per trial.
     traffic
-        The egos as the law drives them, see `egos`.
+        The trials, with the drivers of `egos`.
     overtakes
         When they may cross the centre line.
     """
@@ -168,7 +170,7 @@ def guards(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtake
 
 
 def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
-    """Return drivers of which the law drives the egos only, round their goals.
+    """Return drivers' tables by which the law drives only the egos, round their goals.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Whether an ego that crosses the centre line is sure to be back in time, whatever the others do (compiled).
 
-The law is rehearsed, from the present tick on, among the obstacles alone, until the ego is back. If no other car can
-get near the ego in any tick of that, even if it drives at its top speed straight toward the place where the ego is
-then, nothing can change what has been rehearsed, and the ego does just that: while it is left, the law is asked as if
-it saw no other car. What is passed is an obstacle, which is sure to stand.
+The shield rehearses the law from the present tick on, among the obstacles alone, until the ego is back. If no other car
+can come near the ego in any tick of the rehearsal, even at top speed straight toward where the ego is then, nothing can
+change its course. The ego then does what was rehearsed: while it is left, the law drives it as if it saw no other car.
+What it passes is an obstacle, which is sure to stand.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from dubins_traffic.shield.tables import (
 )
 
 LONGEST = 60.0
-"""A way back that takes longer is not looked for, seconds."""
+"""Longest rehearsal, seconds; a way back that takes longer is not found."""
 ROUNDED = 1e-6
-"""By how much more than rounding an obstacle has to block the lane, metres."""
+"""An obstacle has to block a lane by at least this much, so that rounding does not decide, metres."""
 
 
 @jit
 def drive_by_law(b: int, tick: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of an ego that the law drives; it goes by the cars within sight, `sight2` (m2)."""
+    """Write the law's command for the ego, which sees other cars within the squared distance `sight2` (m2)."""
     scratch = traffic.scratch
     decide_trial(b, tick, sight2, scratch.apart, 0.0, traffic, commands)
 
 
 @jit
-def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, guards: ShieldTables) -> Command:
-    """Return the command, within bounds, by which the law drives an ego that is left and sees no other car.
+def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, shields: ShieldTables) -> Command:
+    """Return the law's command, within bounds, for an ego that is left, as if it saw no other car.
 
-    What the law remembers is that in `guards.alone`.
+    The law's memory is that in `shields.alone`.
     """
     roads, drivers = traffic.roads, traffic.drivers
-    alone, commands = guards.alone.traffic, guards.alone.commands
+    alone, commands = shields.alone.traffic, shields.alone.commands
     alone.state.x[b, EGO], alone.state.y[b, EGO], alone.state.c[b, EGO], alone.state.s[b, EGO] = pose
     bits = FLAG.LEFT | FLAG.OVERTAKING
     own, _ = lane_coordinates(roads, drivers.net[b], lane, pose.x, pose.y)
-    if _blocks(b, lane, own, own + guards.ego[b].blocked_ahead, roads, drivers, guards):
+    if _blocks(b, lane, own, own + shields.ego[b].blocked_ahead, roads, drivers, shields):
         bits |= FLAG.BLOCKED
     alone.labels.bits[b, EGO] = bits
     alone.labels.lane[b, EGO] = lane
@@ -62,16 +62,16 @@ def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, guar
 
 @jit_inline
 def copy_memory(b: int, source: Drivers, to: Drivers) -> None:
-    """Let the law remember in `to` what it does in `source`."""
+    """Copy the law's memory of the ego of trial b from `source` to `to`."""
     to.car[b, EGO] = source.car[b, EGO]
     to.way[b, EGO] = source.way[b, EGO]
 
 
 @jit
 def surely_returns(
-    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, guards: ShieldTables
+    b: int, tick: int, speed: float, yaw_rate: float, sight2: float, traffic: Traffic, shields: ShieldTables
 ) -> bool:
-    """Tell whether the law, after a command of its that makes the ego left, is sure to bring it back in time.
+    """Tell whether the law is sure to bring the ego back in time after this command, which makes it left.
 
     `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
     """
@@ -83,53 +83,53 @@ def surely_returns(
         return False
     x, y, c, s = state.x[b, EGO], state.y[b, EGO], state.c[b, EGO], state.s[b, EGO]
     before, _ = lane_coordinates(roads, net, lane, x, y)
-    top = guards.ego[b].top
-    last = int(min(guards.ego[b].left_time, LONGEST) / vehicle.period)
-    copy_memory(b, drivers, guards.alone.traffic.drivers)
+    top = shields.ego[b].top
+    last = int(min(shields.ego[b].left_time, LONGEST) / vehicle.period)
+    copy_memory(b, drivers, shields.alone.traffic.drivers)
     for k in range(1, last + 1):
-        if k > 1 and may_touch(b, speed, yaw_rate, 0, guards.alone.traffic, vehicle):
+        if k > 1 and may_touch(b, speed, yaw_rate, 0, shields.alone.traffic, vehicle):
             return False
         x, y, c, s = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
         progress, lateral = lane_coordinates(roads, net, lane, x, y)
         top = max(top, progress)
-        if progress < before and top - progress > guards.ego[b].turn_back - TURNING:
+        if progress < before and top - progress > shields.ego[b].turn_back - TURNING:
             return False
-        if k == 1 and not _overtakes(b, lane, progress, traffic, guards):
+        if k == 1 and not _overtakes(b, lane, progress, traffic, shields):
             return False
         pose = Pose(x, y, c, s)
-        if _leaves(lane, pose, roads, net, vehicle) or _may_come(b, k, pose, sight2, state, guards, vehicle):
+        if _leaves(lane, pose, roads, net, vehicle) or _may_come(b, k, pose, sight2, state, shields, vehicle):
             return False
         tx, ty = lane_direction_at(roads, net, lane, x, y)
         half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
-        if lateral + half < guards.ego[b].left_release:
+        if lateral + half < shields.ego[b].left_release:
             return True
         before = progress
-        speed, yaw_rate = drive_alone(b, tick + k, lane, pose, traffic, guards)
+        speed, yaw_rate = drive_alone(b, tick + k, lane, pose, traffic, shields)
     return False
 
 
 @jit_inline
-def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, guards: ShieldTables) -> bool:
-    """Tell whether an ego overtakes in the next frame, with `progress` then, for the sake of an obstacle."""
+def _overtakes(b: int, lane: int, progress: float, traffic: Traffic, shields: ShieldTables) -> bool:
+    """Tell whether an ego whose progress in the next frame is `progress` overtakes an obstacle in that frame."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
-    if _blocks(b, lane, progress, progress + guards.ego[b].blocked_ahead, roads, drivers, guards):
+    if _blocks(b, lane, progress, progress + shields.ego[b].blocked_ahead, roads, drivers, shields):
         return True
     return labels.bits[b, EGO] & FLAG.OVERTAKING != 0 and _blocks(
-        b, lane, progress - vehicle.behind, progress + vehicle.fore, roads, drivers, guards
+        b, lane, progress - vehicle.behind, progress + vehicle.fore, roads, drivers, shields
     )
 
 
 @jit
 def _blocks(
-    b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, guards: ShieldTables
+    b: int, lane: int, near: float, far: float, roads: RoadTable, drivers: Drivers, shields: ShieldTables
 ) -> bool:
-    """Tell whether an obstacle blocks a lane where its progress is in [near, far]."""
+    """Tell whether an obstacle whose progress in a lane is in [near, far] blocks it."""
     vehicle = drivers.vehicle[b]
     length = roads.segment[int(roads.seg_off[drivers.net[b]]) + (lane >> 1)].length
     place = RightLane(b, lane, length, 2.0 * vehicle.middle)
     needed = vehicle.needed - ROUNDED
-    return obstacle_narrows(guards.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
+    return obstacle_narrows(shields.obstacles, place, near + ROUNDED, far - ROUNDED, needed)
 
 
 @jit_inline
@@ -149,14 +149,14 @@ def _leaves(lane: int, pose: Pose, roads: RoadTable, net: int, vehicle: Vehicle)
 
 @jit_inline
 def _may_come(
-    b: int, ticks: int, pose: Pose, sight2: float, state: State, guards: ShieldTables, vehicle: Vehicle
+    b: int, ticks: int, pose: Pose, sight2: float, state: State, shields: ShieldTables, vehicle: Vehicle
 ) -> bool:
-    """Tell whether in `ticks` ticks a car, seen or unseen, could be so near to a pose that it might touch the ego."""
+    """Tell whether a car, seen or unseen, could in `ticks` ticks be so near to a pose that it might touch the ego."""
     x, y = pose.x, pose.y
     near = 2.0 * vehicle.reach + 2.0 * travel_of(vehicle) + GUARD
     far = near + max(vehicle.fastest, -vehicle.slowest) * vehicle.period * ticks
     ex, ey = state.x[b, EGO], state.y[b, EGO]
-    unseen = guards.ego[b].cars - 1
+    unseen = shields.ego[b].cars - 1
     for n in range(1, state.count[b]):
         ox, oy = state.x[b, n], state.y[b, n]
         if sight2 >= 0.0 and (ox - ex) * (ox - ex) + (oy - ey) * (oy - ey) > sight2:
@@ -167,4 +167,4 @@ def _may_come(
     if unseen <= 0:
         return False
     gone = sqrt((x - ex) * (x - ex) + (y - ey) * (y - ey))
-    return gone + far >= sqrt(guards.ego[b].sight2)
+    return gone + far >= sqrt(shields.ego[b].sight2)

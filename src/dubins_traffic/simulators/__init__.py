@@ -1,1 +1,1 @@
-"""Simulators behind the protocol `dubins_traffic.protocols.Simulator`."""
+"""Simulators, which implement `dubins_traffic.protocols.Simulator`."""

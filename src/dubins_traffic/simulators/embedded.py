@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 ABSENT = 1e9
-"""Places of a batch that hold no car lie this far away, metres, and farther, so that nothing meets there."""
+"""Least distance of places without a car, metres: they are so far away, and apart, that no bodies meet there."""
 
 
 class Embedded:
@@ -96,10 +96,10 @@ class Embedded:
         return contacts
 
     def close(self) -> None:
-        """Nothing is held outside memory."""
+        """Do nothing: there are no resources but memory."""
 
     def _models(self, instances: Sequence[Instance]) -> ModelledCars | None:
-        """Return what moves the cars if they are not Dubins cars: of one trial, since Python moves them."""
+        """Return the `Modelled` that moves cars of another model, None for Dubins cars; it takes a single trial."""
         others = [
             instance.problem.car.model for instance in instances if instance.problem.car.model != DUBINS
         ]
@@ -117,7 +117,7 @@ class Embedded:
 
 
 def contact_of(row: Meeting, tick: int, rate: float) -> Contact:
-    """Return the contact in a row of `Workspace.contact`, of the tick that ends in frame `tick`."""
+    """Return a row of `Workspace.contact` as a Contact in the tick that ends in frame `tick`."""
     return Contact(
         tick=tick,
         time=(tick - 1) / rate + row.time,

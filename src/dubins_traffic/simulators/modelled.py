@@ -1,4 +1,4 @@
-"""Cars of another model than the Dubins car, moved one trial at a time: each tick in parts, each part on exact arcs.
+"""Moves cars of other models than the Dubins car, one trial at a time: each tick in parts, each part on exact arcs.
 
 A car model says which arcs its car drives in a tick (`cars.dynamics.MotionModel`). The tick is cut wherever an arc of
 any car ends. Within a part every car drives one arc, so that `cars.motion` moves it and finds its contacts as exactly
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 ROUNDING = 1e-9
-"""By this share of a tick the arcs of a car may last longer or shorter than that, and cuts be one."""
+"""Tolerance, as a share of a tick: for the total time of a car's arcs, and for instants to count as equal."""
 T = TypeVar("T")
 
 
@@ -92,7 +92,7 @@ class ModelledCars:
         return tuple(found)
 
     def _take(self, commands: Floats) -> None:
-        """Let the models, then the bounds, clip the commands."""
+        """Clip the commands in place, by the models and then by the bounds."""
         for n, model in enumerate(self._models):
             speed, yaw_rate = commands[0, n].tolist()
             taken = self._answer(n, "clip", lambda own=model, u=speed, w=yaw_rate: own.clip(u, w))
@@ -101,9 +101,11 @@ class ModelledCars:
         self._clip(rows, 0, commands[0], state.speed[0], state.yaw_rate[0], 0, len(self._models))
 
     def _plan(self, n: int, model: MotionModel, speed: float, yaw_rate: float) -> _Plan:
-        arcs: Any = self._answer(n, "advance", lambda: tuple(model.advance(speed, yaw_rate)))
-        if not 1 <= len(arcs) <= MOST_ARCS:
-            raise self._lost(n, "advance", f"{len(arcs)} arcs", f"1 to {MOST_ARCS} arcs")
+        most = MOST_ARCS + 1
+        arcs: Any = self._answer(n, "advance", lambda: tuple(islice(model.advance(speed, yaw_rate), most)))
+        if not 1 <= len(arcs) < most:
+            found = "0 arcs" if not arcs else f"more than {MOST_ARCS} arcs"
+            raise self._lost(n, "advance", found, f"1 to {MOST_ARCS} arcs")
         rows = [self._numbers(n, "advance", arc, 3) for arc in arcs]
         ends = np.cumsum([seconds for _, _, seconds in rows])
         if min(seconds for _, _, seconds in rows) < 0.0 or abs(ends[-1] / self._period - 1.0) > ROUNDING:
@@ -121,13 +123,13 @@ class ModelledCars:
         return [*cuts, self._period]
 
     def _part(self, seconds: float) -> None:
-        """Move all cars along their arcs, with as much room for pairs as that takes."""
+        """Move all cars along their arcs, enlarging the buffer of pairs as needed."""
         self.motion.work.found[0] = 0
         while self._move(seconds, self._arcs, self._stands, self.motion) == OUTCOME.CROWDED:
             self.motion = self.motion.replace(work=enlarged(self.motion.work))
 
     def _moves(self) -> Any:
-        """Tell of each car whether it has moved or, being a rectangle, turned in this part."""
+        """Tell for each car whether it has moved, or as a rectangle turned, in this part."""
         speed, yaw_rate = self._arcs[0].T
         turns = self.motion.cars.half_length[0] > 0.0
         return (self._stands == 0) & ((speed != 0.0) | (turns & (yaw_rate != 0.0)))
@@ -170,7 +172,7 @@ class _Plan:
 
 
 def _later(contact: Contact, seconds: float, moved: Any) -> Contact:
-    """Return a contact of a part of a tick that begins so many seconds later; `moved` (N,): who has moved before."""
+    """Return a contact of a part as one of the tick; `moved` (N,) tells which cars have moved before in it."""
     other = contact.moved[1] or (contact.other >= 0 and bool(moved[contact.other]))
     return replace(
         contact, time=contact.time + seconds, moved=(contact.moved[0] or bool(moved[contact.car]), other)

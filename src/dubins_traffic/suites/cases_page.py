@@ -46,11 +46,12 @@ def cases_table(suite: Suite, found: Mapping[str, Columns]) -> str:
     return f"{told}\n\n{markdown_table(['case', *found], _body(suite, found))}"
 
 
-def cases_page(suite: Suite, found: Mapping[str, Columns]) -> str:
-    """Return the same as a page in HTML."""
+def cases_page(suite: Suite, found: Mapping[str, Columns], how: str) -> str:
+    """Return the same as a page in HTML, with a sentence on how it was made."""
     body = [[f"<th>{text(name)}</th>", *map(text, cells)] for name, *cells in _body(suite, found)]
     head = f"<header><h1>{text(suite.label)}</h1><p>{text(suite.model.title)}</p></header>"
     made = table(["what", "value"], [["<th>hash</th>", f"<code>{suite.hash}</code>"]], "texts")
+    made += f"<p>{text(how)}</p>"
     sections = [section("Cases", table(["case", *found], body)), section("How it was made", made)]
     return document(suite.label, base_style(), head, sections)
 

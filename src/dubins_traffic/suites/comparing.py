@@ -11,9 +11,10 @@ from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import exists
 from dubins_traffic.suites.result_model import ResultModel, TrialsEntry, WallModel
 from dubins_traffic.suites.results import find_results, load_results, part
-from dubins_traffic.suites.suite import Suite
+from dubins_traffic.suites.suite import SHORT, Suite
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,7 @@ class Source:
 
 
 def open_sources(places: Sequence[str]) -> list[Source]:
-    """Return the files of results at some places, ``[NAME=]PATH`` each.
+    """Return the files of results at some places, ``[NAME=]PATH`` each; what is there is a PATH, with ``=`` or without.
 
     Raises
     ------
@@ -36,7 +37,7 @@ def open_sources(places: Sequence[str]) -> list[Source]:
     """
     sources: list[Source] = []
     for place in places:
-        name, _, path = place.rpartition("=")
+        name, _, path = ("", "", place) if exists(place) else place.rpartition("=")
         file = find_results(path)
         sources.append(Source(file, name, *load_results(file)))
     first = sources[0].found
@@ -65,6 +66,21 @@ def check_suite(suite: Suite, sources: Sequence[Source]) -> None:
             value=found.hash,
             expected=suite.hash,
         )
+
+
+def made_by(sources: Sequence[Source]) -> str:
+    """Return a sentence on the versions of the code that made results, each with what it made if there are several."""
+    made: dict[tuple[str, str], list[str]] = {}
+    for source in sources:
+        own = [entry.controller for entry in source.found.entries]
+        own += [entry.solver for entry in source.found.solvers]
+        made.setdefault((source.found.package, source.found.code), []).append(source.name or ", ".join(own))
+    versions = [f"dubins-traffic {package} (sources {code[:SHORT]})" for package, code in made]
+    if len(made) == 1:
+        return f"Made by {versions[0]}."
+    each = zip(made.values(), versions, strict=True)
+    listed = "; ".join(f"{', '.join(names)} by {version}" for names, version in each)
+    return f"Made by different versions of the code, in which trials may go differently: {listed}."
 
 
 def entry_name(source: Source, own: str, count: int) -> str:

@@ -20,7 +20,7 @@ RIGHT: Mapping[bool | None, str] = {True: "right", False: "wrong", None: "no ans
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What one solver says: `found` and `seconds` by the names of the games."""
+    """The answers of one solver: `found` and `seconds`, by the names of the games."""
 
     name: str
     found: Mapping[str, GameResult]
@@ -55,8 +55,8 @@ def games_table(suite: Suite, answers: Sequence[Answers]) -> str:
     return f"{told}\n\n{markdown_table(_head(answers), _body(suite, answers))}\n{_summary(suite, answers)}\n"
 
 
-def games_page(suite: Suite, answers: Sequence[Answers]) -> str:
-    """Return the same as a page in HTML."""
+def games_page(suite: Suite, answers: Sequence[Answers], how: str) -> str:
+    """Return the same as a page in HTML, with a sentence on how it was made."""
     body = [[f"<th>{text(name)}</th>", *map(text, cells)] for name, *cells in _body(suite, answers)]
     facts = [
         [f"<th>{text(what)}</th>", f"<code>{text(value)}</code>"]
@@ -65,7 +65,7 @@ def games_page(suite: Suite, answers: Sequence[Answers]) -> str:
     head = f"<header><h1>{text(suite.label)}</h1><p>{text(suite.model.title)}</p></header>"
     sections = [
         section("Answers", table(_head(answers), body) + f"<p>{text(_summary(suite, answers))}</p>"),
-        section("How it was made", table(["what", "value"], facts, "texts")),
+        section("How it was made", table(["what", "value"], facts, "texts") + f"<p>{text(how)}</p>"),
     ]
     return document(suite.label, base_style(), head, sections)
 

@@ -1,7 +1,7 @@
-"""Makes a suite of a folder of cases: ``python -m dubins_traffic.suites.gather NAME TITLE FOLDER FILE``.
+"""Makes a suite from a folder of cases: ``python -m dubins_traffic.suites.gather NAME TITLE FOLDER FILE``.
 
-The cases are the files ``*.json`` in the folder and the folders in it, as `falsify` writes them. A suite that is there
-is not overwritten: it never changes.
+The cases are the files ``*.json`` in the folder and its subfolders, as `falsify` writes them. An existing suite is not
+overwritten, since suites never change.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If there is none, or a file is no case.
+        If there is no such file, or one is no case.
     """
     files = sorted(folder.rglob("*.json"))
     if not files:
@@ -39,7 +39,7 @@ def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
 
 
 def _name(path: Path, folder: Path) -> str:
-    """Return what a case is called: ``lanes/3.order.json`` is ``lanes-3-order``."""
+    """Return the name of a case: that of ``lanes/3.order.json`` is ``lanes-3-order``."""
     whole = path.relative_to(folder).with_suffix("").as_posix()
     return re.sub(r"[^a-z0-9]+", "-", whole.lower()).strip("-")
 

@@ -28,7 +28,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     verdicts = [ruling.value for ruling in Ruling] if judged else []
     head = ["controller", "trials", f"{metric.heading}, mean", "sum"]
     head += ["clean", *verdicts] if judged else []
-    head += ["collisions", "fault of the ego", "came to nothing", *(own.heading for own in timed)]
+    head += ["collisions", "fault of the ego", "came to nothing", *(f"{own.heading}, ms" for own in timed)]
     ranked = sorted(comparison.standings, key=lambda own: -(own.estimates[metric.name].mean or 0.0))
     body = [
         [
@@ -44,7 +44,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             str(standing.collisions),
             str(standing.faults["the ego"] + standing.faults["both"]),
             str(sum(standing.ends[end].count for end in ("failed", "crashed") if end in standing.ends)),
-            *(shown(standing.estimates[own.name].mean) for own in timed),
+            *(_milliseconds(standing.estimates[own.name].mean) for own in timed),
         ]
         for standing in ranked
     ]
@@ -56,6 +56,10 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
 
 def _sum(estimate: Estimate) -> float | None:
     return None if estimate.mean is None else estimate.mean * estimate.count
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return shown(None if seconds is None else 1e3 * seconds)
 
 
 def _estimate(estimate: Estimate) -> str:

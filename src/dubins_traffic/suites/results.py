@@ -1,4 +1,4 @@
-"""Files of results: made of a campaign's folder, read from anywhere."""
+"""Files of a suite's results: made from a campaign's folder, and read from any path."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dubins_traffic.files import is_file, read_text, write_text
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import parse_json
 from dubins_traffic.release import sources_hash
+from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.suites.result_model import FORMAT, WALL_FORMAT, ResultModel, WallModel
 from dubins_traffic.suites.suite import Suite
 
@@ -123,7 +124,7 @@ def part(
     Parameters
     ----------
     columns : Mapping
-        What came of them, `KEPT`.
+        Their results, the columns `KEPT`.
     seconds : Mapping or None
         The wall-clock figures, if there are any.
     numbers : sequence of int
@@ -150,6 +151,7 @@ def part(
         if values is None or len(values) != count:
             problem = "a column is missing" if values is None else "a column of another length"
             raise InputError(problem, field=f"columns.{entry.name}", expected=f"{count} values")
+        _check_words(entry.name, values)
         try:
             arrays.append(made.array(values, type=entry.type))
         except (made.ArrowInvalid, made.ArrowTypeError, OverflowError) as error:
@@ -157,6 +159,22 @@ def part(
                 f"a column of other values ({error})", field=f"columns.{entry.name}", expected=str(entry.type)
             ) from None
     return made.Table.from_arrays(arrays, schema=rows.part_schema())
+
+
+def _check_words(column: str, values: Sequence[Any]) -> None:
+    """Refuse a trial that ended in no way at all, or whose verdict is none."""
+    wrong = [value for value in values if not _is_word(column, value)]
+    if wrong:
+        expected = ", ".join(Ruling) + " or null" if column == "verdict" else "how each trial ended"
+        raise InputError(
+            "a column of other values", field=f"columns.{column}", value=wrong[0], expected=expected
+        )
+
+
+def _is_word(column: str, value: object) -> bool:
+    if column == "verdict":
+        return value is None or value in list(Ruling)
+    return column != "end" or (isinstance(value, str) and bool(value))
 
 
 def _text(document: Mapping[str, Any]) -> str:

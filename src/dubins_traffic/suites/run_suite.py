@@ -1,4 +1,4 @@
-"""A suite is run as a campaign in its folder, and its results are written there when it is finished."""
+"""Runs a suite as a campaign in a folder, and writes its results there when it is finished."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ def run_suite(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Run the trials of a suite, or what is left of them.
+    """Run the trials of a suite, or the remaining ones, and write the results.
 
     Parameters
     ----------
     suite : Suite
-        One of trials.
+        A suite of trials.
     folder : path
         Folder of a campaign, made if missing.
     controllers : sequence of str
-        What is run; those of the suite's page, if none is given.
+        The controllers to run; by default those of the suite's page.
     trials : int, optional
-        Fewer trials of each combination.
+        Number of trials of each combination, if fewer are to be run.
     workers, resume, progress
         As for `run_campaign`.
 

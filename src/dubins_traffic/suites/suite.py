@@ -1,4 +1,4 @@
-"""A suite: what its file says, its hash, and the campaign that it is for given controllers."""
+"""A suite: its document, its hash, and the campaign that runs it with given controllers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from dubins_traffic.suites.settings import SuiteModel
 SHORT = 12
 """Digits of a hash in the names of files."""
 _TOLD = ("title", "version")
-"""What may be said otherwise without a change of the problems or of their scores."""
+"""Fields that may change without a change of the problems or their scores; the hash leaves them out."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Suite:
     model : SuiteModel
         The same, checked, with defaults.
     file : str or None
-        Where it was read; None for one that is shipped.
+        The file from which it was read; None for a shipped suite.
     """
 
     document: Mapping[str, Any]
@@ -66,7 +66,7 @@ class Suite:
 
     @property
     def hash(self) -> str:
-        """SHA-256 of all that decides problems and scores: not of its title, nor of the page's controllers."""
+        """SHA-256 of all that determines problems and scores: without its title and the page's controllers."""
         told = {name: value for name, value in self.document.items() if name not in _TOLD}
         if "campaign" in told:
             told["campaign"] = {
@@ -97,11 +97,11 @@ class Suite:
         Parameters
         ----------
         controllers : sequence of str
-            What is run.
+            The controllers to run.
         trials : int, optional
-            Fewer trials of each combination: the first of them.
+            Number of trials of each combination, if only the first ones are to be run.
         places : tuple of str, optional
-            Where the controllers are, if nothing is to be loaded.
+            The full names of the controllers, if they are not to be loaded.
 
         Raises
         ------

@@ -9,7 +9,7 @@ from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.files import make_folder, write_text
 from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
-from dubins_traffic.suites.comparing import Source, compare_trials
+from dubins_traffic.suites.comparing import Source, compare_trials, made_by
 from dubins_traffic.suites.games_page import answers_of, games_page, games_table
 from dubins_traffic.suites.markdown import trials_table
 from dubins_traffic.suites.suite import Suite
@@ -26,16 +26,18 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     InputError
         As `compare_trials`, `columns_of` and `answers_of`.
     """
+    how = made_by(sources)
+    note = f"\n{how}\n"
     if suite.model.cases is not None:
         found = columns_of(suite, sources)
-        return {TABLE: cases_table(suite, found), PAGE: cases_page(suite, found)}
+        return {TABLE: cases_table(suite, found) + note, PAGE: cases_page(suite, found, how)}
     if suite.model.games is not None:
         answers = answers_of(suite, sources)
-        return {TABLE: games_table(suite, answers), PAGE: games_page(suite, answers)}
+        return {TABLE: games_table(suite, answers) + note, PAGE: games_page(suite, answers, how)}
     comparison, made = compare_trials(suite, sources)
     return {
         **csv_files(comparison),
-        TABLE: trials_table(suite, comparison),
+        TABLE: trials_table(suite, comparison) + note,
         PAGE: page(comparison, made, {}),
     }
 

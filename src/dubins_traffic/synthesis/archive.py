@@ -7,7 +7,6 @@ and size are known to be those that are expected.
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -49,15 +48,9 @@ def check_target(path: str | Path, *, overwrite: bool = False) -> None:
         If a folder or a file is there, or its folder is missing or may not be written to.
     """
     target = Path(path)
-    name, folder = str(path), target.parent
-    if target.is_dir():
-        raise InputError("a folder", file=name, expected="a file to write")
+    files.require_place(target)
     if target.exists() and not overwrite:
-        raise InputError("exists already", file=name, expected="a new name, or --overwrite")
-    if not folder.is_dir():
-        raise InputError("no such folder", file=str(folder), expected="a folder to write to")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError("no permission to write", file=str(folder), expected="a folder to write to")
+        raise InputError("exists already", file=str(path), expected="a new name, or --overwrite")
 
 
 def save_arrays(path: str | Path, header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -104,11 +104,6 @@ class Assumption:
             found = replace(found, **WORDS[name])
         return found
 
-    @classmethod
-    def of_rules(cls, assumed: Mapping[str, bool]) -> Assumption:
-        """Return the assumption of a problem, from E1 to E6 each assumed or not."""
-        return cls.parse(name for name, kept in assumed.items() if kept)
-
     def words(self) -> tuple[str, ...]:
         """Return the words that `parse` understands as this assumption."""
         return tuple(word for word, change in WORDS.items() if replace(self, **change) == self)

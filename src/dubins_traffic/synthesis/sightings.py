@@ -37,9 +37,14 @@ class Ground:
         self.arena = arena
         self._nodes = [arena.nodes_of(v) for v in range(len(network.intersections))]
         self._points: list[list[float]] = network.points.tolist()
-        tangents: list[list[float]] = network.tangents.tolist()
-        self._tangents = [(tx, ty) if way == 0 else (-tx, -ty) for tx, ty in tangents for way in (0, 1)]
+        self._network = network
+        self._tangents = [
+            (sign * tx, sign * ty)
+            for begins, ends in zip(network.tangents.tolist(), network.end_tangents.tolist(), strict=True)
+            for (tx, ty), sign in ((begins, 1.0), (ends, -1.0))
+        ]
         self._ends = [network.lane_ends(lane) for lane in range(network.lanes)]
+        self._hulls = [self._hull(segment) for segment in range(len(network.segments))]
         self._beside: list[list[int]] = [[] for _ in range(arena.cells)]
         for cell in range(arena.cells):
             for other in arena.following(cell):
@@ -76,7 +81,16 @@ class Ground:
             return 0.0
         x, y = self._points[self._ends[lane][0]]
         tx, ty = self._tangents[lane]
+        if self._network.bent[lane >> 1]:
+            return float(self._network.lane_coordinates(lane, (pose.x, pose.y))[0])
         return (pose.x - x) * tx + (pose.y - y) * ty
+
+    def _hull(self, segment: int) -> list[list[float]]:
+        """Return points whose convex hull holds a segment: its ends, and the corners between where it bends."""
+        network = self.arena.network
+        corners = [(x, y) for x, y, _ in network.corners[segment]] if network.corners else []
+        ends = [self._points[v] for v in self._ends[2 * segment]]
+        return [*ends, *network.to_world(corners).tolist()] if corners else ends
 
     def within(self, cell: int, pose: Pose, radius: float, margin: float) -> bool:
         """Say whether a car in a cell would be nearer to a pose than `radius`, wherever in the cell it is.
@@ -84,9 +98,12 @@ class Ground:
         Its centre is at most `margin` from the intersection, or in the lane between its ends.
         """
         count = len(self.arena.nodes)
-        ends = (self.arena.nodes[cell].vertex,) if cell < count else self._ends[cell - count]
         reach = radius - margin
-        points = (self._points[v] for v in ends)
+        points = (
+            [self._points[self.arena.nodes[cell].vertex]]
+            if cell < count
+            else self._hulls[(cell - count) >> 1]
+        )
         return reach > 0.0 and all((x - pose.x) ** 2 + (y - pose.y) ** 2 < reach * reach for x, y in points)
 
     def nearest_free(self, cell: int, taken: Collection[int], avoided: Collection[int]) -> int:

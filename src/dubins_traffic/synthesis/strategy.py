@@ -66,10 +66,6 @@ class Strategy:
             raise InputError("a strategy that wins from nowhere", expected="some position")
         return int(np.argmax(won))
 
-    def goal_after(self, position: int, goal: int) -> int:
-        """Return the goal to seek in a position, when `goal` has been sought: the next if it has been reached."""
-        return (goal + 1) % len(self.ranks) if self.ranks[goal].rank[position] == 0 else goal
-
     def choose(self, position: int, goal: int) -> int:
         """Return the position to which the ego moves from `position`, or that itself if it stays.
 

@@ -254,7 +254,7 @@ class Link:
             raise PeerError(End.PEER_LOST.value, f"its peer has gone, at tick {self._tick}")
 
     def _streams(self, still: bool) -> bool:
-        """Whether views between frames are sent now: in lockstep only of a world that nobody drives."""
+        """Tell whether views between frames are sent now: in lockstep only of a world that nobody drives."""
         if self._stream is None or still:
             return False
         return not self._running or not self.clock.lockstep or not self._moving

@@ -43,7 +43,7 @@ def keep(
 
 @jit
 def all_finite(commands: Floats) -> bool:
-    """Whether all commands of trial 0, (1, N, 2), are finite."""
+    """Tell whether all commands of trial 0, (1, N, 2), are finite."""
     finite = True
     for n in range(commands.shape[1]):
         for k in range(2):
@@ -70,19 +70,22 @@ class FrameBuffer:
         self._renew()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the sinks that stay behind."""
+        """Return the state that a fork copies: all but the sinks that can't go on in a fork."""
         carried = tuple(sink for sink in self._sinks if isinstance(sink, Forks) and sink.forks)
         return {**vars(self), "_sinks": carried}
 
     @property
     def sinks(self) -> tuple[Sink, ...]:
-        """Who gets the frames; those that can go on in forks depend on no cut, and have been handed all of them."""
+        """The sinks; if all of them can go on in a fork, the frames collected so far are handed to them first.
+
+        Where blocks are cut makes no difference to such sinks. A record's writer is none of them.
+        """
         if all(isinstance(sink, Forks) and sink.forks for sink in self._sinks):
             self.flush()
         return self._sinks
 
     def add(self, sink: Sink) -> None:
-        """Hand the blocks from that in hand on to one more sink, which has been handed all before."""
+        """Add a sink that has been handed all frames before the present block; it receives that block and all later."""
         self._sinks = (*self._sinks, sink)
 
     def push(
@@ -93,7 +96,10 @@ class FrameBuffer:
         contacts: Sequence[Contact],
         events: Sequence[Event],
     ) -> None:
-        """Take the frame just reached, the clipped commands that led to it, and what happened in its tick."""
+        """Append the frame just reached to the block, with the clipped commands that led to it and its tick's events.
+
+        `state` and `labels` are (1, N), `commands` (1, N, 2) m/s and rad/s; all are copied.
+        """
         f = self._filled
         self._keep(f, self._reals, self._whole, self._bits, commands, state, labels)
         if contacts:
@@ -105,11 +111,11 @@ class FrameBuffer:
             self.flush()
 
     def note(self, event: Event) -> None:
-        """Add an event to the block in hand."""
+        """Append an event to the present block."""
         self._events.append(event)
 
     def flush(self) -> None:
-        """Hand what is in hand to the sinks."""
+        """Hand the frames and events of the present block to the sinks and begin the next block."""
         if not self._filled and not self._events:
             return
         filled = self._filled
@@ -128,7 +134,7 @@ class FrameBuffer:
             sink.frames(block)
 
     def end(self, ending: Ending) -> None:
-        """Hand over the rest and say how the trial ended."""
+        """Hand the last block to the sinks, then the ending."""
         self.flush()
         for sink in self._sinks:
             sink.end(ending)

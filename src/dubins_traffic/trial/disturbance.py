@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class CommandLine:
-    """The way of a command from the controller to the car.
+    """Delays and loses the ego's commands on their way from the controller to the car.
 
     First a command may be lost, then what arrives is delayed. In place of a lost command the one that arrived
     before it arrives again; before any has arrived the car stands.
@@ -28,18 +28,19 @@ class CommandLine:
         self._instance = instance
         self._under_way = deque([(0.0, 0.0)] * disturbances.command_delay)
         self._latest = (0.0, 0.0)
-        self._clear = self._loss == 0.0 and not self._under_way
+        self.clear = self._loss == 0.0 and not self._under_way
+        """Whether every command takes effect as it is."""
 
     def take(self, tick: int, command: object) -> tuple[float, float]:
-        """Return the command in force in this tick, now that a controller has asked for `command`.
+        """Return the command in force in this tick, (m/s, rad/s), given the controller's latest `command`.
 
         Raises
         ------
         ControllerError
-            If that is not two finite numbers: a controller fault.
+            If `command` is not two finite numbers: a controller fault.
         """
         asked = checked_command(command, tick)
-        return asked if self._clear else self._carry(tick, asked)
+        return asked if self.clear else self._carry(tick, asked)
 
     def _carry(self, tick: int, command: tuple[float, float]) -> tuple[float, float]:
         if self._loss == 0.0 or self._draw(tick) >= self._loss:

@@ -1,4 +1,4 @@
-"""What ends a trial early, and what is said of it."""
+"""Faults and collisions that end a trial early: the check of a command, and the details of endings."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 def checked_command(command: object, tick: int) -> tuple[float, float]:
-    """Return what a controller has asked for at `tick` as two finite numbers.
+    """Return the command of a controller at `tick` as two finite numbers (m/s, rad/s).
 
     Raises
     ------
     ControllerError
-        If it is anything else: a controller fault.
+        If `command` is anything else: a controller fault.
     """
     try:
         speed, yaw = _pair(command)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # what is no number may do anything when it is read as one
+    except BaseException as error:  # a user's object may raise anything when it is converted to a number
         detail = f"a command is two numbers (speed, yaw rate): got {value_text(command, 80)} at tick {tick}"
         raise ControllerError(End.CONTROLLER_FAULT.value, detail) from error
     if not (math.isfinite(speed) and math.isfinite(yaw)):
@@ -40,7 +40,10 @@ def checked_command(command: object, tick: int) -> tuple[float, float]:
 
 
 def _pair(command: object) -> tuple[float, float]:
-    """Return a row of two numbers as floats; raises whatever its parts raise, TypeError if it is no such row."""
+    """Return a sequence of two numbers as floats.
+
+    Raises TypeError if it is no such sequence, and whatever converting its elements raises.
+    """
     if type(command) not in (tuple, Command) and not _is_row(command):
         raise TypeError("not a row")
     speed, yaw = cast("tuple[float, float]", command)
@@ -48,7 +51,7 @@ def _pair(command: object) -> tuple[float, float]:
 
 
 def _is_row(value: object) -> bool:
-    """Whether a value has an order and a length: no generator, set, mapping or text."""
+    """Tell whether a value has an order and a length: no generator, set, mapping or text."""
     ordered = hasattr(value, "__getitem__") and hasattr(value, "__len__")
     return ordered and not isinstance(value, str | bytes | bytearray | Mapping)
 
@@ -62,13 +65,13 @@ def _number(value: object) -> float:
 
 
 def agent_fault(instance: Instance, commands: Floats) -> str:
-    """Return what is said when an e-agent's command, a row of `commands` (N, 2), is not finite."""
+    """Return the detail of the ending `agent_fault`: which e-agent's row of `commands` (N, 2) is not finite."""
     n = int(np.argwhere(~np.isfinite(commands).all(axis=1))[0, 0])
     return f"{instance.names[n]} asked for a command that is not finite"
 
 
 def collision_detail(instance: Instance, contact: Contact) -> str:
-    """Return what is said when a contact of the ego ends the trial."""
+    """Return the detail of the ending `collision`: with whom the ego collided, and when."""
     other = contact.other if contact.car == EGO else contact.car
     name = instance.names[other] if other >= 0 else f"obstacle {-1 - other}"
     return f"with {name} at {contact.time:.3f} s"

@@ -1,4 +1,4 @@
-"""What a fork of a trial is made of: deep copies, in which another instance may stand for that of the trial."""
+"""Forks of a trial: deep copies of its parts, in which a reseeded instance may replace the trial's own."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ T = TypeVar("T")
 
 
 def forked(value: T, before: Instance, after: Instance) -> T:
-    """Return a deep copy of something that goes on in a fork, with the instance `after` wherever it has `before`.
+    """Return a deep copy of `value` for a fork, in which every reference to `before` has become one to `after`.
 
     Raises
     ------
     InputError
-        If something in it can't be copied, or says that it can't go on twice.
+        If a part of `value` can't be copied, or refuses to be.
     """
     memo: dict[int, Any] = {id(before): after}
     try:
@@ -38,5 +38,5 @@ def forked(value: T, before: Instance, after: Instance) -> T:
 
 
 def reseeded(tick: int, seed: int) -> Event:
-    """Return the event that tells of a fork since when it follows from another seed."""
+    """Return the event that notes, in a fork's record, the tick from which it draws from another seed."""
     return Event(tick, FORKED, NONE, f"from here on all is drawn from seed {seed}")

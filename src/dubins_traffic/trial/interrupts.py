@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Final
 
-_HEARD: Final = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 class _Held(threading.local):
-    """A body that no signal interrupts while `heard_between_frames` is in force; what came is heard at its end."""
+    """A `with` block that no signal interrupts inside `heard_between_frames`; a signal is handled when it ends."""
 
     inside = 0
     came: Callable[[], object] | None = None
@@ -34,22 +34,22 @@ class _Held(threading.local):
 
 
 WHOLE: Final = _Held()
-"""Within this, a frame is made and handed on as a whole."""
+"""The `with` block in which a frame is made and handed to the sinks as a whole."""
 
 
 @contextmanager
 def heard_between_frames() -> Generator[None]:
-    """Hold back, in the body, what interrupts this process while it is `WHOLE`; elsewhere it is heard at once.
+    """Hold SIGINT and SIGTERM back while the process is within `WHOLE`; elsewhere in the body handle them at once.
 
-    Threads but the main one are never interrupted, and a signal that nobody handles in Python is left alone.
+    Only the main thread is ever interrupted. A signal without a handler in Python keeps its default action.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in _HEARD}
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
     for number, handler in before.items():
         if callable(handler):
-            signal.signal(number, _patient(handler))
+            signal.signal(number, _deferring(handler))
     try:
         yield
     finally:
@@ -58,7 +58,9 @@ def heard_between_frames() -> Generator[None]:
                 signal.signal(number, handler)
 
 
-def _patient(handler: Callable[[int, FrameType | None], object]) -> Callable[[int, FrameType | None], None]:
+def _deferring(handler: Callable[[int, FrameType | None], object]) -> Callable[[int, FrameType | None], None]:
+    """Return a handler that does as `handler`, but only after the process has left `WHOLE`."""
+
     def hear(number: int, frame: FrameType | None) -> None:
         if WHOLE.inside:
             WHOLE.came = lambda: handler(number, None)

@@ -1,4 +1,4 @@
-"""Runs a controller through a trial: prepare (timed), run, end."""
+"""Runs a controller through a trial: start the controller (timed), step to the end, close the controller."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
     A controller that raises, gives up (None), answers nonsense, or takes longer than `deadline` seconds for one
     `act` ends its own trial with a named reason; nothing is raised but what interrupts the program.
     """
-    seat = Seat(controller, deadline)
+    seat = Seat(controller, deadline, linked=trial.is_watched)
     with heard_between_frames():
         try:
             seat.start(trial.instance.problem, trial.tick)

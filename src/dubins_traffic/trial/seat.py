@@ -1,8 +1,9 @@
-"""A controller in its place: what it is asked, in which order, and whose fault it is when that goes wrong."""
+"""Calls a controller's methods in order, measures them, and turns what goes wrong into a named end of its trial."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Final, cast
 from dubins_traffic.controllers import blame
 from dubins_traffic.errors import ControllerError, PeerError, shown
 from dubins_traffic.protocols import Closes, Controller, End, Ending, Reports
+from dubins_traffic.record.sink import FAULTS
 
 if TYPE_CHECKING:
     from dubins_traffic.cars.state import Observation
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 CLOSE_RAISED: Final = "close raised"
 """In the detail of an ending, before what a controller's `close` raised."""
+_PEERS_OWN: Final = FAULTS | {End.GAVE_UP}
+"""Ends that a PeerError may name in a trial that nobody elsewhere takes part in."""
 
 
 class _TooLateError(Exception):
@@ -29,18 +33,21 @@ class _TooLateError(Exception):
 
 
 class Seat:
-    """The ego's controller in one trial, run by itself, in a batch or in a session.
+    """Calls the ego's controller through one trial: a single one, one of a batch, or one of a session.
 
-    It is started, asked once a tick, heard if it reports, and told the end. Whatever it raises, answers or reports
-    wrongly is its fault and becomes a ControllerError that names the end of its trial; nothing else gets out but
-    KeyboardInterrupt, and a PeerError, which names the end by itself.
+    The seat starts the controller, asks it once a tick, collects its reports, and closes it. Whatever the
+    controller raises, answers or reports wrongly is its fault and becomes a ControllerError that names the end of its
+    trial. Beside that only KeyboardInterrupt and PeerError (which names the end itself) pass through. A process that
+    the controller has forked ends where it would go on as the judge.
 
     Parameters
     ----------
     controller : Controller
-        Who drives.
+        Drives the ego.
     deadline : float, optional
         Seconds within which each `act` must answer; by default it may take its time.
+    linked : bool
+        Whether somebody elsewhere takes part in the trial, who may end it as he likes.
 
     Attributes
     ----------
@@ -50,21 +57,23 @@ class Seat:
         Wall-clock seconds of each call of its `act`.
     """
 
-    def __init__(self, controller: Controller, deadline: float | None = None) -> None:
+    def __init__(
+        self, controller: Controller, deadline: float | None = None, *, linked: bool = False
+    ) -> None:
         self.begin: float | None = None
         self.latencies: list[float] = []
         self._controller = controller
         self._reports = isinstance(controller, Reports)
         self._deadline = deadline
-        self._guard = Answerable()
+        self._guard = Answerable(linked=linked)
 
     def start(self, problem: Problem, tick: int = 0) -> None:
-        """Tell the controller the problem, in frame `tick`.
+        """Hand the problem to the controller, in frame `tick`, and measure how long it takes.
 
         Raises
         ------
         ControllerError
-            If that is more than it can take.
+            If the controller raises anything.
         """
         started = perf_counter()
         self._guard.tick = tick
@@ -73,12 +82,12 @@ class Seat:
         self.begin = perf_counter() - started
 
     def act(self, seen: Observation, note: Callable[[str, str], object]) -> tuple[float, float]:
-        """Return what the controller answers, which nobody has checked yet; `note` is told what it reports.
+        """Return the controller's command, still unchecked, and pass its reports to ``note(kind, detail)``.
 
         Raises
         ------
         ControllerError
-            If it is at fault, gives up, or takes longer than it may.
+            If the controller raises, reports nonsense, gives up, or takes longer than its deadline.
         """
         guard, controller, deadline = self._guard, self._controller, self._deadline
         guard.tick = seen.tick
@@ -102,7 +111,7 @@ class Seat:
         return command
 
     def end(self, ending: Ending) -> Ending:
-        """Tell the controller that its trial is over; return the ending, with what closing raised in its detail."""
+        """Close the controller; return the ending, to whose detail an error of `close` is added."""
         if isinstance(self._controller, Closes):
             try:
                 self._controller.close()
@@ -112,19 +121,24 @@ class Seat:
                 blame.show(error)
                 detail = f"{ending.detail}; {CLOSE_RAISED} {blame.error_text(error)}".lstrip("; ")
                 return Ending(ending.end, ending.ticks, detail)
+            finally:
+                self._guard.end_forked()
         return ending
 
 
 class Answerable:
-    """Whatever a controller raises in the body, in frame `tick`, is its fault, and becomes the named end of its trial.
+    """A `with` block around calls of a controller in frame `tick`: what it raises becomes a ControllerError.
 
-    That includes SystemExit: a controller ends its trial, not the program.
+    That includes SystemExit: a controller ends its trial, not the program. A PeerError goes through if it names an end
+    that a peer can bring about; that the whole duration is over is for the trial to say, or for others (`linked`).
     """
 
-    __slots__ = ("tick",)
+    __slots__ = ("_linked", "_process", "tick")
 
-    def __init__(self) -> None:
+    def __init__(self, *, linked: bool = False) -> None:
         self.tick = 0
+        self._linked = linked
+        self._process = os.getpid()
 
     def __enter__(self) -> None:
         pass
@@ -132,32 +146,46 @@ class Answerable:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, _traceback: object
     ) -> None:
+        self.end_forked()
         if isinstance(error, _TooLateError):
             raise _deadline_error(error.deadline, self.tick) from None
-        if error is not None and not isinstance(error, KeyboardInterrupt | PeerError):
-            blame.show(error)
-            raise fault(error, self.tick) from error
+        if error is None or isinstance(error, KeyboardInterrupt) or self._names_end(error):
+            return
+        blame.show(error)
+        raise fault(error, self.tick) from error
+
+    def end_forked(self) -> None:
+        """End this process if it is one that the controller has forked: there is one judge."""
+        if os.getpid() != self._process:
+            os._exit(0)
+
+    def _names_end(self, error: BaseException) -> bool:
+        """Whether an error names an end of the trial by itself."""
+        if not isinstance(error, PeerError):
+            return False
+        ends = tuple(End) if self._linked else tuple(_PEERS_OWN)
+        return isinstance(cast(object, error.detail), str) and error.reason in ends
 
 
 def fault(error: BaseException, tick: int) -> ControllerError:
-    """Return the fault that it was of a controller to raise `error` in frame `tick`."""
+    """Return the ControllerError for an `error` that a controller has raised in frame `tick`."""
     return ControllerError(End.CONTROLLER_FAULT.value, blame.error_text(error, tick))
 
 
 def checked_reports(reports: Iterable[object]) -> list[tuple[str, str]]:
-    """Return what a controller reports, pairs of kind and detail, as lines that a record can hold.
+    """Return the reports of a controller as pairs (kind, detail) of printable one-line texts, as records hold them.
 
     Raises
     ------
     TypeError
-        If it is anything else.
+        If a report is anything but a pair of texts.
     """
     found: list[tuple[str, str]] = []
     for entry in reports:
         pair = tuple(cast("Sequence[object]", entry)) if isinstance(entry, tuple | list) else ()
         if len(pair) != 2 or not all(isinstance(part, str) for part in pair):
             raise TypeError(
-                f"a report is pairs of texts (kind, detail): got {blame.value_text(cast(object, entry), 80)}"
+                f"report() must return pairs of texts (kind, detail): got {blame.value_text(cast(object, entry), 80)}"
             )
         kind, detail = map(str, pair)
         found.append((shown(kind), shown(detail)))

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 
 class Trial:
-    """A trial that is stepped by its user: sense, decide, clip, move, label, push (`docs/semantics.md`).
+    """One trial, stepped by its caller; a tick is: sense, decide, clip, move, label, push (`docs/semantics.md`).
 
     Parameters
     ----------
     instance : Instance
-        What is run; with the commands it decides every byte of the frames.
+        What is run; the instance and the ego's commands determine every byte of the frames.
     simulator : Simulator
         Moves the cars.
     agents : sequence of Driver
@@ -87,10 +87,16 @@ class Trial:
         return self._tick
 
     @property
-    def sinks(self) -> Sequence[Sink]:
-        """Who is handed the frames of this trial; of a fork, those that have come along.
+    def is_watched(self) -> bool:
+        """Whether somebody is shown every frame at once, such as those elsewhere who drive or look on."""
+        return bool(self._watchers)
 
-        They have been handed all frames, unless one of them writes a record, whose chunks are whole seconds.
+    @property
+    def sinks(self) -> Sequence[Sink]:
+        """The sinks of this trial; a fork has those that could be copied.
+
+        They have been handed all frames up to the present one, unless one of them can't go on in a fork: the writer
+        of a record gets whole seconds.
         """
         return self._buffer.sinks
 
@@ -113,9 +119,11 @@ class Trial:
         return self.observation
 
     def advance(self, command: tuple[float, float]) -> Sequence[Contact]:
-        """Do as `step` but don't observe; return the contacts of the tick."""
+        """Step the trial as `step` does, but return the contacts of the tick and make no observation."""
         if self.ending is not None:
-            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): make a new one")
+            raise DubinsTrafficError(
+                f"the trial has ended ({self.ending.end}) and can't be stepped: make a new one"
+            )
         try:
             speed, yaw = self._line.take(self._tick, command)
         except ControllerError as error:
@@ -144,28 +152,28 @@ class Trial:
         return contacts
 
     def fork(self, seed: int | None = None) -> Self:
-        """Return a trial that goes on from the present frame by itself; see `runs.single.Trial.fork`.
+        """Return an independent copy of this trial at its present frame; see `runs.single.Trial.fork`.
 
         Parameters
         ----------
         seed : int, optional
-            From which all follows that is drawn from here on; by default from that of the instance.
+            Seed of all random numbers drawn from here on; by default that of the instance.
 
         Raises
         ------
         DubinsTrafficError
             If the trial has ended.
         InputError
-            If its simulator, one of its drivers or a sink can't go on twice.
+            If its simulator, one of its drivers or a sink can't be copied.
         """
         if self.ending is not None:
-            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}): nothing goes on")
+            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}) and can't be forked")
         if not self._simulator.capabilities.forks:
             raise InputError(
-                "a trial on this simulator can't go on twice",
+                "a trial on this simulator can't be forked",
                 field="simulator",
                 value=self.instance.simulator,
-                expected="embedded, or another one that can",
+                expected="embedded, or another simulator with the capability `forks`",
             )
         again = seed is not None and seed != self.instance.seed
         instance = replace(self.instance, seed=seed) if again else self.instance
@@ -176,7 +184,7 @@ class Trial:
         return twin
 
     def _reseed(self) -> None:
-        """Let what is drawn from the present frame on follow from the instance's seed, which is another than before."""
+        """Draw all random numbers from the present frame on from the instance's seed, which has changed."""
         seed = self.instance.seed
         self._observation = None
         for agent in self._agents:
@@ -185,7 +193,7 @@ class Trial:
         self._buffer.note(reseeded(self._tick, seed))
 
     def note(self, kind: str, detail: str = "") -> None:
-        """Put an event of the ego, at the present tick, into the record."""
+        """Hand an event of the ego, at the present tick, to the sinks."""
         self._buffer.note(Event(self._tick, kind, EGO, detail))
 
     def end(self, end: End, detail: str = "") -> Ending:
@@ -215,7 +223,7 @@ class Trial:
         return self._observation
 
     def _note_agents(self) -> None:
-        """Put what the e-agents have to say into the record."""
+        """Hand the reports of the e-agents' drivers to the sinks, as events of no car."""
         for agent in self._tellers:
             for kind, detail in agent.report():
                 self._buffer.note(Event(self._tick, kind, NONE, detail))

@@ -1,1 +1,1 @@
-"""Records held against what must have happened: simulated again where the world is ours, checked where it is not."""
+"""Verification of records: trials of this package's simulator are simulated again, those of other worlds checked."""

@@ -1,4 +1,4 @@
-"""A recorded trial is simulated again from its instance and its recorded commands, and compared."""
+"""Simulates a recorded trial again from its instance and recorded commands, and compares the two."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FIELDS = (*schema.FRAME_FIELDS[6:], *schema.FRAME_FIELDS[:6], *schema.LABEL_FIE
 
 
 def trial_difference(record: Record) -> Difference | None:
-    """Return the first thing in `record` that does not follow from its instance and its recorded commands.
+    """Return the first difference of `record` from what follows from its instance and recorded commands.
 
     The commands of e-agents that a trial drives by itself are decided again; those of the ego and of remote cars are
     taken as recorded. So are the poses of a world that is not ours.
@@ -48,7 +48,7 @@ def trial_difference(record: Record) -> Difference | None:
 
 
 def drivers(record: Record) -> Sequence[Driver]:
-    """Return who drives the e-agents: the trial's own drivers, and the record for remote cars."""
+    """Return the drivers of the e-agents: the trial's own, and for remote cars one that plays the record."""
     agents = record.instance.e_agents
     remote = [n for n, agent in enumerate(agents, start=1) if agent.kind == REMOTE]
     local: list[Driver] = [Fleet()] if len(remote) < len(agents) else []
@@ -56,7 +56,7 @@ def drivers(record: Record) -> Sequence[Driver]:
 
 
 def _commands_of_ego(instance: Instance, frames: Frames) -> Sequence[tuple[float, float]]:
-    """Return the commands that the ego's controller gave in each tick, as far as the record tells: they may be delayed.
+    """Return the commands that the ego's controller gave in each tick, as far as delays let the record show them.
 
     A command that was delayed beyond the end, or lost, has left no trace; in its place stands what makes none.
     """
@@ -91,7 +91,7 @@ def _report(trial: Trial, events: Sequence[Event]) -> None:
 def _concluded(
     record: Record, trial: Trial, witness: _Witness, reported: dict[int, list[Event]]
 ) -> Difference | None:
-    """Let the trial end as the record says, if that may be, and return what differs."""
+    """End the trial as the record says if that is possible, and return the first difference."""
     last = len(record.frames) - 1
     if trial.ending is not None and trial.tick < last:
         early = witness.difference
@@ -142,7 +142,7 @@ def _ending_text(ending: Ending | None) -> str:
 
 
 class _Witness:
-    """A sink that holds what a trial pushes against its record, block by block.
+    """A sink that compares the frames of a trial with its record, block by block.
 
     `ends_early`: the last event is of this trial's end alone, and not the record's. `put_off`: by how many ticks an
     interruption was noted beside the last frame.
@@ -157,7 +157,7 @@ class _Witness:
         self.put_off = 0
 
     def begin(self, instance: Instance) -> None:
-        """Nothing has been pushed yet."""
+        """Do nothing: no frame has come yet."""
 
     def frames(self, frames: Frames) -> None:
         """Compare the next block."""
@@ -166,7 +166,7 @@ class _Witness:
         self._block += 1
 
     def end(self, ending: Ending) -> None:
-        """Keep how the trial ended, and compare how many blocks there were."""
+        """Keep the ending, and compare the number of blocks."""
         self.ending = replace(ending, ticks=ending.ticks + self.put_off)
         if self.difference is None and self._block < len(self._record.blocks):
             extra = self._record.blocks[self._block]
@@ -204,7 +204,7 @@ class _Witness:
 
 
 def _columns_differ(recorded: Frames, frames: Frames, names: Sequence[str]) -> Difference | None:
-    """Return the first number of a block that is not the recorded one, bit for bit."""
+    """Return the first number of a block that differs from the recorded one in any bit."""
     last = min(frames.first + len(frames), len(recorded))
     count = max(0, last - frames.first)
     best: Difference | None = None
@@ -227,7 +227,7 @@ def _unequal(
     expected: Sequence[Contact | Event],
     instance: Instance,
 ) -> Difference | None:
-    """Return the first contact or event that is not as expected."""
+    """Return the first contact or event that differs from the expected one."""
     for k in range(max(len(recorded), len(expected))):
         one = recorded[k] if k < len(recorded) else None
         two = expected[k] if k < len(expected) else None

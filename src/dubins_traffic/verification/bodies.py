@@ -1,4 +1,4 @@
-"""Which bodies overlap in recorded poses."""
+"""Finds the bodies that overlap in recorded poses."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Meetings:
         self._collect(frames)
 
     def note(self, contacts: tuple[Contact, ...]) -> None:
-        """Take contacts of the next frame: what touches is one meeting until it has parted."""
+        """Take the contacts of the next frame: two bodies that touch count as one meeting until they have parted."""
         self._touching.update((contact.car, contact.other) for contact in contacts)
 
     def gaps(self, f: int, state: State) -> Iterator[tuple[tuple[int, int], float]]:

@@ -1,4 +1,4 @@
-"""Labels and contacts of a record found again from its poses, whatever the record says of them."""
+"""Finds the labels and contacts of a record again from its poses, whatever the record holds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dubins_traffic.verification.worlds import OVERLAP, FromPoses, Replayed, Sho
 
 
 def from_poses(record: Record) -> Record:
-    """Return a record with the labels and contacts that its poses and commands have.
+    """Return a record with the labels and contacts that follow from its poses and commands.
 
     In a world of ours every tick begins at its recorded frame and is moved by the recorded commands: what touches on
     the way is a contact. Bodies that overlap in a frame touch there, in any world, unless they have touched already.
@@ -45,7 +45,7 @@ class _Kept:
     """A sink that keeps all frames."""
 
     def begin(self, instance: Instance) -> None:  # noqa: ARG002  # all frames are kept alike
-        """Nothing is kept yet."""
+        """Do nothing: no frame has come yet."""
         self.blocks: list[Frames] = []
 
     def frames(self, frames: Frames) -> None:
@@ -53,4 +53,4 @@ class _Kept:
         self.blocks.append(frames)
 
     def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
+        """Do nothing."""

@@ -1,4 +1,4 @@
-"""What can be checked of worlds that are not ours: bounds, contacts and times."""
+"""Checks records of worlds that another program simulates: bounds, contacts and times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dubins_traffic.verification.worlds import MEASURED, by_tick
 
 @dataclass(frozen=True, slots=True)
 class Slack:
-    """By how much a world that is not ours may miss the bounds.
+    """Tolerances with which the world of another program has to keep the bounds.
 
     In `window` seconds a car moves and turns by at most `share` times what the bounds allow, and `metres` and
     `radians`. Bodies that have a contact are at most `gap` metres apart at the frame before it or at its own; bodies
@@ -34,20 +34,20 @@ class Slack:
 
 
 PHYSICS: Final = Slack(window=0.2, share=1.1, metres=0.02, radians=0.1, gap=0.03, overlap=0.005)
-"""Of Gazebo, and any other simulator in lockstep."""
+"""Tolerances for Gazebo and any other simulator in lockstep."""
 TRACKED: Final = Slack(window=1.0, share=1.5, metres=0.25, radians=0.5, gap=0.03, overlap=0.005)
-"""Of poses that come from elsewhere in real time, late and early."""
+"""Tolerances for poses that another process sends in real time, late and early."""
 UNIT: Final = 1e-6
-"""By this the length of a heading may differ from 1."""
+"""Largest difference of the length of a heading from 1."""
 
 
 def slack_of(instance: Instance) -> Slack:
-    """Return what the world of an instance is allowed."""
+    """Return the tolerances for the world of an instance."""
     return TRACKED if instance.simulator == MEASURED else PHYSICS
 
 
 def world_difference(record: Record) -> Difference | None:
-    """Return the first place in the frames of `record` that bounds, bodies or times rule out.
+    """Return the first place in the frames of `record` that bounds, bodies or times exclude.
 
     No car within its bounds can have done it, or contacts don't fit the poses or are not in order of time.
     """
@@ -118,7 +118,7 @@ def _over(
 
 
 def _times(record: Record) -> Difference | None:
-    """Check that contacts stand in the order of their ticks and at instants of them."""
+    """Check that contacts are in the order of their ticks, and their times within them."""
     rate, last = record.instance.problem.rate, 0
     for contact in record.frames.contacts:
         tick = contact.time * rate
@@ -131,7 +131,7 @@ def _times(record: Record) -> Difference | None:
 
 
 def _contacts(record: Record, slack: Slack) -> Difference | None:
-    """Check that what has a contact is near, and that what overlaps has one."""
+    """Check that bodies with a contact are near each other, and that bodies that overlap have a contact."""
     instance, frames = record.instance, record.frames
     contacts, meetings = by_tick(frames.contacts), Meetings(instance, frames)
     obstacles, state = len(instance.problem.obstacles), State.zeros(1, len(instance.names))
@@ -154,7 +154,7 @@ def _contacts(record: Record, slack: Slack) -> Difference | None:
 
 
 def _gap(meetings: Meetings, frames: Frames, contact: Contact, state: State) -> float:
-    """Return the lesser gap of the two frames between which a contact lies."""
+    """Return the smaller gap, metres, of the two frames between which a contact lies."""
     gaps: list[float] = []
     for f in (contact.tick - 1, contact.tick):
         put_frame(state, frames, f)

@@ -1,4 +1,4 @@
-"""The first place in which two documents differ."""
+"""Finds the first place in which two documents differ."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dubins_traffic.verification.result import Difference
 
 
 def header_difference(written: bytes, record: Record) -> Difference | None:
-    """Return where the header of `record`, as it is `written`, says other things than its own instance does.
+    """Return where the header of `record`, as `written`, differs from the document of its instance.
 
     The instance may be written in more ways than one: what its document leaves out has its default.
     """
@@ -30,14 +30,14 @@ def header_difference(written: bytes, record: Record) -> Difference | None:
 
 
 def instance_difference(record: Record, expected: Instance) -> Difference | None:
-    """Return the first difference between the instance of `record` and the one that was to be run."""
+    """Return the first difference between the instance of `record` and the one that should have been run."""
     same = instance_from_document(instance_to_document(expected))  # with what it leaves out at its default
     documents = [_as_json(instance_to_document(instance)) for instance in (record.instance, same)]
     return unlike("instance", documents[0], documents[1])
 
 
 def score_difference(record: Record, scores: Sequence[Mapping[str, Any]]) -> Difference | None:
-    """Return where the score printed of `record`, the one of `scores` that names its file, is another than its own.
+    """Return where the printed score of `record`, the one in `scores` that names its file, differs from its score.
 
     What was measured on a wall clock is left out.
     """

@@ -11,7 +11,7 @@ from dubins_traffic.record.header import PACKAGE
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What differs first: `what`, of which car in which frame where it has them, as recorded and as expected."""
+    """The first difference: `what` differs, its car and frame if it has any, the recorded and the expected value."""
 
     what: str
     recorded: Any
@@ -92,13 +92,13 @@ class Verification:
         }
 
     def _versions(self) -> str:
-        """Return what is said where the record is of another version, in which other things may have followed."""
+        """Return the remark on a record of another version of the package, which may have given other results."""
         own = version(PACKAGE)
         return "" if own == self.written_by else f" (written by {PACKAGE} {self.written_by}, this is {own})"
 
 
 OURS = "embedded"
-"""The simulator whose trials are simulated again."""
+"""The simulator whose trials can be simulated again."""
 
 
 def _as_text(value: Any) -> str:

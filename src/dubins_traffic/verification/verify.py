@@ -1,4 +1,4 @@
-"""Verification of records: whether what a record says is what happened."""
+"""Verifies records: whether the frames in a record are those that its instance and commands lead to."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def verify(
     instance: Instance | Callable[[Record], Instance] | None = None,
     scores: Sequence[Mapping[str, Any]] | None = None,
 ) -> Verification:
-    """Go through a recorded trial again and compare all of it with its record, bit for bit.
+    """Run a recorded trial again and compare everything with its record, bit for bit.
 
     Where the world is ours the trial is simulated again from its instance and its recorded commands, and the e-agents
     that it drives by itself are decided again. Of other worlds it is checked that frames fit the bounds and contacts
@@ -101,7 +101,7 @@ def _first_difference(record: Record, data: bytes, expected: Instance | None) ->
 
 
 def _earlier(record: Record) -> Difference | None:
-    """Return the earlier of two differences: from the bounds of a world that is not ours, or from simulating again."""
+    """Return the earlier of two differences: from the bounds of another world, or from simulating again."""
     found = [
         None if record.instance.simulator == OURS else world_difference(record),
         trial_difference(record),
@@ -110,7 +110,7 @@ def _earlier(record: Record) -> Difference | None:
 
 
 def _unchecked(record: Record) -> tuple[str, ...]:
-    """Return what is taken as it was recorded."""
+    """Return what is taken from the record unchecked."""
     remote = [agent.name for agent in record.instance.e_agents if agent.kind == REMOTE]
     taken = ["commands of the ego", *(f"commands of {name}" for name in remote)]
     taken.append("what the controller reported")

@@ -1,4 +1,4 @@
-"""What stands in a trial's place of a simulator and of drivers when it is gone through again from its record."""
+"""Simulators and drivers that play a record, for running its trial again."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from dubins_traffic.simulators.embedded import Embedded
 from dubins_traffic.verification.bodies import Meetings, put_frame
 
 ROUNDING: Final = 1e-9
-"""By this a world that is not ours may clip commands otherwise, m/s and rad/s."""
+"""Largest difference between commands as clipped here and by the world of another program, m/s and rad/s."""
 OVERLAP: Final = 1e-6
-"""Bodies in a world of ours that overlap by more than this, metres, and have not touched, have been put there."""
+"""Bodies of the embedded simulator that overlap by more than this without a contact have been moved, metres."""
 MEASURED: Final = "ros1-world"
-"""The world in which contacts are told from the poses at frames alone."""
+"""The simulator whose contacts are found from the poses at frames alone."""
 
 
 class Replayed:
-    """Drives some cars as they were driven (a `protocols.Driver`).
+    """Drives some cars by their recorded commands (a `protocols.Driver`).
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Replayed:
         self._commands = commands_of(frames)[:, self._cars]
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
-        """Nothing is begun."""
+        """Do nothing."""
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:  # noqa: ARG002
         """Write the recorded commands for [t_k, t_k+1)."""
@@ -54,7 +54,7 @@ def commands_of(frames: Frames) -> Floats:
 
 
 class Shown:
-    """A world that is not ours, as it was recorded (a `protocols.Simulator`).
+    """Plays the recorded world of another program (a `protocols.Simulator`).
 
     Contacts are those of the record, except where poses alone tell them: there they are found again.
     """
@@ -95,7 +95,7 @@ class Shown:
         return [tuple(self._contacts.get(self._tick, ()))]
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: there are no resources."""
 
 
 class FromPoses:
@@ -123,7 +123,7 @@ class FromPoses:
         return self.state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
-        """Go to the next frame and return what has touched on the way there, or overlaps there."""
+        """Go to the next frame and return the contacts on the way there, and those of bodies that overlap there."""
         (found,) = self._world.step(commands)
         self._tick += 1
         put_frame(self.state, self._frames, self._tick)
@@ -137,7 +137,7 @@ class FromPoses:
         return [(*found, *own)]
 
     def close(self) -> None:
-        """Close the world within."""
+        """Close the simulator within."""
         self._world.close()
 
 

@@ -1,4 +1,4 @@
-"""Whether a record's file has the bytes that a trial with its frames would have been written with."""
+"""Checks that a record's file has exactly the bytes that this package writes for its frames."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import nose, outline
 from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_lines, extent, lane_hints, road_lines
+from dubins_traffic.viewer.scene import Extent, centre_paths, extent, lane_hints, road_lines, short
 
 SIDE_RANGE = (4.5, 13.0)
 INCHES_PER_METRE = 0.55
@@ -80,7 +80,7 @@ class Canvas:
             self.axes.add_collection(surface, autolim=False)
         stroke = min(1.8, max(0.3, 0.05 * self.points))
         centre = LineCollection(
-            list(centre_lines(network, half)),
+            centre_paths(network, half),
             linewidths=stroke,
             colors=palette.LINE_COLOUR,
             linestyles=[(0.0, (0.2 * self.points / stroke, 0.16 * self.points / stroke))],
@@ -99,7 +99,7 @@ class Canvas:
         size = min(LABEL_POINTS, 0.3 * 2.0 * half * self.points)
         if size >= 2.5:
             for (x, y), place in zip(network.intersections, network.points, strict=True):
-                self._text(place, f"{x},{y}", size, palette.FAINT_COLOUR, 3)
+                self._text(place, f"{short(x)},{short(y)}", size, palette.FAINT_COLOUR, 3)
 
     def goals(self, problem: Problem) -> None:
         """Draw the goals' discs, numbered in the order in which they are given."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from itertools import pairwise
-from typing import Any
+from math import ceil
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,11 +33,16 @@ COLOURS: dict[str, str] = {
     Reason.APART: "#22272E",
 }
 """Of parts of roads that are held, and of dropped roads by their reason."""
+NETWORK_COLOUR = "#BBD7EA"
 WIDTH = 9.0
 """Inches."""
+TALLEST, LOWEST = 1.0, 0.3
+"""Height of the map, in `WIDTH` and in its own width."""
+NARROWEST, BESIDE, ABOVE, ROW = 7.0, 0.75, 1.35, 0.2
+"""Inches: least of a picture; beside the map; above and below it without the legend; of a row of the legend."""
 FINEST = 2e-4
 """Lines are drawn within this share of the picture."""
-HELD, DROPPED = 1.8, 1.0
+NETWORK, HELD, DROPPED = 4.5, 1.8, 1.0
 """Points."""
 
 
@@ -54,37 +60,63 @@ def write_losses(path: str | os.PathLike[str], losses: Losses) -> None:
 
 
 def _draw(losses: Losses) -> Any:
-    from matplotlib.collections import LineCollection
-
     points = np.concatenate([fate.line for fate in losses.fates])
     low, high = points.min(axis=0), points.max(axis=0)
     span = np.maximum(high - low, 1.0)
-    lines: dict[str, list[Floats]] = {name: [] for name in COLOURS}
-    for fate in losses.fates:
-        for name, line in _parts(fate):
-            lines[name].append(simplified(line, FINEST * float(span.max())))
-    height = min(max(WIDTH * float(span[1] / span[0]), 3.0), 2.0 * WIDTH)
-    figure: Any = figure_class()(figsize=(WIDTH, height + 1.6), layout="constrained")
+    span = np.maximum(span, LOWEST * float(span[0]))
+    groups = _groups(losses, FINEST * float(span.max()))
+    wide = min(WIDTH, WIDTH * TALLEST * float(span[0] / span[1]))
+    height = wide * float(span[1] / span[0]) + ABOVE + ROW * ceil(0.5 * len(groups))
+    figure: Any = figure_class()(figsize=(max(wide + BESIDE, NARROWEST), height), layout="constrained")
     axes: Any = figure.add_subplot()
-    for name, colour in COLOURS.items():
-        if lines[name]:
-            held = name in (KEPT, OFF)
-            drawn = LineCollection(
-                lines[name],
-                colors=colour,
-                linewidths=HELD if held else DROPPED,
-                zorder=2.0 + held,
-                label=name if held else f"dropped: {name}",
-                capstyle="round",
-            )
-            axes.add_collection(drawn)
-    axes.set_xlim(low[0] - 0.03 * span[0], high[0] + 0.03 * span[0])
-    axes.set_ylim(low[1] - 0.03 * span[1], high[1] + 0.03 * span[1])
+    for order, group in enumerate(groups):
+        axes.add_collection(group.collection(1.0 + 0.1 * order))
+    middle = 0.5 * (low + high)
+    for limit, centre, size in zip((axes.set_xlim, axes.set_ylim), middle, 0.53 * span, strict=True):
+        limit(centre - size, centre + size)
     axes.set_aspect("equal")
-    axes.set_xlabel("metres of the map")
+    axes.tick_params(labelsize=8.0)
+    axes.set_xlabel("metres of the map", fontsize=9.0)
     axes.set_title(losses.lines()[0].replace("; ", ";\n"), fontsize=9.0)
     figure.legend(loc="outside lower center", ncols=2, fontsize=8.0, frameon=False)
     return figure
+
+
+class _Group(NamedTuple):
+    """Lines of one colour, with what the legend says of them."""
+
+    label: str
+    colour: str
+    points: float
+    lines: list[Floats]
+
+    def collection(self, order: float) -> Any:
+        from matplotlib.collections import LineCollection
+
+        style: dict[str, Any] = {"colors": self.colour, "linewidths": self.points, "zorder": order}
+        return LineCollection(self.lines, label=self.label, capstyle="round", joinstyle="round", **style)
+
+
+def _groups(losses: Losses, finest: float) -> list[_Group]:
+    """Return what is drawn, from below to above: what was dropped, the network, and which roads it holds."""
+    lines: dict[str, list[Floats]] = {name: [] for name in COLOURS}
+    for fate in losses.fates:
+        for name, line in _parts(fate):
+            lines[name].append(simplified(line, finest))
+    kept = sum(fate.kept for fate in losses.fates if fate.fate != "dropped")
+    held = sum(fate.length for fate in losses.fates if fate.fate != "dropped")
+    told = {KEPT: f"{KEPT} ({kept:.0f} m)", OFF: f"{OFF} ({held - kept:.0f} m)"}
+    for fate, reason, number, metres in losses.rows():
+        if fate == "dropped":
+            told[reason] = f"dropped: {reason} ({number}, {metres:.0f} m)"
+    dropped = [
+        _Group(told[name], COLOURS[name], DROPPED, lines[name])
+        for name in COLOURS
+        if lines[name] and name not in (KEPT, OFF)
+    ]
+    network = [simplified(line, finest) for line in losses.network]
+    of_map = [_Group(told[name], COLOURS[name], HELD, lines[name]) for name in (KEPT, OFF) if lines[name]]
+    return [*dropped, _Group("the network", NETWORK_COLOUR, NETWORK, network), *of_map]
 
 
 def _parts(fate: Fate) -> list[tuple[str, Floats]]:

@@ -11,6 +11,7 @@ from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.scoring.formulas import FormulaVerdict
 from dubins_traffic.scoring.verdict import EGO_NAME, Ruling, Verdict, Violation
+from dubins_traffic.viewer.scene import short
 
 RULES = {
     "1.collision": "touches another body",
@@ -167,7 +168,7 @@ def marks_of(instance: Instance, frames: Frames, more: Sequence[Mark] = ()) -> l
     for frame, vertex in goal_visits(instance, frames):
         x, y = lattice[vertex]
         place = (float(points[vertex, 0]), float(points[vertex, 1]))
-        text = f"ego visits goal {numbers[vertex]} at ({x}, {y})"
+        text = f"ego visits goal {numbers[vertex]} at ({short(x)}, {short(y)})"
         marks.append(Mark((frames.first + frame) / frames.rate, "goal", text, EGO, place))
     marks += more
     return sorted(marks, key=lambda mark: mark.time)

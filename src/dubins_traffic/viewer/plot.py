@@ -113,18 +113,24 @@ def write_plot(path: str | os.PathLike[str], subject: Subject | Run) -> None:
 def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any]) -> None:
     """Write the figure that `draw` returns to `path`; errors as those of `write_plot`."""
     target = Path(path)
-    suffix = target.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            "not a picture",
-            file=str(target),
-            value=target.suffix,
-            expected=f"a suffix of {', '.join(SUFFIXES)}",
-        )
+    require_picture(target)
     with _matplotlib().rc_context(STYLE):
         figure = draw()
+        suffix = target.suffix.lower()
         look: dict[str, Any] = {"format": suffix[1:], "metadata": METADATA[suffix], "dpi": 160}
         replace_file(target, lambda draft: figure.savefig(draft, **look))
+
+
+def require_picture(path: Path) -> None:
+    """Refuse a path with the suffix of no picture, and all where matplotlib is not installed."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            "not a picture",
+            file=str(path),
+            value=path.suffix,
+            expected=f"a suffix of {', '.join(SUFFIXES)}",
+        )
+    _matplotlib()
 
 
 def _matplotlib() -> Any:
@@ -148,6 +154,8 @@ def _draw(subject: Subject | Run) -> Any:
     instance = subject.instance
     if isinstance(subject, Record):
         frames = subject.frames
+        if len(frames) == 0:
+            raise InputError("nothing to draw", field="frames", value=0, expected="at least one frame")
         whole: list[Floats] = list(np.stack([frames.x, frames.y], axis=-1).swapaxes(0, 1))
         marks = [contact_mark(instance, contact) for contact in frames.contacts]
         canvas = _ground(instance, whole)

@@ -19,7 +19,7 @@ from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.marks import goal_numbers
 from dubins_traffic.viewer.raster_ground import Cover, blend, rgb
 from dubins_traffic.viewer.raster_kernel import MARK, Image, View, paint
-from dubins_traffic.viewer.scene import centre_lines, extent, lane_hints, obstacle_points, road_lines
+from dubins_traffic.viewer.scene import centre_paths, extent, lane_hints, obstacle_points, road_lines
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -150,8 +150,8 @@ class Raster:
             blend(picture, roads, colour)
         lines, hints = self._cover(), self._cover()
         thin = 0.5 * max(0.045 * scale, 0.8)
-        for first, last in centre_lines(network, 0.5 * car.road_width):
-            lines.dashes(self.at(*first), self.at(*last), thin, 0.2 * scale, 0.16 * scale)
+        for path in centre_paths(network, 0.5 * car.road_width):
+            lines.dashed([self.at(*point) for point in path], thin, 0.2 * scale, 0.16 * scale)
         for first, last in stop_lines(problem):
             lines.dashes(self.at(*first), self.at(*last), 1.4 * thin, car.road_width * scale, 1.0)
         for hint in lane_hints(network, car.w):

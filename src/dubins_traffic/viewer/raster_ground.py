@@ -62,10 +62,26 @@ class Cover:
         for first, last in pairwise(points):
             self.line(first, last, half)
 
+    def dashed(self, points: Sequence[Sequence[float]], half: float, on: float, off: float) -> None:
+        """Cover the lines from point to point by `dashes` that go on evenly from each to the next."""
+        before = 0.0
+        for first, last in pairwise(points):
+            self.dashes(first, last, half, on, off, before)
+            before += float(np.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2))
+
     def dashes(
-        self, first: Sequence[float], last: Sequence[float], half: float, on: float, off: float
+        self,
+        first: Sequence[float],
+        last: Sequence[float],
+        half: float,
+        on: float,
+        off: float,
+        before: float = 0.0,
     ) -> None:
-        """Cover a line of strokes `on` long with gaps `off` between them, cut off straight at its ends."""
+        """Cover a line of strokes `on` long with gaps `off` between them, cut off straight at its ends.
+
+        The first stroke begins so far `before` the line.
+        """
         (ax, ay), (bx, by) = first, last
         length = float(np.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
         box = self._box(min(ax, bx), max(ax, bx), min(ay, by), max(ay, by), half)
@@ -75,7 +91,7 @@ class Cover:
         cx, cy = (bx - ax) / length, (by - ay) / length
         u = (x - ax) * cx + (y - ay) * cy
         v = np.abs((y - ay) * cx - (x - ax) * cy)
-        inner = u - np.floor(u / (on + off)) * (on + off)
+        inner = u + before - np.floor((u + before) / (on + off)) * (on + off)
         stroke = np.abs(inner - 0.5 * on) - 0.5 * on
         self._put(
             rows,

@@ -320,5 +320,6 @@ window.replay = {
   get mark() { return marks.chosen; },
   get shown() { return marks.shown(show); },
   pose: (car) => trial.pose(car, state.time),
+  at: (x, y) => map.camera.toScreen(x, y),
   seek, play, pause,
 };

@@ -89,6 +89,11 @@ class Trial {
     return [segment && `${name}_s_${segment.join("_")}`, point && `${name}_t_${point.join("_")}`].filter(Boolean);
   }
 
+  // A lattice point as pictures show it.
+  latticeName(vertex) {
+    return this.lattice[vertex].map((value) => Number(value.toFixed(2)) + 0).join(",");
+  }
+
   // The propositions that hold of a car, by name.
   propositions(car, time) {
     const bits = this.bits[car * this.frames + this.place(time)[0]];
@@ -112,5 +117,15 @@ class Trial {
     }
     if (counts.has(this.at[frame])) lit.add(this.at[frame]);
     return { rounds, counts, lit };
+  }
+}
+
+// Add lines [x0, y0, x1, y1] to a path; one that begins where the last ended goes on with it, so that strokes do, too.
+function addLines(path, lines) {
+  let x, y;
+  for (const [x0, y0, x1, y1] of lines) {
+    if (x0 !== x || y0 !== y) path.moveTo(x0, y0);
+    path.lineTo(x1, y1);
+    [x, y] = [x1, y1];
   }
 }

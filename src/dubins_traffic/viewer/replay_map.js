@@ -41,15 +41,9 @@ class MapView {
     this.camera = new Camera();
     this.colours = {};
     this.roads = new Path2D();
-    for (const [x0, y0, x1, y1] of trial.lines) {
-      this.roads.moveTo(x0, y0);
-      this.roads.lineTo(x1, y1);
-    }
+    addLines(this.roads, trial.lines);
     this.centres = new Path2D();
-    for (const [x0, y0, x1, y1] of trial.centres) {
-      this.centres.moveTo(x0, y0);
-      this.centres.lineTo(x1, y1);
-    }
+    addLines(this.centres, trial.centres);
     this.hints = new Path2D();
     for (const [x0, y0, x1, y1, x2, y2] of trial.hints) {
       this.hints.moveTo(x0, y0);
@@ -310,7 +304,7 @@ class MapView {
       const [px, py] = camera.toScreen(x, y);
       const size = Math.min(12, 0.28 * small);
       if (goal) this.text(`goal ${goal}`, px, size < 8 ? py : py - 7, { size: 13, weight: 700, colour: colours["goal-ink"] });
-      if (size >= 8 && small >= 22) this.text(trial.lattice[vertex].join(","), px, goal ? py + 8 : py, { size, colour: colours.faint });
+      if (size >= 8 && small >= 22) this.text(trial.latticeName(vertex), px, goal ? py + 8 : py, { size, colour: colours.faint });
     });
   }
 

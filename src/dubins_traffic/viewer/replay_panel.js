@@ -107,7 +107,7 @@ class Panel {
       const visits = counts.get(vertex);
       this.goals[index].classList.toggle("on", lit.has(vertex));
       this.goals[index].replaceChildren(
-        make("b", `${trial.goals.numbers[index]}`), `  ${trial.lattice[vertex].join(",")} × ${visits}`);
+        make("b", `${trial.goals.numbers[index]}`), `  ${trial.latticeName(vertex)} × ${visits}`);
     });
     this.rows.forEach(({ row, cells }, car) => {
       const pose = trial.pose(car, time);

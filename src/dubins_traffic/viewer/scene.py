@@ -58,6 +58,18 @@ def centre_lines(network: RoadNetwork, half_width: float) -> Floats:
     return lines
 
 
+def centre_paths(network: RoadNetwork, half_width: float) -> list[Floats]:
+    """Return `centre_lines` with the chords of a bend as one line (N, 2), along which strokes go on evenly."""
+    lines = centre_lines(network, half_width)
+    cuts = np.flatnonzero((lines[1:, 0] != lines[:-1, 1]).any(axis=1)) + 1
+    return [np.concatenate([run[:1, 0], run[:, 1]]) for run in np.split(lines, cuts)]
+
+
+def short(number: float) -> str:
+    """Return a lattice coordinate as pictures show it, with two digits after the point at most."""
+    return f"{round(number, 2) + 0.0:.12g}"
+
+
 def lane_hints(network: RoadNetwork, w: float) -> Floats:
     """Return chevrons on the right lanes that point the way one drives there, (H, 3, 2) metres.
 

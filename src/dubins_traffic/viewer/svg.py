@@ -16,7 +16,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import outline
 from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_lines, extent, obstacle_points, road_lines
+from dubins_traffic.viewer.scene import Extent, centre_paths, extent, obstacle_points, road_lines
 
 WIDTH, HEIGHT = 460.0, 400.0
 """Most pixels of a picture."""
@@ -111,8 +111,8 @@ class Drawing:
         for colour, wide in ((palette.KERB_COLOUR, width + 2.0), (palette.ROAD_COLOUR, width)):
             for ends in lines:
                 self.line(ends, colour, wide, 'stroke-linecap="round"')
-        for ends in centre_lines(self.network, 0.5 * self.car.road_width):
-            self.line(ends, palette.LINE_COLOUR, 1.0, 'stroke-dasharray="4 3"')
+        for path in centre_paths(self.network, 0.5 * self.car.road_width):
+            self.line(path, palette.LINE_COLOUR, 1.0, 'stroke-dasharray="4 3"')
 
     def problem(self, problem: Problem) -> None:
         """Draw the goals with their numbers, and the obstacles."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 
 LEVEL = 0.95
 RESAMPLES = 1_000
@@ -20,7 +21,6 @@ NORMAL = 1.959963984540054
 """The normal distribution has `LEVEL` of its weight within so many standard deviations of its mean."""
 MOST = 2_000
 """Of more values than these the interval follows from the normal and the binomial distribution."""
-_BATCH_VALUES = 4_000_000
 
 Interval: TypeAlias = tuple[float, float]
 
@@ -57,14 +57,15 @@ def estimate(values: Floats, *, median: bool = True) -> Estimate:
     if count == 0:
         return Estimate(0, None, None, None, None)
     mean = math.fsum(known.tolist()) / count
+    resamples = None if count > MOST else known[_drawn(count)]
     if count == 1 or float(known.min()) == float(known.max()):
         about = (mean, mean)
     else:
-        about = _normal(known, mean) if count > MOST else _bootstrap(known, np.mean)
+        about = _normal(known, mean) if resamples is None else _between(resamples.mean(axis=-1))
     if not median:
         return Estimate(count, mean, about, None, None)
     middle = float(np.median(known))
-    between = _ranks(known) if count > MOST else _bootstrap(known, np.median)
+    between = _ranks(known) if resamples is None else _between(np.median(resamples, axis=-1))
     return Estimate(count, mean, about, middle, between)
 
 
@@ -94,22 +95,24 @@ def stats() -> Any:
         raise MissingExtraError("a report", "campaign") from error
 
 
-def _bootstrap(values: Floats, statistic: Callable[..., Any]) -> Interval:
-    """Return the interval between the percentiles of a statistic of resamples, a batch of them at a time."""
-    count = len(values)
-    draws = np.random.default_rng(SEED)
-    batch = max(1, _BATCH_VALUES // count)
-    found: list[Floats] = []
-    for first in range(0, RESAMPLES, batch):
-        picked = draws.integers(0, count, (min(batch, RESAMPLES - first), count))
-        found.append(statistic(values[picked], axis=-1))
-    ordered = np.sort(np.concatenate(found)).tolist()
+@lru_cache(maxsize=4)
+def _drawn(count: int) -> Ints:
+    """Return which of `count` values, `MOST` at most, make up each resample: the same for all that are as many."""
+    return np.random.default_rng(SEED).integers(0, count, (RESAMPLES, count))
+
+
+def _between(found: Floats) -> Interval:
+    """Return the interval between the percentiles of what was found of each resample."""
+    ordered: list[float] = np.sort(found).tolist()
     tail = (1.0 - LEVEL) / 2.0
     return _quantile(ordered, tail), _quantile(ordered, 1.0 - tail)
 
 
 def _quantile(ordered: Sequence[float], part: float) -> float:
-    """Return the value below which a part of the values lies, between two of them by their distance."""
+    """Return the value below which a part of the values lies, between two of them by their distance.
+
+    NumPy's goes from the nearer of the two, which gives another last bit in a quarter of all cases.
+    """
     place = part * len(ordered) + (1.0 - part)
     first = max(1, min(int(place), len(ordered) - 1))
     beyond = place - first

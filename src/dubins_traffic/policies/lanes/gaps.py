@@ -1,4 +1,4 @@
-"""What is in the way: samples of the path ahead, and the first body that a car on them would come too near to."""
+"""Samples of the path ahead, and the first body that a car following them would come too near to (compiled)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dubins_traffic.policies.safety import body_at
 
 
 class Manoeuvre(NamedTuple):
-    """A way aside and back: an offset to the left that goes from `begin` metres to `aim` metres within `ramp` metres.
+    """A manoeuvre aside and back: an offset to the left that goes from `begin` to `aim` metres within `ramp` metres.
 
     From `until` metres on it goes back to 0 within `Manner.returns`.
     """
@@ -28,7 +28,7 @@ class Manoeuvre(NamedTuple):
 
 @jit
 def manoeuvre_of(ego: Follower) -> Manoeuvre:
-    """Return what the ego is about."""
+    """Return the ego's present manoeuvre."""
     return Manoeuvre(ego.begin, ego.aim, ego.ramp, ego.until)
 
 
@@ -44,7 +44,7 @@ def offset_at(distance: float, manoeuvre: Manoeuvre, returns: float) -> float:
 
 @jit
 def sample_path(known: Knowledge) -> None:
-    """Fill the samples with what lies ahead of the ego."""
+    """Fill the samples with the path ahead of the ego."""
     row, sigma = known.follower.row, known.follower.sigma
     for k in range(known.sample.shape[0]):
         row, sigma = ahead_on(known, row, sigma, False)
@@ -58,7 +58,7 @@ def sample_path(known: Knowledge) -> None:
 
 @jit
 def gap_between(one: Box, other: Box) -> float:
-    """Return the gap between two rounded boxes; for two discs without ado."""
+    """Return the gap between two rounded boxes, metres; for two discs by their centres alone."""
     if one.half_length + one.half_width + other.half_length + other.half_width == 0.0:
         dx = other.x - one.x
         dy = other.y - one.y
@@ -69,7 +69,7 @@ def gap_between(one: Box, other: Box) -> float:
 
 @jit
 def pose_of(car: SeenCar) -> Pose:
-    """Return where a car is."""
+    """Return the pose of a seen car."""
     return Pose(car.x, car.y, car.c, car.s)
 
 
@@ -77,12 +77,12 @@ def pose_of(car: SeenCar) -> Pose:
 def first_conflict(
     known: Knowledge, last: int, done: float, manoeuvre: Manoeuvre, still_margin: float, moving_margin: float
 ) -> tuple[int, int, int]:
-    """Return (first, who, nearest): where a car that follows the samples first comes too near to a body.
+    """Return (first, who, nearest): the first sample at which the car would come too near to a body, and that body.
 
-    It is the first of the samples 1 to `last` (number) at which it comes nearer than the margin, that body (part p:
-    -1 - p), and the sample nearest to that; (-1, NOBODY, -1) if there is none. Of the manoeuvre `done` (m) are behind.
-    Kept are `still_margin` (m) from what stands and `moving_margin` (m) from what moves; where a gap is smaller
-    already, it may stay so.
+    `first` is of the samples 1 to `last` (number), `who` a car or obstacle part -1 - p, and `nearest` the sample
+    nearest to it; (-1, NOBODY, -1) if there is none. Of the manoeuvre `done` (m) are behind the car. Too near is less
+    than `still_margin` (m) to a standing body or `moving_margin` (m) to a moving one; a gap that is smaller already may
+    stay so.
     """
     vehicle, obstacles, tick = known.vehicle, known.obstacles, known.follower.tick
     before = body_at(Pose(0.0, 0.0, 0.0, 0.0), vehicle)
@@ -118,14 +118,14 @@ def first_conflict(
 
 @jit
 def comes_nearer(before: Box, after: Box, other: Box, margin: float) -> bool:
-    """Whether a body that goes from `before` to `after` comes nearer than `margin` (m) to another."""
+    """Tell whether a body that goes from `before` to `after` comes nearer than `margin` (m) to another."""
     gap = gap_between(after, other)
     return gap < margin and gap < gap_between(before, other)
 
 
 @jit
 def nearest_sample(known: Knowledge, k: int, x: float, y: float) -> int:
-    """Return the sample from `k` (number) on, as long as they come nearer, that is nearest to a point."""
+    """Return the sample nearest to a point, searched from `k` (number) on until distances grow again."""
     best = 1e300
     for m in range(k, known.sample.shape[0]):
         dx = x - known.sample[m].x

@@ -1,4 +1,4 @@
-"""What the controller `lanes` knows and remembers, and how it drives."""
+"""The tables of the controller `lanes`: its parameters, the ego, the cars it sees, its path, and scratch."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from dubins_traffic.policies.lanes.paths import WAITING_GAP, PathRow
 from dubins_traffic.policies.rules.tables import Vehicle
 
 NOBODY = -(2**40)
-"""In place of a car's number, or of -1 - p for an obstacle's part p."""
+"""No body: where otherwise stands a car's number, or -1 - p for obstacle part p."""
 
 
 @record
 class Manner:
-    """How the controller drives."""
+    """The parameters of the controller's driving."""
 
     follow: float
     """Gap kept behind cars, centre to centre, metres."""
@@ -73,7 +73,7 @@ class Manner:
 
 @record
 class Follower:
-    """The ego: where it is, where on its path, what it is about, what it remembers, and what it decides."""
+    """The ego: pose, place on its path, manoeuvre, memory, and the command that is decided."""
 
     tick: int
     """The tick for which it decides."""
@@ -149,7 +149,7 @@ class SeenCar:
 
 @record
 class Sample:
-    """A place of the path ahead."""
+    """A point of the path ahead."""
 
     x: float
     """Where it is, metres."""
@@ -166,7 +166,7 @@ class Sample:
 
 
 class Knowledge(Tables):
-    """What the policy knows and remembers of a trial.
+    """All tables of the policy for a trial.
 
     `path` (rows,); `other` (N,): the other cars, `still` (N,): for how long each has stood, seconds, and `gap` (N,):
     how far it is, metres; `sample` (K,): a workspace.

@@ -8,22 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
 from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.policies.lanes.bent_lanes import LanePiece, cut, lane_pieces
 from dubins_traffic.policies.lanes.turns import Piece, Site, Turn, along, angle_between, shape
-from dubins_traffic.roads.straight import require_straight
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
+STRAIGHT_SHARE = 0.999
+"""Of the straight end of a lane that bends a turn takes at most this share."""
 EDGE = 0.15
 """What an evading car's centre keeps from the edge of the road, in units of w."""
 WAITING_GAP = 0.3
 """Metres between a waiting car and the disc it waits for: so far that a car that leaves by the next lane to the right
 and keeps a metre away from those that wait can still leave."""
+
+Bounds = tuple[float, float]
+"""How far right (negative) and left of a piece of a path a car may keep, metres."""
+_BOUNDS: Final = "lanes bounds"
 
 
 @record
@@ -72,18 +78,23 @@ class PathMaker:
     """Makes the paths of one problem. `visited` are intersections whose discs every turn has to enter."""
 
     def __init__(self, problem: Problem) -> None:
-        require_straight(problem.network, "driving on lanes")
         self._problem = problem
         self._network = problem.network
         self._visited = frozenset(problem.goal_vertices)
         self._lengths: list[float] = problem.network.lengths.tolist()
-        self._directions = [
-            (sign * tx, sign * ty) for tx, ty in problem.network.tangents.tolist() for sign in (1.0, -1.0)
+        begins, ends = problem.network.tangents.tolist(), problem.network.end_tangents.tolist()
+        self._begins = [
+            way for (tx, ty), (ux, uy) in zip(begins, ends, strict=True) for way in ((tx, ty), (-ux, -uy))
         ]
+        self._ends = [(-tx, -ty) for k in range(len(self._begins)) for tx, ty in (self._begins[k ^ 1],)]
+        self._bent = {
+            lane: lane_pieces(problem.network, lane, problem.car.w)
+            for lane in range(problem.network.lanes)
+            if problem.network.bent[lane >> 1]
+        }
         self._degrees: list[int] = problem.network.degrees.tolist()
         self._points: list[tuple[float, float]] = [(x, y) for x, y in problem.network.points.tolist()]
         self._turns: dict[tuple[int, int], Turn] = {}
-        self._shapes: dict[Site, Turn] = {}
 
     def turn(self, lane: int, other: int) -> Turn:
         """Return the turn from one lane to a successor."""
@@ -91,18 +102,23 @@ class PathMaker:
         if found is None:
             v = self._network.lane_ends(lane)[1]
             site = Site(
-                round(angle_between(*self._directions[lane], *self._directions[other]), 9),
-                self._lengths[lane >> 1],
-                self._lengths[other >> 1],
+                round(angle_between(*self._ends[lane], *self._begins[other]), 9),
+                self._straight(lane, -1),
+                self._straight(other, 0),
                 self._degrees[v],
                 self._problem.intersection_radius,
                 self._problem.car,
                 v in self._visited,
             )
-            if site not in self._shapes:
-                self._shapes[site] = shape(site)
-            found = self._turns[lane, other] = self._shapes[site]
+            found = self._turns[lane, other] = shape(site)
         return found
+
+    def _straight(self, lane: int, end: int) -> float:
+        """Return the length of a lane; of one that bends, twice that of its straight first or last line."""
+        if lane not in self._bent:
+            return self._lengths[lane >> 1]
+        own = self._bent[lane][end]
+        return 2.0 * STRAIGHT_SHARE * (own.end - own.begin)
 
     def turn_cost(self, lane: int, other: int) -> float:
         """Return what a turn adds to the length of a route, metres."""
@@ -121,7 +137,7 @@ class PathMaker:
             if k == loop:
                 loop_row = len(rows)
             turn = self.turn(lane, following)
-            rows.append(self._lane_row(lane, begin, turn))
+            rows += self._lane_rows(lane, begin, turn)
             rows += self._turn_rows(lane, turn)
             begin = turn.after
         path = table(PathRow, len(rows))
@@ -131,33 +147,46 @@ class PathMaker:
         self._bound(path)
         return Path(path, loop_row)
 
-    def _lane_row(self, lane: int, begin: float, turn: Turn) -> dict[str, float]:
+    def _lane_rows(self, lane: int, begin: float, turn: Turn) -> list[dict[str, float]]:
+        """Return the rows along a lane, from `begin` metres along its road to its next turn."""
         problem = self._problem
         w = problem.car.w
-        (x0, y0), _ = self._network.lane_line(lane, -w)
-        tx, ty = self._directions[lane]
         length = self._lengths[lane >> 1]
         end = max(length - turn.before, begin)
+        rows: list[dict[str, float]] = []
+        for low, _, piece in self._lane_parts(lane, begin, end):
+            row = {
+                "x": piece.x,
+                "y": piece.y,
+                "c": piece.c,
+                "s": piece.s,
+                "length": piece.length,
+                "lane": lane,
+            }
+            rows.append(
+                row | {"bend": piece.bend, "low": -w + EDGE * w, "high": 3.0 * w - EDGE * w, "pivot": 0}
+            )
+            begin = low
         sharp = bool(turn.pieces[0].pivot) if turn.pieces else turn.cost != 0.0
+        rows[-1]["pivot"] = int(sharp)
         v = self._network.lane_ends(lane)[1]
-        row = {
-            "x": x0 + begin * tx,
-            "y": y0 + begin * ty,
-            "c": tx,
-            "s": ty,
-            "length": end - begin,
-            "lane": lane,
-        }
-        row |= {"low": -w + EDGE * w, "high": 3.0 * w - EDGE * w, "pivot": int(sharp)}
         if self._degrees[v] != 2:
             reach = problem.intersection_radius + problem.car.body.reach
             stop = min(length - reach - WAITING_GAP, end)
             stop = max(stop, min(reach, length - reach - 0.02)) - begin
-            row |= {"waits": 1, "stop": stop, "gate_x": self._points[v][0], "gate_y": self._points[v][1]}
-        return row
+            rows[-1] |= {"waits": 1, "stop": stop, "gate_x": self._points[v][0], "gate_y": self._points[v][1]}
+        return rows
+
+    def _lane_parts(self, lane: int, begin: float, end: float) -> list[LanePiece]:
+        """Return the pieces of the middle of a right lane from `begin` to `end` metres along its road."""
+        if lane in self._bent:
+            return cut(self._bent[lane], begin, end)
+        (x0, y0), _ = self._network.lane_line(lane, -self._problem.car.w)
+        tx, ty = self._begins[lane]
+        return [LanePiece(begin, end, Piece(x0 + begin * tx, y0 + begin * ty, tx, ty, end - begin))]
 
     def _turn_rows(self, lane: int, turn: Turn) -> list[dict[str, float]]:
-        tx, ty = self._directions[lane]
+        tx, ty = self._ends[lane]
         x0, y0 = self._points[self._network.lane_ends(lane)[1]]
         rows: list[dict[str, float]] = []
         for piece in turn.pieces:
@@ -171,16 +200,27 @@ class PathMaker:
         return rows
 
     def _bound(self, rows: Rows[PathRow]) -> None:
-        """Fill `low` and `high` of the rows in turns by trying offsets at three places; never up to a turn's centre."""
-        w = self._problem.car.w
-        turns = np.flatnonzero(rows["lane"] < 0).tolist()
-        if not turns:
-            return
-        offsets = 0.1 * w * np.arange(-30, 31)
-        points = np.empty((len(turns), 3, len(offsets), 2))
-        for i, r in enumerate(turns):
+        """Fill `low` and `high` of the rows in turns; what is known of a piece of road is kept with the network."""
+        known = cast(dict[Piece, Bounds], self._network.known.setdefault((_BOUNDS, self._problem.car.w), {}))
+        turning: list[tuple[PathRow, Piece]] = []
+        for r in np.flatnonzero(rows["lane"] < 0).tolist():
             row = rows[r]
-            piece = Piece(row.x, row.y, row.c, row.s, row.length, row.bend)
+            turning.append((row, Piece(row.x, row.y, row.c, row.s, row.length, row.bend)))
+        missing = list(dict.fromkeys(piece for _, piece in turning if piece not in known))
+        if missing:
+            known.update(zip(missing, self._bounds(missing), strict=True))
+        for row, piece in turning:
+            row.low, row.high = known[piece]
+
+    def _bounds(self, pieces: Sequence[Piece]) -> list[Bounds]:
+        """Return how far cars may be right (negative) and left of pieces of turns, metres, never up to a turn's centre.
+
+        Offsets are tried at three places of each.
+        """
+        w = self._problem.car.w
+        offsets = 0.1 * w * np.arange(-30, 31)
+        points = np.empty((len(pieces), 3, len(offsets), 2))
+        for i, piece in enumerate(pieces):
             for k in range(3):
                 sigma = 0.5 * k * piece.length
                 x, y = along(piece, sigma)
@@ -189,15 +229,17 @@ class PathMaker:
                 points[i, k, :, 0] = x - offsets * ty
                 points[i, k, :, 1] = y + offsets * tx
         free = np.min(self._network.on_road(points, (2.0 - EDGE) * w).astype(np.int64), axis=1).tolist()
-        for i, r in enumerate(turns):
-            low = high = 30
-            while low > 0 and free[i][low - 1]:
-                low -= 1
-            while high < 60 and free[i][high + 1]:
-                high += 1
-            row = rows[r]
-            row.low, row.high = float(offsets[low]), float(offsets[high])
-            if row.bend != 0.0:
-                inner = max(0.0, 1.0 / abs(row.bend) - w)
-                row.low = max(row.low, -inner) if row.bend < 0.0 else row.low
-                row.high = min(row.high, inner) if row.bend > 0.0 else row.high
+        found: list[Bounds] = []
+        for own, piece in zip(free, pieces, strict=True):
+            right = left = 30
+            while right > 0 and own[right - 1]:
+                right -= 1
+            while left < 60 and own[left + 1]:
+                left += 1
+            low, high = float(offsets[right]), float(offsets[left])
+            if piece.bend != 0.0:
+                inner = max(0.0, 1.0 / abs(piece.bend) - w)
+                low = max(low, -inner) if piece.bend < 0.0 else low
+                high = min(high, inner) if piece.bend > 0.0 else high
+            found.append((low, high))
+        return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dubins_traffic.cars.state import Command, Pose
+from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.gaps import (
     first_conflict,
@@ -22,13 +22,13 @@ from dubins_traffic.policies.lanes.knowledge import NOBODY, Knowledge
 from dubins_traffic.policies.lanes.paths import PathRow
 from dubins_traffic.policies.lanes.tracking import ahead_on, locate, place_on, steer
 from dubins_traffic.policies.lanes.waiting import gap_from, is_oncoming, stand
-from dubins_traffic.policies.safety import NEAR, leaves_road, may_hit, may_meet, travel_of
+from dubins_traffic.policies.safety import leaves_road, may_hit, may_meet, travel_of
 from dubins_traffic.roads.table import RoadTable
 
 
 @jit
 def decide(tick: int, x: float, y: float, c: float, s: float, known: Knowledge, roads: RoadTable) -> None:
-    """Choose the command of an ego at a pose; `roads` has its network only."""
+    """Choose the command of an ego at a pose; `roads` holds the trial's network alone."""
     ego = known.follower
     ego.tick, ego.x, ego.y, ego.c, ego.s = tick, x, y, c, s
     ego.blocker = NOBODY
@@ -44,6 +44,27 @@ def decide(tick: int, x: float, y: float, c: float, s: float, known: Knowledge, 
     ego.speed = speed
     ego.yaw_rate = yaw_rate
     _note_progress(known, wanted)
+
+
+@jit
+def decide_in(b: int, tick: int, radius: float, state: State, known: Knowledge, roads: RoadTable) -> None:
+    """Choose the command of the ego of trial b of a batch, which sees the cars within `radius` (m)."""
+    x = state.x[b, EGO]
+    y = state.y[b, EGO]
+    for n in range(1, state.count[b]):
+        dx = state.x[b, n] - x
+        dy = state.y[b, n] - y
+        if dx * dx + dy * dy <= radius * radius:
+            car = known.other[n - 1]
+            car.tick, car.x, car.y, car.c, car.s = (
+                tick,
+                state.x[b, n],
+                state.y[b, n],
+                state.c[b, n],
+                state.s[b, n],
+            )
+            car.speed, car.yaw_rate = state.speed[b, n], state.yaw_rate[b, n]
+    decide(tick, x, y, state.c[b, EGO], state.s[b, EGO], known, roads)
 
 
 @jit
@@ -100,7 +121,7 @@ def _find_place(known: Knowledge) -> None:
 
 @jit
 def _speed_in_traffic(known: Knowledge) -> float:
-    """Return the speed that traffic allows; negative to back up."""
+    """Return the speed that traffic allows, m/s; negative to back up."""
     ego, manner, fastest = known.follower, known.manner, known.vehicle.fastest
     sample_path(known)
     first, who, nearest = first_conflict(
@@ -126,7 +147,7 @@ def _speed_in_traffic(known: Knowledge) -> float:
 
 @jit
 def _following_speed(known: Knowledge, first: int, who: int, nearest: int) -> float:
-    """Return the speed at which the gap to what is in the way becomes and stays the one to follow at."""
+    """Return the speed, m/s, that brings the gap to the body in the way to the one to follow at, and keeps it there."""
     manner, ego = known.manner, known.follower
     if who == NOBODY:
         return known.vehicle.fastest
@@ -144,7 +165,7 @@ def _following_speed(known: Knowledge, first: int, who: int, nearest: int) -> fl
 
 @jit
 def _occupant(known: Knowledge, gate: PathRow) -> int:
-    """Return a car whose body meets the disc and that has moved of late, or NOBODY."""
+    """Return a car whose body meets the disc and that has moved lately, or NOBODY."""
     for n in range(known.other.shape[0]):
         car = known.other[n]
         is_awake = car.tick == known.follower.tick and known.still[n] < known.manner.stands
@@ -155,7 +176,7 @@ def _occupant(known: Knowledge, gate: PathRow) -> int:
 
 @jit
 def _in_disc(known: Knowledge, gate: PathRow, x: float, y: float) -> bool:
-    """Whether a car with its centre at a place may meet the disc behind a line."""
+    """Tell whether a car with its centre at a point may meet the disc behind a line to wait at."""
     dx = x - gate.gate_x
     dy = y - gate.gate_y
     radius = known.vehicle.disc + known.vehicle.reach
@@ -164,7 +185,7 @@ def _in_disc(known: Knowledge, gate: PathRow, x: float, y: float) -> bool:
 
 @jit
 def _stops_inside(known: Knowledge, who: int, nearest: int, gate: PathRow) -> bool:
-    """Whether the car would have to stop behind a standing `who` before it has left the disc again."""
+    """Tell whether the ego would have to stop behind a standing `who` before it has left the disc again."""
     if who >= 0 and known.still[who] == 0.0:
         return False
     k = nearest - int(known.manner.follow / known.manner.spacing)
@@ -200,7 +221,7 @@ def _follow(known: Knowledge, speed: float) -> tuple[float, float]:
 
 @jit
 def _shuffle(known: Knowledge, yaw_rate: float) -> tuple[float, float]:
-    """Return the command of a car with a turning radius that has to turn on the spot: to and fro, or a full turn."""
+    """Return the command of a car with a turning radius that has to turn in place: to and fro, or a full circle."""
     ego, vehicle, manner = known.follower, known.vehicle, known.manner
     ego.shuffled += 1
     speed = min(vehicle.fastest, manner.back_speed)
@@ -216,7 +237,7 @@ def _shuffle(known: Knowledge, yaw_rate: float) -> tuple[float, float]:
 
 @jit
 def _is_safe(known: Knowledge, roads: RoadTable, command: Command) -> bool:
-    """Whether a command can neither lead into a contact nor off the road, whatever the others do."""
+    """Tell whether a command leads neither into a contact nor off the road in a tick, whatever the others do."""
     ego, vehicle = known.follower, known.vehicle
     pose = Pose(ego.x, ego.y, ego.c, ego.s)
     if command.speed != 0.0 and leaves_road(pose, command, vehicle.period, roads, 0):
@@ -226,4 +247,4 @@ def _is_safe(known: Knowledge, roads: RoadTable, command: Command) -> bool:
         car = known.other[n]
         if car.tick == ego.tick and may_meet(pose, command, vehicle, pose_of(car), travel):
             return False
-    return not may_hit(0, pose, command, vehicle, known.obstacles, NEAR, 0.0)
+    return not may_hit(0, pose, command, vehicle, known.obstacles, vehicle.near, 0.0)

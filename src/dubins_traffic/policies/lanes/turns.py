@@ -8,6 +8,7 @@ is the line y = -w.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt
 from typing import NamedTuple
@@ -78,6 +79,7 @@ class Site:
     visit: bool
 
 
+@lru_cache(maxsize=4096)
 def shape(site: Site) -> Turn:
     """Return the shortest turn the car can make on the road; if there is none, one with the cost IMPOSSIBLE."""
     candidates = [*_curves(site), *_corners(site)]
@@ -89,7 +91,7 @@ def shape(site: Site) -> Turn:
 
 
 def can_pivot(car: Car) -> bool:
-    """Whether the car can turn within its own length: without turning radius, or shuttling to and fro."""
+    """Tell whether the car can turn within its own length: without turning radius, or shuttling to and fro."""
     return car.bounds.turning_radius == 0.0 or car.bounds.speed_low <= -0.05
 
 
@@ -200,7 +202,7 @@ def _polyline(site: Site, distance: float, via: tuple[tuple[float, float], ...],
 
 
 def _fits(site: Site, turn: Turn) -> bool:
-    """Whether the turn stays on both roads, and enters the disc if it must."""
+    """Tell whether the turn stays on both roads, and enters the disc if it must."""
     w = site.car.w
     c, s = cos(site.angle), sin(site.angle)
     edge = (2.0 - 0.5 * MARGIN) * w
@@ -230,8 +232,13 @@ def _arc(x: float, y: float, c: float, s: float, bend: float, angle: float) -> t
 
 
 def _end(piece: Piece) -> tuple[float, float, float, float]:
-    x, y = along(piece, piece.length)
-    turn = piece.bend * piece.length
+    return advanced(piece, piece.length)
+
+
+def advanced(piece: Piece, distance: float) -> tuple[float, float, float, float]:
+    """Return the point `distance` metres along a piece, and the unit heading there."""
+    x, y = along(piece, distance)
+    turn = piece.bend * distance
     c, s = cos(turn), sin(turn)
     return x, y, piece.c * c - piece.s * s, piece.s * c + piece.c * s
 

@@ -11,7 +11,7 @@ from dubins_traffic.policies.safety import body_at
 
 @jit
 def gap_from(known: Knowledge, x: float, y: float, n: int) -> float:
-    """Return the gap between the ego, were its centre at a place, and the other car n, metres."""
+    """Return the gap, metres, between car n and the ego if its centre were at (x, y)."""
     ego, vehicle = known.follower, known.vehicle
     own = body_at(Pose(x, y, ego.c, ego.s), vehicle)
     return gap_between(own, body_at(pose_of(known.other[n]), vehicle))
@@ -19,9 +19,9 @@ def gap_from(known: Knowledge, x: float, y: float, n: int) -> float:
 
 @jit
 def stand(known: Knowledge, speed: float, cause: int, first: int) -> float:
-    """Return the speed of a car that `cause` (number of a body) keeps to a speed; wait, back up or pass in time.
+    """Return the speed of the ego, which the body `cause` (number) keeps to `speed`; in time begin to back up or pass.
 
-    The conflict begins at the sample `first` (number). Who has been kept waiting for long asks for another route.
+    The conflict begins at the sample `first` (number). An ego kept waiting for long asks for another route.
     """
     ego, manner = known.follower, known.manner
     if ego.backs_from >= 0 and cause != NOBODY and _backs_up(known, ego.backs_from):
@@ -58,7 +58,7 @@ def stand(known: Knowledge, speed: float, cause: int, first: int) -> float:
 
 @jit
 def _return(known: Knowledge) -> None:
-    """Give up what the car was about, and go back to the path from where it is."""
+    """Give up the manoeuvre, and go back to the path from here."""
     ego = known.follower
     ramp = 0.2 + abs(ego.left)
     _begin(known, Manoeuvre(ego.left, 0.0, ramp, ramp))
@@ -74,14 +74,14 @@ def _begin(known: Knowledge, manoeuvre: Manoeuvre) -> None:
 
 @jit
 def is_oncoming(known: Knowledge, n: int) -> bool:
-    """Whether the other car n faces the ego's way back, within 60 degrees."""
+    """Tell whether car n comes toward the ego, within 60 degrees."""
     car = known.other[n]
     return car.c * known.follower.c + car.s * known.follower.s < -0.5
 
 
 @jit
 def _backs_up(known: Knowledge, cause: int) -> bool:
-    """Whether to back up from a car that stands so near that it may be waiting for the ego to go away.
+    """Tell whether to back up from a car that stands so near that it may be waiting for the ego to move away.
 
     Once begun, this goes on until there is enough room, the car moves off or something is behind.
     """
@@ -114,7 +114,7 @@ def _nearest_body(known: Knowledge) -> int:
 
 @jit
 def _free_behind(known: Knowledge) -> bool:
-    """Whether the car may back up a little: able to, on the road, nobody close behind."""
+    """Tell whether the ego can back up a little: its bounds allow it, on the road, and no body is close behind."""
     ego = known.follower
     piece = known.path[ego.row]
     if known.vehicle.slowest >= 0.0 or ego.left < piece.low or ego.left > piece.high:
@@ -131,7 +131,7 @@ def _free_behind(known: Knowledge) -> bool:
 
 @jit
 def _find_way_past(known: Knowledge, first: int) -> bool:
-    """Look for the least offset at which the car gets past what stands in its way, and take it."""
+    """Look for the least offset at which the ego gets past what stands in its way, and begin that manoeuvre."""
     manner, sample, now = known.manner, known.sample, known.follower.left
     last = sample.shape[0] - 1
     ramp = min(0.7, max(0.15, manner.spacing * first - 0.1))
@@ -152,7 +152,7 @@ def _find_way_past(known: Knowledge, first: int) -> bool:
 
 @jit
 def _passed(known: Knowledge, way: Manoeuvre, last: int) -> int:
-    """Return the sample at which a car on a manoeuvre can return to its path, or -1 if it is no way past."""
+    """Return the sample at which the ego can return to its path after a manoeuvre, -1 if that leads not past."""
     manner = known.manner
     for end in range(8, last - 8, 5):
         tried = Manoeuvre(way.begin, way.aim, way.ramp, manner.spacing * end)

@@ -1,14 +1,22 @@
-"""Lanes and ways that obstacles bar: in which they are in the way and can't be passed (compiled)."""
+"""Lanes and ways that are barred: an obstacle is in the way and can't be passed (compiled)."""
 
 from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
-from dubins_traffic.policies.rules.passing import BACK, BERTH, NARROWS, SLIP, TURNING, stop_line
+from dubins_traffic.policies.rules.passing import (
+    BACK,
+    BERTH,
+    NARROWS,
+    SLIP,
+    drawn_out,
+    passing_time,
+    stop_line,
+)
 from dubins_traffic.policies.rules.seeing import OBSTACLE_GAP, QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import on_way, way_between
-from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end, tightness
 
 LATE, LAST = 0.85, 0.82
 """From where on, in units of R, a car that comes out of a disc can pass an obstacle behind it within the lane: so that
@@ -23,6 +31,7 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
     """
     roads, obstacles = traffic.roads, traffic.obstacles
     length = roads.segment[int(roads.seg_off[net]) + (lane >> 1)].length
+    tight = tightness(roads, net, lane, vehicle.middle)
     wide = vehicle.half_width + vehicle.rounding
     done = 0.0
     early = LATE * vehicle.disc + vehicle.reach + QUEUE_GAP
@@ -34,12 +43,13 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
         if begin < nearest_bar(vehicle):
             return True
         own = begin - vehicle.reach - SLIP
-        back = end + SLIP + 2.0 * vehicle.half_length + BACK
+        until = end + SLIP + 2.0 * vehicle.half_length
+        back = until + BACK * drawn_out(tight)
         offset += BERTH + wide
         aside = offset > 3.0 * vehicle.middle - EDGE
         if aside or back > length + stop_line(vehicle) or own < vehicle.disc + vehicle.reach + EDGE:
             return True
-        if (back - own) / (0.8 * vehicle.fastest) + TURNING > vehicle.left_time:
+        if passing_time(own, until, tight, vehicle) > vehicle.left_time:
             return True
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
@@ -52,13 +62,13 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
 
 @jit_inline
 def nearest_bar(vehicle: Vehicle) -> float:
-    """Return from where on an obstacle in a lane leaves room before it for a car that comes out of the disc, metres."""
+    """Return the least distance along a lane at which an obstacle leaves room for a car out of the disc, metres."""
     return vehicle.disc + 2.0 * vehicle.reach + EDGE + QUEUE_GAP
 
 
 @jit
 def has_place(b: int, lane: int, traffic: Traffic) -> bool:
-    """Tell whether a car can leave the disc at the beginning of a lane for all obstacles, though it gets no farther."""
+    """Tell whether obstacles let a car leave the disc at the beginning of a lane, even if it gets no farther."""
     roads, obstacles, drivers = traffic.roads, traffic.obstacles, traffic.drivers
     net, vehicle = drivers.net[b], drivers.vehicle[b]
     first, last = obstacles.off[b], obstacles.off[b + 1]
@@ -120,28 +130,33 @@ def next_narrow(
 
 @jit
 def leads_nowhere(b: int, lane: int, traffic: Traffic) -> bool:
-    """Tell whether no way on from the end of a lane, nor from the end of the next, is free of what can't be passed."""
-    roads, drivers = traffic.roads, traffic.drivers
-    net = drivers.net[b]
+    """Tell whether all ways on from the end of a lane, or from the ends of the next lanes, are barred."""
+    roads, net = traffic.roads, traffic.drivers.net[b]
     row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
-    shut = 0
+    shut = shut_exits(b, lane, traffic)
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        if is_shut(b, lane, out, traffic) or ends_there(b, out, traffic):
-            shut += 1
-    return shut == roads.degree[row]
+        if shut & (1 << k) == 0 and shut_exits(b, out, traffic) != all_exits(b, out, traffic):
+            return False
+    return True
 
 
 @jit
-def ends_there(b: int, lane: int, traffic: Traffic) -> bool:
-    """Tell whether no way on from the end of a lane is free of obstacles that can't be passed."""
-    roads, drivers = traffic.roads, traffic.drivers
-    net = drivers.net[b]
+def shut_exits(b: int, lane: int, traffic: Traffic) -> int:
+    """Return the arms, one bit each, of the intersection at the end of a lane to which the way is barred."""
+    roads, net = traffic.roads, traffic.drivers.net[b]
     row = int(roads.vert_off[net]) + lane_end(roads, net, lane)
     shut = 0
     for k in range(roads.degree[row]):
-        shut += 1 if is_shut(b, lane, int(roads.arms[row, k]), traffic) else 0
-    return shut == roads.degree[row]
+        shut |= 1 << k if is_shut(b, lane, int(roads.arms[row, k]), traffic) else 0
+    return shut
+
+
+@jit
+def all_exits(b: int, lane: int, traffic: Traffic) -> int:
+    """Return the bits of all arms of the intersection at the end of a lane."""
+    roads, net = traffic.roads, traffic.drivers.net[b]
+    return (1 << int(roads.degree[int(roads.vert_off[net]) + lane_end(roads, net, lane)])) - 1
 
 
 @jit

@@ -1,10 +1,10 @@
-"""Another exit for a car whose own is full (compiled)."""
+"""Choosing another exit for a car in a disc whose own exit is full or barred (compiled)."""
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.barred import has_place, stands_in_disc
-from dubins_traffic.policies.rules.exits import BARRED, cheapest, price_exits, ticks_of
+from dubins_traffic.policies.rules.exits import BARRED, NO_WAY, cheapest, price_exits, ticks_of
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import has_room, is_clear, is_free, is_open, room_in
 from dubins_traffic.policies.rules.tables import Traffic
@@ -12,21 +12,21 @@ from dubins_traffic.policies.rules.turn_arcs import PART
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 
 STUCK = 2.0
-"""Seconds for which an e-agent in a disc waits for the way it wants before it takes another; of the ego that is not
-asked, and on its way to another exit it might leave the disc outside its lane."""
+"""Seconds for which an e-agent in a disc waits for its exit before it takes another. The ego keeps its exit: it owes
+no E4, and on the way to another it might leave the disc outside its lane."""
 LATE = 1.0
-"""Who has been in a crossing for so long, seconds, keeps to its exit while this is open, though there may be no room
-behind what drives there: on the way to another it might not leave the disc in time."""
+"""A car that has been in a crossing for this long, seconds, keeps its exit while that is open, even if there may be no
+room behind the cars there: on the way to another exit it might not leave the disc in time."""
 
 CHOICES = 4
-"""A car in a crossing looks for another exit each so many ticks."""
+"""A car in a crossing looks for another exit once in this many ticks."""
 
 
-@jit
+@jit_rare
 def take_another(b: int, n: int, tick: int, budget: float, traffic: Traffic) -> bool:
     """Choose the best exit in which there is room; tell whether there is one.
 
-    An exit that counts more than the present one by `budget` metres does not come into question, and neither does one
+    An exit that counts more than the present one by `budget` (m) does not come into question, and neither does one
     in which an obstacle can't be passed, unless all are such.
     """
     roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
@@ -53,7 +53,7 @@ def take_another(b: int, n: int, tick: int, budget: float, traffic: Traffic) -> 
     return best >= 0
 
 
-@jit
+@jit_rare
 def take_widest(b: int, n: int, traffic: Traffic) -> None:
     """Choose the exit in which there is most room, though it is not enough; `scratch.cost` has what they count."""
     roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
@@ -77,7 +77,7 @@ def leads_out(b: int, lane: int, out: int, traffic: Traffic) -> bool:
     return through and has_place(b, out, traffic)
 
 
-@jit
+@jit_rare
 def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
     """Choose an exit for a car that finds room in none of those it wants; tell whether there is any.
 
@@ -97,7 +97,7 @@ def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
             if is_open(b, n, out, traffic):
                 opened |= 1 << k
                 ample |= 1 << k if room >= -drivers.vehicle[b].backs_up else 0
-        elif room >= 0.0 and leads_out(b, car.lane, out, traffic):
+        elif scratch.cost[k] < NO_WAY and room >= 0.0 and leads_out(b, car.lane, out, traffic):
             barred |= 1 << k
     allowed = ample if ample != 0 else (barred if barred != 0 else opened)
     best = cheapest(v, roads.vert_off[net], allowed, roads, scratch)
@@ -106,9 +106,9 @@ def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
     return best >= 0
 
 
-@jit
+@jit_rare
 def take_way_on(b: int, n: int, traffic: Traffic) -> None:
-    """Choose an exit that is free as E4 says, whatever bars the way beyond, for who would turn round in a bend."""
+    """Choose an exit that is free (E4), even if it is barred beyond, for a car that would turn round in a bend."""
     roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
     car = drivers.car[b, n]
@@ -120,7 +120,7 @@ def take_way_on(b: int, n: int, traffic: Traffic) -> None:
             car.next_lane = out
 
 
-@jit
+@jit_rare
 def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
     """Choose another exit for a car that is held up in a disc."""
     drivers = traffic.drivers
@@ -134,7 +134,7 @@ def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
 
 @jit_inline
 def keeps_exit(b: int, n: int, tick: int, way: KeptPath, traffic: Traffic) -> bool:
-    """Tell whether `find_way_out` certainly leaves a car in its crossing its exit, and does nothing but count.
+    """Tell whether `find_way_out` is certain to keep the exit of a car in a crossing and only count ticks.
 
     `way` (row) is its row of `Drivers.way`.
     """
@@ -145,7 +145,7 @@ def keeps_exit(b: int, n: int, tick: int, way: KeptPath, traffic: Traffic) -> bo
 def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None:
     """Choose another exit for an e-agent in a disc whose own is barred: at once in a crossing, else after a while.
 
-    Who has been in a crossing for a while does so only if its own exit is taken.
+    A car that has been in a crossing for LATE does so only if its own exit is taken.
     """
     drivers = traffic.drivers
     car = drivers.car[b, n]

@@ -1,9 +1,8 @@
-"""What is chosen for a car in place of what the law leaves free to it, leg by leg (compiled).
+"""Choices that tables make for e-agents of the kind `chosen` where the law leaves them free, leg by leg (compiled).
 
 A leg begins when the car takes a lane, and ends when it takes the next one; the first has number 0. `Drivers.choice`
-has a row for each of the first legs of a car (`tables.Leg`); what is not a number there is not chosen, and the car
-does then as it does without. All else (the order of arrival, room behind a disc, what is ahead) stays the
-law's.
+has a row for each of the first legs of a car (`tables.Leg`); where that has NaN, the car drives as the law says. All
+else (the order of arrival, room behind a disc, what is ahead) is always the law's.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from dubins_traffic.cars.state import Labels
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.propositions import FLAG
@@ -26,11 +25,11 @@ PASSES: Final = 8.0
 """How near a car is that passes, in units of a body's farthest point."""
 
 
-@jit
+@jit_rare
 def choose(b: int, n: int, barred: float, traffic: Traffic) -> None:
-    """Begin the next leg of a car that has taken a lane and its exit: put in place what is chosen for it.
+    """Begin the next leg of a car that has taken a lane and its exit: apply the choices for it.
 
-    `scratch.cost` has what the exits count; one that counts `barred` (m) or more is not taken.
+    `scratch.cost` holds the costs of the exits; one of cost `barred` (m) or more is not taken.
     """
     roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     car = drivers.car[b, n]
@@ -64,9 +63,9 @@ def _chosen(value: float, otherwise: float) -> float:
     return value if value - value == 0.0 else otherwise
 
 
-@jit_inline
+@jit_rare
 def pauses(b: int, n: int, to_go: float, labels: Labels, traffic: Traffic) -> bool:
-    """Tell whether a car stands in its lane now because so it was chosen, and count the time.
+    """Tell whether a car pauses in its lane now by choice, and count the time.
 
     It does once it has driven its share of the lane, `to_go` (m) before the lane's end, and is outside discs, has no
     place in an order of arrival, and passes nothing. The time does not end while another e-agent passes.
@@ -90,7 +89,7 @@ def pauses(b: int, n: int, to_go: float, labels: Labels, traffic: Traffic) -> bo
 
 @jit_inline
 def is_passed(b: int, n: int, labels: Labels, traffic: Traffic) -> bool:
-    """Tell whether another e-agent passes a car: that would be long on the left if the car drove off beside it."""
+    """Tell whether another e-agent is passing a car, which would keep it on the left if it drove off now."""
     state = traffic.state
     far = PASSES * traffic.drivers.vehicle[b].reach
     found = False
@@ -104,7 +103,7 @@ def is_passed(b: int, n: int, labels: Labels, traffic: Traffic) -> bool:
 
 @jit_inline
 def holds(car: Driver, vehicle: Vehicle) -> bool:
-    """Tell whether a car whose turn it is still holds at the line because so it was chosen."""
+    """Tell whether a car whose turn it is still waits at the line by choice."""
     return car.owed * vehicle.period <= car.line_hold
 
 

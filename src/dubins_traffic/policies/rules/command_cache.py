@@ -1,9 +1,8 @@
-"""Cars that just drive on: what they do is kept, with the stretch of their way on which it is certain to stay so
-(compiled).
+"""The command cache: what cars without anything around them do, and the stretch on which that is valid (compiled).
 
-Most cars have nothing around them and follow a lane or an arc. Of these only the offset from their line, and its
-direction, change from tick to tick. What they do stands in columns (`kept.KeptCommands`), and is found for several cars
-in one go of the processor, which takes less time than for one after another.
+Most cars have nothing around them and follow a lane or an arc: only their offset from its line, and their direction,
+change from tick to tick. What they do stands in columns (`kept.KeptCommands`), so that the commands of several cars are
+computed at once.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from dubins_traffic.cars.rows import TOGETHER, copy_together
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
-from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_look
 from dubins_traffic.policies.rules.choice import keeps_exit
 from dubins_traffic.policies.rules.kept import NOWHERE, KeptCommands
 from dubins_traffic.policies.rules.path_cache import kept_way
@@ -37,16 +36,16 @@ from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
 
 IF_NOT_BEHIND_EGO = 2.0
-"""Value of `KeptCommands.holds` of an e-agent that drives on if the ego is not ahead in its lane."""
+"""Value of `KeptCommands.holds`: the cached command is valid if the ego is not ahead in the car's lane."""
 TINY = 1e-300
-"""Metres that no car is from the centre of an arc."""
+"""Least distance from the centre of an arc that is reckoned with, metres: no car is so near."""
 
 
 @jit_inline
-def look_who_coasts(b: int, traffic: Traffic) -> None:
-    """Find which cars of trial b still just drive on as they did, as far as their poses say, and their commands.
+def check_command_caches(b: int, traffic: Traffic) -> None:
+    """Find which cars of trial b are still in the stretch of their cached command, and compute their commands.
 
-    Nothing in the loop over the cars is a branch: so the compiler sees that several may be taken at once.
+    The loop over cars has no branches, so that the compiler works on several cars at once.
     """
     state, drivers = traffic.state, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -54,13 +53,13 @@ def look_who_coasts(b: int, traffic: Traffic) -> None:
     for first in range(0, count, BLOCK):
         here = min(count - first, BLOCK)
         block = drivers.command[b, first // BLOCK]
-        _bring(b, first, here, state, block)
-        _drive_on_as_before(block, (here + WIDE - 1) & -WIDE, vehicle.yaw_most, vehicle.period)
+        _load_positions(b, first, here, state, block)
+        _check_valid_stretches(block, (here + WIDE - 1) & -WIDE, vehicle.yaw_most, vehicle.period)
 
 
 @jit_inline
-def _bring(b: int, first: int, here: int, state: State, block: KeptCommands) -> None:
-    """Put where the `here` cars from car `first` on are beside what they do."""
+def _load_positions(b: int, first: int, here: int, state: State, block: KeptCommands) -> None:
+    """Copy the poses of the `here` cars from car `first` on into their block."""
     x, y, c, s = state.x[b], state.y[b], state.c[b], state.s[b]
     here_x, here_y, here_c, here_s = block.here_x, block.here_y, block.here_c, block.here_s
     if state.x.shape[1] % TOGETHER == 0:
@@ -76,8 +75,8 @@ def _bring(b: int, first: int, here: int, state: State, block: KeptCommands) -> 
 
 
 @jit_inline
-def _drive_on_as_before(block: KeptCommands, last: int, limit: float, period: float) -> None:
-    """Find who of the first `last` cars of a block is where it just drives on, and the commands of all of them."""
+def _check_valid_stretches(block: KeptCommands, last: int, limit: float, period: float) -> None:
+    """Find which of the first `last` cars of a block are in their valid stretch; compute the commands of all."""
     x, y, c, s = block.here_x, block.here_y, block.here_c, block.here_s
     low, high, past_most, minds, astray = block.low, block.high, block.past, block.minds, block.astray
     way_x, way_y, tx, ty, ux, uy = block.x, block.y, block.tx, block.ty, block.ux, block.uy
@@ -104,11 +103,13 @@ def _drive_on_as_before(block: KeptCommands, last: int, limit: float, period: fl
         )
 
 
-@jit_inline
-def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, commands: Floats) -> bool:
-    """Write the command of a car that still just drives on as it did; tell whether it does. After `look_who_coasts`.
+@jit_look
+def repeat_command(
+    b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, commands: Floats
+) -> bool:
+    """Write the cached command of a car if it is still valid; tell whether it is. Called after `check_command_caches`.
 
-    Nothing is around the car that matters to it, as far as `company` says so; else that is found here.
+    Whether another car matters to it is looked up here unless `company` says that none does.
     """
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     block = drivers.command[b, n // BLOCK]
@@ -148,7 +149,7 @@ def coast(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, 
 def still_meets_nobody(
     b: int, n: int, bend: float, x: float, y: float, way: ReferencePath, traffic: Traffic
 ) -> bool:
-    """Tell what `meets_nobody` does, of a car on its lane in, or in its arc if its line has a `bend` (1/m)."""
+    """Do as `meets_nobody`, for a car on its lane, or in its arc if its line has a `bend` (1/m)."""
     if bend == 0.0:
         part, key, left, _, _ = on_lane(way, x, y)
     else:
@@ -157,13 +158,13 @@ def still_meets_nobody(
 
 
 @jit_inline
-def stop_coasting(b: int, n: int, drivers: Drivers) -> None:
-    """Forget what a car did."""
+def forget_command(b: int, n: int, drivers: Drivers) -> None:
+    """Make the cached command of a car invalid."""
     drivers.command[b, n // BLOCK].low[n & (BLOCK - 1)] = NOWHERE
 
 
 @jit_inline
-def drive_on(
+def drive_freely(
     b: int,
     n: int,
     part: int,
@@ -176,9 +177,10 @@ def drive_on(
     traffic: Traffic,
     commands: Floats,
 ) -> bool:
-    """Write the command of a car that just drives on, or waits at a line; tell whether it does, else do nothing.
+    """Write and cache the command of a car if it has nothing to mind but its line; tell whether that is so.
 
-    Nothing is around the car that matters to it (`policy.just_drives`). What it does is kept for the ticks to come.
+    It is for cars of which `policy.just_drives` holds and around which nothing matters. Such a car may also wait at a
+    line.
     """
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -207,7 +209,7 @@ def drive_on(
     row.coast_waits = 1 if waits else 0
     row.coast_special = 1 if chooses or waits else 0
     row.coast_stopped = int(bits & FLAG.STOPPED) if waits else 0
-    keep_course(b, n, speed, part, outside, gated, x, y, way, traffic)
+    cache_command(b, n, speed, part, outside, gated, x, y, way, traffic)
     if gated:
         count_turn(bits, row, car)
     car.waited = 0
@@ -218,13 +220,13 @@ def drive_on(
 
 @jit_inline
 def has_more_to_mind(bits: np.int64, car: Driver) -> bool:
-    """Tell whether a car passes something, drives on the left, or stands on purpose."""
+    """Tell whether a car with the flags `bits` (FLAG) passes something, drives on the left, or stands by choice."""
     passes = bits & (FLAG.BLOCKED | FLAG.LEFT) != 0 or car.violations & VIOLATION.LEFT_SIDE != 0
     return passes or car.hold > 0.0 or car.pause > 0.0
 
 
 @jit_inline
-def keep_course(
+def cache_command(
     b: int,
     n: int,
     speed: float,
@@ -236,11 +238,11 @@ def keep_course(
     way: ReferencePath,
     traffic: Traffic,
 ) -> None:
-    """Keep what a car does that has nothing around it, and on which stretch of its way it is certain to do the same.
+    """Cache the command of a car that has nothing around it, with the stretch of its way on which it is valid.
 
-    The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. Without
-    lane state it also ends where the arc does: there the part of the way changes, or the lane. Who waits at its line
-    does the same until it has moved, or it is its turn.
+    The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. For a
+    car without lane state it also ends where the arc does, since there the part of the way changes, or the lane. The
+    command of a car that waits at its line is valid until the car has moved, or it is its turn.
     """
     labels, drivers = traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]

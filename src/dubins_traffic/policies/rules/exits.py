@@ -1,12 +1,13 @@
-"""Which lane a car takes at the end of its own, compiled."""
+"""Chooses the lane that a car takes at the end of its own (compiled)."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from dubins_traffic.cars.state import Labels
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.random import DRAW, below, uniform
+from dubins_traffic.policies.rules.abilities import turns_within_road
 from dubins_traffic.policies.rules.barred import is_shut, leads_nowhere
 from dubins_traffic.policies.rules.chosen import choose
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Scratch, Traffic, Vehicle
@@ -15,21 +16,23 @@ from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import FAR, aim_for, place_of, spread
 
 BACK = 30.0
-"""What turning round at a crossing counts, metres (for a nemesis STEP)."""
+"""Cost of turning round at a crossing, metres (for a nemesis STEP)."""
 UNREACHABLE = 1e6
 BACK_IN_BEND = 2e6
-"""What turning round in a bend counts, metres: more than any way on that is not barred."""
+"""Cost of turning round in a bend, metres: more than any way on that is not barred."""
 BARRED = 1e7
-"""What a lane counts in which an obstacle can't be passed, metres."""
+"""Cost of a lane in which an obstacle can't be passed, metres."""
+NO_WAY = 1e9
+"""Cost of the way back for a car whose turning radius is too large for it, metres: it is never taken."""
 STEP = 3.0
-"""What a lane counts in choosing between exits, metres."""
+"""Cost of each further lane in choosing between exits, metres."""
 BLOCK_TIME = 9.0
-"""For how long a car that blocks stands in an intersection, seconds."""
+"""Time for which a car that blocks stands in an intersection, seconds."""
 
 
 @jit
 def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
-    """Note that car n is on `lane` now, choose the lane after it and the car's violations."""
+    """Set the lane of car n to `lane`, and choose its next lane and its violations."""
     roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     car = drivers.car[b, n]
     seed = drivers.seed[b]
@@ -82,7 +85,10 @@ def is_goal(v: int, car: Driver, drivers: Drivers) -> bool:
 
 @jit_inline
 def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scratch) -> int:
-    """Return the cheapest exit of v of those with their bit in `allowed`, -1 if there is none."""
+    """Return the cheapest exit of v of those with their bit in `allowed` (bits), -1 if there is none.
+
+    `offset` (row) is that of the network's first intersection.
+    """
     best = -1
     for k in range(roads.degree[offset + v]):
         if allowed & (1 << k) != 0 and (best < 0 or scratch.cost[k] < scratch.cost[best]):
@@ -92,7 +98,7 @@ def cheapest(v: int, offset: Any, allowed: int, roads: RoadTable, scratch: Scrat
 
 @jit
 def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
-    """Fill `scratch.cost` with what each exit at the end of the car's lane counts, metres to go or a random number."""
+    """Fill `scratch.cost` with the cost of each exit at the end of the car's lane: metres to go, or a random number."""
     roads, obstacles, drivers, scratch = traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch
     net = drivers.net[b]
     car = drivers.car[b, n]
@@ -120,6 +126,8 @@ def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
         if out == lane ^ 1 and roads.degree[row] > 1:
             at_crossing = STEP if kind == KIND.NEMESIS else BACK
             cost += at_crossing if roads.degree[row] > 2 else BACK_IN_BEND
+            vehicle = drivers.vehicle[b]
+            cost += 0.0 if turns_within_road(vehicle.tightest, vehicle.middle) else NO_WAY
         if obstacles.off[b] != obstacles.off[b + 1] and (
             is_shut(b, lane, int(out), traffic) or leads_nowhere(b, int(out), traffic)
         ):
@@ -129,7 +137,7 @@ def price_exits(b: int, n: int, tick: int, traffic: Traffic) -> None:
 
 @jit
 def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
-    """Fill `scratch.hops` with the lanes from each lane to where the car wants to go; False if it goes anywhere."""
+    """Fill `scratch.hops` with the number of lanes from each lane to the car's target; False if it has none."""
     roads, drivers, scratch = traffic.roads, traffic.drivers, traffic.scratch
     net = drivers.net[b]
     car = drivers.car[b, n]
@@ -155,16 +163,16 @@ def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
     return True
 
 
-@jit
+@jit_rare
 def forget(net: int, roads: RoadTable, scratch: Scratch) -> None:
-    """Make all lanes of a network far from everywhere."""
+    """Set `scratch.hops` of all lanes of a network to infinitely many."""
     for k in range(2 * (roads.seg_off[net + 1] - roads.seg_off[net])):
         scratch.hops[k] = FAR
 
 
-@jit
+@jit_rare
 def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
-    """Fill `scratch.hops` with the lanes from each lane to intersection v."""
+    """Fill `scratch.hops` with the number of lanes from each lane to intersection v."""
     forget(net, roads, scratch)
     row = int(roads.vert_off[net]) + v
     found = 0
@@ -173,9 +181,9 @@ def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
     spread(roads, net, scratch.hops, scratch.queue, found)
 
 
-@jit
+@jit_rare
 def seek_ego(b: int, net: int, traffic: Traffic) -> None:
-    """Turn hops to the ego's goal into hops to the next lanes on its way there."""
+    """Replace the hops to the ego's goal by hops to the next lanes on the ego's way there."""
     labels, roads, scratch = traffic.labels, traffic.roads, traffic.scratch
     lane = labels.lane[b, 0]
     v = labels.crosses[b, 0] if lane < 0 else lane_end(roads, net, lane)
@@ -203,9 +211,9 @@ def seek_ego(b: int, net: int, traffic: Traffic) -> None:
     spread(roads, net, scratch.hops, scratch.queue, found)
 
 
-@jit
+@jit_rare
 def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
-    """Return the goal to which the ego is nearest, but for the one it is at; -1 without goals."""
+    """Return the goal nearest to the ego, except the one it is at; -1 without goals."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     best = -1
@@ -224,7 +232,7 @@ def foreseen(b: int, traffic: Traffic, car: Driver) -> int:
 
 @jit_inline
 def watch_ego(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
-    """A nemesis remembers in PLACE the goal at which the ego has been last."""
+    """Let a nemesis remember, in `Driver.place`, the goal at which the ego was last."""
     car = drivers.car[b, n]
     at = labels.at[b, 0]
     if at >= 0 and is_goal(at, car, drivers):
@@ -233,7 +241,7 @@ def watch_ego(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
 
 @jit_inline
 def count_visit(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
-    """A car on its round takes the next goal once it is at this one."""
+    """Set the next goal of a car on its round once it is at the present one."""
     car = drivers.car[b, n]
     if car.place >= 0 and labels.at[b, n] == drivers.stage[car.place]:
         car.place = car.place + 1 if car.place + 1 < car.last else car.first
@@ -241,5 +249,5 @@ def count_visit(b: int, n: int, labels: Labels, drivers: Drivers) -> None:
 
 @jit_inline
 def ticks_of(seconds: float, vehicle: Vehicle) -> int:
-    """Return a duration in whole ticks, rounded down."""
+    """Return a duration, `seconds` (s), in whole ticks, rounded down."""
     return int(seconds / vehicle.period + 1e-9)

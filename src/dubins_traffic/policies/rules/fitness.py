@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.errors import InputError
-from dubins_traffic.policies.rules.tables import LONGEST_WAY
+from dubins_traffic.policies.rules.abilities import LONGEST_WAY, ROUND
+from dubins_traffic.policies.rules.wide_turns import check_wide_turns
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.rules.parameters import RuleParameters
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
-ROUND = 0.9
-"""Least turning radius at which a car turns round from lane to lane, in units of w."""
+KEPT = "the rules of the road and the shield are kept by standing at once, with no stopping distance (docs/shield.md),"
+"""Why other cars than the Dubins car are refused."""
 LONG = 1.2
 """Largest rho, in units of w, with which cars in one disc can turn beside each other."""
 BESIDE = 0.05
@@ -43,12 +44,11 @@ def check_fit(problem: Problem, owes: bool) -> None:
         Naming the field of the car, or the place in the roads.
     """
     car, bounds = problem.car, problem.car.bounds
-    require_dubins(car, "the rules of the road and the shield are kept")
+    require_dubins(car, KEPT)
     if bounds.speed_low > 0.0:
         raise _refuse("can't stop", "bounds.speed_min", bounds.speed_low, "at most 0")
     if bounds.turning_radius > ROUND * car.w:
-        expected = f"at most {ROUND} w = {ROUND * car.w:.6g} m"
-        raise _refuse("can't turn round", "bounds.turning_radius", bounds.turning_radius, expected)
+        check_wide_turns(problem)
     width = car.body.width
     if 0.5 * width + BESIDE >= car.w:
         name = "body.disc.radius" if isinstance(car.body, Disc) else "body.rectangle.width"

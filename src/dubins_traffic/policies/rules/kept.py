@@ -1,4 +1,4 @@
-"""What is kept of cars from tick to tick so that it need not be found again: their paths, and what they go on doing.
+"""The tables of the path cache and the command cache.
 
 `policies.rules.path_cache` and `policies.rules.command_cache` write and read it.
 """
@@ -10,14 +10,14 @@ from dubins_traffic.kernels.columns import columns
 from dubins_traffic.kernels.records import Rows, record, table
 
 NOWHERE = 1e9
-"""Metres that no way is long: who would have to be so far along its way to go on as it does, doesn't."""
+"""Longer than any way, metres: a cached command that begins so far along its way is never valid."""
 
 
 @record
 class KeptPath:
     """The reference path of a car, kept from tick to tick, and the labels with which one just drives on.
 
-    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`.
+    All is -1 before there is a path. The path is that of `policies.rules.turn_arcs.ReferencePath`, in metres.
     """
 
     lane: int = -1
@@ -69,10 +69,10 @@ class KeptPath:
 
 @columns(BLOCK)
 class KeptCommands:
-    """Of BLOCK cars, number by number: where a car just drives on as it did, and the command with which it does.
+    """The cached commands of BLOCK cars, and the stretch of its way on which each is valid.
 
-    The loop over the cars of `policies.rules.command_cache.look_who_coasts` reads and writes these columns several cars
-    at once. The path is that of `policies.rules.turn_arcs.ReferencePath`.
+    `policies.rules.command_cache.check_command_caches` reads and writes these columns for several cars at once. The
+    path is that of `policies.rules.turn_arcs.ReferencePath`.
     """
 
     low: Floats

@@ -1,4 +1,4 @@
-"""The cars of a trial by the segments they are on, for those who look around (compiled)."""
+"""Lists of the cars of a trial by segment, for cars that look around (compiled)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dubins_traffic.policies.rules.tables import Traffic
 
 
 class _Listed(NamedTuple):
-    """Who is in the lists of the segments."""
+    """Which cars are in the lists of the segments."""
 
     NOBODY: int = 0
     SEEN: int = 1
@@ -22,7 +22,7 @@ LISTED: Final = _Listed()
 
 @jit_inline
 def enlist(b: int, n: int, sight2: float, traffic: Traffic) -> None:
-    """Have those in the lists of the segments by whom car n goes: whom it sees if it is the ego, else all.
+    """Fill the lists of the segments with the cars that car n takes into account: all, or those that the ego sees.
 
     `sight2` (m^2) is the square of how far the ego sees, negative if that is everywhere.
     """

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction
 
 BESIDE = 0.06
-"""What a car keeps free beside an obstacle, metres."""
+"""Gap that a car keeps beside an obstacle, metres."""
 SQUEEZED = 0.022
 """The same between two obstacles that leave no more room, metres."""
 EDGE = 0.05
-"""What the centre keeps from the edge of the road, metres."""
+"""Distance that the centre keeps from the edge of the road, metres."""
 TINY = 0.002
-"""Who passes within its lane is this far beside its way at least, metres."""
+"""Least offset from its way of a car that passes within its lane, metres."""
 
 
 @jit
 def within_lane(offset: float, vehicle: Vehicle) -> bool:
-    """Tell whether a body so far left of the middle of the right lane does not reach over the centre line."""
+    """Tell whether a body at `offset` left of the middle of the right lane does not reach over the centre line."""
     return offset + vehicle.half_width + vehicle.rounding <= vehicle.middle
 
 
@@ -39,12 +39,14 @@ def offset_on_way(
     )
 
 
-@jit
+@jit_rare
 def offset_in_lane(
     traffic: Traffic, net: int, lane: int, begin: float, end: float, first: int, last: int, vehicle: Vehicle
 ) -> float:
-    """Return `clear_offset` for the stretch of a lane from `begin` to `end`, metres along it."""
+    """Return `clear_offset` for a stretch of a lane from `begin` to `end`, metres along it; 0 if its road bends."""
     roads, obstacles = traffic.roads, traffic.obstacles
+    if roads.segment[int(roads.seg_off[net]) + (lane >> 1)].piece >= 0:
+        return 0.0
     along, left = lane_coordinates(roads, net, lane, 0.0, 0.0)
     tx, ty = lane_direction(roads, net, lane)
     return clear_offset(
@@ -85,7 +87,7 @@ def clear_offset(
     return 0.0
 
 
-@jit
+@jit_rare
 def is_clear(
     along: float, left: float, tx: float, ty: float, begin: float, end: float, offset: float, wide: float,
     obstacles: ObstacleTable, first: int, last: int, vehicle: Vehicle,

@@ -7,7 +7,8 @@ from typing import Any
 
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
+from dubins_traffic.policies.rules.abilities import turns_within_road
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
@@ -18,47 +19,47 @@ from dubins_traffic.rules.shape import half_extent
 PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
 BERTH = 0.12
-"""What is kept free beside what stands, metres."""
+"""Gap beside what is passed, metres."""
 SLIP = 0.25
-"""So far past what stands a car begins to return, metres, beyond the length of a rectangle."""
+"""A car begins to return this far past what it passes, metres, beyond the length of a rectangle."""
 BACK = 0.4
-"""So far after that its body is back in the right lane, metres."""
+"""Distance from there in which its body is back in the right lane, metres."""
 TURNING = 1.2
-"""Seconds that passing takes beyond what the distance asks for."""
+"""Seconds that passing takes in addition to the time for the distance."""
 COMES = 0.7
-"""Cars that come are taken to drive as fast as the car can, at least at this speed, m/s."""
+"""Least speed assumed of oncoming cars, m/s; if the cars can drive faster, that speed is assumed."""
 SPARE = 0.6
-"""Metres to spare before a car that comes."""
+"""Metres to spare before an oncoming car."""
 FOLLOWED = 1.5
-"""Nobody begins to pass anything while the ego is this near behind, metres: it might take his place."""
+"""No e-agent begins to pass while the ego is this near behind, metres: the ego might take its place."""
 OVERTAKEN = 2.0
-"""Who comes from behind on the left within this is let past first, metres."""
+"""A car that comes from behind on the left within this distance is let past first, metres."""
 NARROWS = 1.5
-"""What stands so near behind what is passed is passed with it, metres."""
+"""A body that stands this near behind what is passed is passed with it, metres."""
 
 
 @jit_inline
 def along(way: ReferencePath, x: float, y: float) -> float:
-    """Return metres along the lane from its end, negative."""
+    """Return the coordinate of a point along the lane, from its end, metres, negative before it."""
     return (x - way.x) * way.tx + (y - way.y) * way.ty
 
 
 @jit_inline
 def aside(way: ReferencePath, x: float, y: float) -> float:
-    """Return metres left of the middle of the right lane."""
+    """Return how far left of the middle of the right lane a point lies, metres."""
     return way.tx * (y - way.y) - way.ty * (x - way.x) + way.middle
 
 
 @jit
 def stop_line(vehicle: Vehicle) -> float:
-    """Return metres from the intersection, negative, to where a car on the right lane has to be back in it."""
+    """Return where along the lane, metres from the intersection, negative, a car has to be back in it."""
     edge = vehicle.disc + vehicle.reach + 0.03
     return -sqrt(edge * edge - vehicle.middle * vehicle.middle)
 
 
 @jit
 def half_width(b: int, j: Any, way: ReferencePath, state: State, vehicle: Vehicle) -> float:
-    """Return half the extent of a car across the lane."""
+    """Return half the extent of car `j` (index) across the lane, metres."""
     return half_extent(
         way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
         vehicle.half_length, vehicle.half_width, vehicle.rounding,
@@ -68,20 +69,46 @@ def half_width(b: int, j: Any, way: ReferencePath, state: State, vehicle: Vehicl
 @jit
 def can_come_back(vehicle: Vehicle) -> bool:
     """Tell whether a car that has begun to pull out can still stay in its lane: it turns in place, or backs up."""
-    return vehicle.tightest == 0.0 or vehicle.slowest < 0.0
+    return vehicle.tightest == 0.0 or (
+        vehicle.slowest < 0.0 and turns_within_road(vehicle.tightest, vehicle.middle)
+    )
 
 
-@jit
+@jit_inline
+def drawn_out(tight: float) -> float:
+    """Return how many metres along an unrolled road a car may get on at most while it drives one, in its place aside.
+
+    `tight` (ratio) is `Scratch.tight`; 1 on straight roads.
+    """
+    return (1.0 + tight) / max(1.0 - 2.0 * tight, 0.25)
+
+
+@jit_inline
+def slowed_by(tight: float) -> float:
+    """Return how many metres a car may have to drive at most for one along an unrolled road.
+
+    `tight` (ratio) is `Scratch.tight`.
+    """
+    return (1.0 + 2.0 * tight) / (1.0 - tight)
+
+
+@jit_inline
+def passing_time(own: float, until: float, tight: float, vehicle: Vehicle) -> float:
+    """Return how long passing takes at most, seconds, from `own` (m) along the lane to where `until` (m) it returns.
+
+    `tight` (ratio) is `Scratch.tight`.
+    """
+    if tight == 0.0:
+        return (until + BACK - own) / (0.8 * vehicle.fastest) + TURNING
+    return ((until - own) * slowed_by(tight) + BACK) / (0.8 * vehicle.fastest) + TURNING
+
+
+@jit_rare
 def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic) -> None:
     """Begin to pass what stands ahead, if there is room to return and the other lane is and stays free."""
     state, labels, roads, obstacles, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.obstacles,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     reach = vehicle.reach
@@ -90,7 +117,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     offset += BERTH + vehicle.half_width + vehicle.rounding
     line = stop_line(vehicle)
     until = end + SLIP + 2.0 * vehicle.half_length
-    back = until + BACK
+    tight = scratch.tight[0]
+    back = until + BACK * drawn_out(tight)
     if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
@@ -108,10 +136,10 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         and ego_is_beside(b, own, back, way, traffic, drivers.car[b, n].lane, vehicle)
     ):
         return
-    time = (back - own) / (0.8 * vehicle.fastest) + TURNING
+    time = passing_time(own, until, tight, vehicle)
     if time > vehicle.left_time:
         return
-    comes = max(COMES, vehicle.fastest) * time + SPARE
+    comes = max(COMES, vehicle.fastest) * time * ((1.0 + tight) / (1.0 - tight)) + SPARE
     room = line - back
     j = scratch.head[drivers.car[b, n].lane >> 1]
     while j >= 0:
@@ -138,9 +166,9 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     drivers.car[b, n].waited = 0
 
 
-@jit
+@jit_rare
 def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> None:
-    """Begin to pass obstacles ahead without leaving the lane, or on the right of it on the road: nobody comes there.
+    """Begin to pass obstacles ahead without leaving the lane to the left, where no oncoming car is.
 
     All that are near to one another are passed on one line, or else obstacle part p, the first of them, alone.
     """
@@ -162,7 +190,7 @@ def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> No
 
 @jit
 def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may come out of the next disc, from `comes` metres behind it at most."""
+    """Tell whether a car may come out of the next disc that is now at most `comes` metres behind it."""
     state, labels, roads, drivers, scratch = (
         traffic.state,
         traffic.labels,
@@ -192,7 +220,7 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
 def ego_is_beside(
     b: int, own: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
-    """Tell whether the ego is in the lane where a car would pass: it might keep beside, or stop where that returns."""
+    """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns."""
     state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
         return False

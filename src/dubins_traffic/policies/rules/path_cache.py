@@ -1,8 +1,8 @@
-"""The way of a car from the lane it drives to the next one, kept from tick to tick (compiled)."""
+"""The path cache: the way of each car from its lane to the next one, kept until either changes (compiled)."""
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_look
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import queue_lengths
 from dubins_traffic.policies.rules.tables import Drivers
@@ -13,12 +13,18 @@ from dubins_traffic.roads.table import RoadTable
 
 @jit_inline
 def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> ReferencePath:
-    """Return the way from the lane that a car drives to the next one, which is kept until either changes."""
+    """Return the way of car n from its lane to the next one, from the cache if that is valid."""
     car = drivers.car[b, n]
     row = drivers.way[b, n]
-    if row.lane != car.lane or row.out != car.next_lane:
+    if not _is_of(car.lane, car.next_lane, row):
         keep_way(b, n, roads, drivers)
     return kept_way(row)
+
+
+@jit_look
+def _is_of(lane: int, out: int, row: KeptPath) -> bool:
+    """Tell whether the cached way leads from `lane` to lane `out`."""
+    return row.lane == lane and row.out == out
 
 
 @jit_inline
@@ -42,7 +48,7 @@ def kept_way(row: KeptPath) -> ReferencePath:
 
 @jit
 def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
-    """Work out the way from the lane that a car drives to the next one."""
+    """Compute the way of car n from its lane to the next one and store it in the cache."""
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]

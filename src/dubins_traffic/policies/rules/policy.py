@@ -15,15 +15,15 @@ import numpy as np
 from dubins_traffic.cars.near import FEW
 from dubins_traffic.cars.state import Labels, Pose
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
 from dubins_traffic.policies.rules.chosen import keeps_own_gap, pauses
 from dubins_traffic.policies.rules.command_cache import (
-    coast,
+    check_command_caches,
     cruise,
-    drive_on,
-    look_who_coasts,
-    stop_coasting,
+    drive_freely,
+    forget_command,
+    repeat_command,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.policies.rules.lists import LISTED, enlist, unlist_cars
@@ -53,9 +53,9 @@ from dubins_traffic.routing.lane_graph import lane_at
 from dubins_traffic.rules.propositions import FLAG
 
 BUMPER = 0.005
-"""Gap kept behind a moving car by one that tailgates and trusts it not to brake, metres."""
+"""Gap that a tailgating car, which trusts the one ahead not to brake, keeps behind it while it moves, metres."""
 DAWDLE = 0.12
-"""Speed of a nemesis before the ego, m/s."""
+"""Speed at which a nemesis drives in front of the ego, m/s."""
 
 
 @jit
@@ -73,8 +73,8 @@ def decide_trial(
 ) -> None:
     """Write the commands of the cars of one trial that the law drives.
 
-    The ego goes by the cars whose squared distance from it is at most `sight2`, metres squared, and by all that are
-    given if that is negative. No car is nearer to another than `apart` (N,) less `loss`, metres.
+    The ego takes into account the cars whose squared distance from it is at most `sight2` (m2), all if that is
+    negative. `apart` (N,) less `loss` (m) is a lower bound on the distance from each car to the nearest other.
     """
     state, labels, obstacles, drivers, scratch = (
         traffic.state,
@@ -90,7 +90,7 @@ def decide_trial(
         enough = INFINITE
         others = COMPANY.CROWDED
     bends = traffic.roads.piece.shape[0] > 0
-    look_who_coasts(b, traffic)
+    check_command_caches(b, traffic)
     for n in range(state.count[b]):
         company = others if apart[n] > 0.0 else COMPANY.CROWDED
         if apart[n] > enough:
@@ -104,12 +104,10 @@ def decide_trial(
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
             continue
-        unrolled = bends and bends_ahead(b, n, traffic)
+        unrolled = bends and unroll_bend(b, n, tick, sight2, traffic)
         if unrolled:
-            enlist(b, n, sight2, traffic)
-            unroll(b, n, traffic)
             company = COMPANY.UNROLLED
-        if company >= COMPANY.CROWDED or not coast(b, n, tick, kind, company, traffic, commands):
+        if company >= COMPANY.CROWDED or not repeat_command(b, n, tick, kind, company, traffic, commands):
             drive(b, n, tick, company, sight2, traffic, commands)
         if unrolled:
             roll_up(b, n, traffic, commands)
@@ -117,9 +115,26 @@ def decide_trial(
         unlist_cars(b, traffic)
 
 
+@jit_rare
+def unroll_bend(b: int, n: int, tick: int, sight2: float, traffic: Traffic) -> bool:
+    """Unroll the road of a car if it bends between it and the end of its lane; tell whether it does.
+
+    A car in a disc may have come to the lane out in this tick; then that lane counts. `sight2` (m^2) is the square of
+    how far the ego sees. This is not part of `drive`, which is faster on straight roads without it.
+    """
+    state = traffic.state
+    if traffic.labels.lane[b, n] < 0:
+        keep_place(b, n, tick, state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], traffic)
+    if not bends_ahead(b, n, traffic):
+        return False
+    enlist(b, n, sight2, traffic)
+    unroll(b, n, traffic)
+    return True
+
+
 @jit_inline
 def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
-    """Tell whether a car still stands where it has started: it may, unless it would keep others from a crossing."""
+    """Tell whether a car still stands where it started: it may, unless it would keep others from a crossing."""
     if tick * drivers.vehicle[b].period >= drivers.car[b, n].departs:
         return False
     bits = np.int64(labels.bits[b, n])
@@ -128,15 +143,12 @@ def parks(b: int, n: int, tick: int, labels: Labels, drivers: Drivers) -> bool:
 
 @jit_inline
 def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traffic, commands: Floats) -> None:
-    """Write the command of a car; `company` says what is known of the cars around it.
-
-    Where its road is unrolled it does not begin to pass what stands.
-    """
+    """Write the command of a car; `company` says what is known of the cars around it."""
     state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     x, y = state.x[b, n], state.y[b, n]
-    stop_coasting(b, n, drivers)
+    forget_command(b, n, drivers)
     if car.kind == KIND.NEMESIS:
         watch_ego(b, n, labels, drivers)
     way = keep_place(b, n, tick, x, y, state.c[b, n], state.s[b, n], traffic)
@@ -151,7 +163,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
     if free and company != COMPANY.ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
-    if free and drive_on(b, n, part, left, px, py, outside, chooses, way, traffic, commands):
+    if free and drive_freely(b, n, part, left, px, py, outside, chooses, way, traffic, commands):
         return
     enlist(b, n, sight2, traffic)
     near = 0
@@ -170,11 +182,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if who != -1:
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, -way_to_go(way, x, y), near, traffic)
-    offset = 0.0
-    if company == COMPANY.UNROLLED:
-        car.aside = 0.0
-    else:
-        speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
+    speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0
@@ -205,7 +213,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
 
 @jit_inline
 def just_drives(car: Driver) -> bool:
-    """Tell whether a car does nothing for which it looks at cars that are far away, but enter a bend or dead end."""
+    """Tell whether a car has no reason to look at far cars, unless it enters a bend or dead end."""
     return car.kind != KIND.NEMESIS and car.violations & VIOLATION.TAILGATING == 0 and car.aside == 0.0
 
 
@@ -297,7 +305,7 @@ def pass_what_stands(
 
 @jit_inline
 def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
-    """Tell whether it is time to look for a way past: not in every tick, and sooner for who is left already."""
+    """Tell whether it is time to look for a way past: not in every tick, and sooner for a car that is left already."""
     return (car.waited >= ticks_of(PASSING_WAIT, vehicle) or bits & FLAG.LEFT != 0) and car.waited % 4 == 0
 
 
@@ -305,7 +313,7 @@ def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
 def keep_place(
     b: int, n: int, tick: int, x: float, y: float, c: float, s: float, traffic: Traffic
 ) -> ReferencePath:
-    """Keep LANE and NEXT in step with where the car is; return its way."""
+    """Update `Driver.lane` and `Driver.next_lane` to where the car is; return its way."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]

@@ -1,8 +1,8 @@
-"""Whether a car that passes goes on, and where it returns: what it passes may drive on meanwhile (compiled)."""
+"""Decides whether a passing car goes on and where it returns, as what it passes may drive on (compiled)."""
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE, within_lane
 from dubins_traffic.policies.rules.passing import BACK, BERTH, SLIP, along, aside, stop_line
 from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
@@ -10,18 +10,18 @@ from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.propositions import FLAG
 
 SLOW = 0.05
-"""A car slower than this is passed, once this has begun, though it waits its turn by now, m/s."""
+"""A car slower than this, m/s, is passed to the end once that has begun, even if it waits for its turn by now."""
 NARROWLY = 0.02
-"""What a car that goes straight to the right keeps from where it may meet the disc, metres."""
+"""Distance from the disc that a car keeps which goes straight to the right, metres."""
 
 
 @jit_inline
 def last_return(vehicle: Vehicle) -> float:
-    """Return metres from the intersection, negative, from where a car can still go straight to the right."""
+    """Return the last place, metres from the intersection, negative, where a car can still go straight to the right."""
     return -(vehicle.disc + vehicle.reach + EDGE + NARROWLY)
 
 
-@jit
+@jit_rare
 def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return the speed of a car that passes; end the manoeuvre when it is done or there is nothing left to pass.
 

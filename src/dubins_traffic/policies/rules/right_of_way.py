@@ -1,4 +1,4 @@
-"""Whether a car may enter the disc at the end of its lane: its turn at a crossing, and room behind it (compiled)."""
+"""Decides whether a car may enter the disc ahead: its turn at a crossing, and room behind the disc (compiled)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import EGO, State
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
 from dubins_traffic.policies.rules.chosen import holds
 from dubins_traffic.policies.rules.exits import ticks_of
@@ -21,24 +21,24 @@ from dubins_traffic.roads.lookup import INFINITE, lane_end, lane_start
 from dubins_traffic.rules.propositions import FLAG
 
 CHOOSY = 1.0
-"""Seconds for which a car whose turn it is waits for room in the lane it wants."""
+"""Seconds for which a car whose turn it is waits for room in its preferred exit."""
 BUDGET = 4.0
-"""Metres of detour that a car on its round accepts for each second it has waited for room."""
+"""Metres of detour that a car on its round accepts per second it has waited for room."""
 SOON = 0.5
-"""Who is this near to a bend comes into it before one who turns round there, metres."""
+"""A car this near to a bend enters it before one that turns round there, metres."""
 DUTY = 0.8
-"""An e-agent that has lost its place once enters after this share of the time in which it would lose it again, though
-there is room nowhere: else it breaks E3."""
+"""An e-agent that has lost its place once enters after this share of the time in which it would lose it again, even
+without room in any exit: otherwise it breaks E3."""
 PATIENT = 0.5
-"""An e-agent that has stood for this share of the time that E5 allows before a bend or dead end enters as soon as an
-exit is free, though those in it may stop."""
+"""An e-agent that has stood before a bend or dead end for this share of the time that E5 allows enters as soon as an
+exit is free, even if cars in it may stop."""
 HUSH = 0.2
 """For this share of every half of the time in which each goal has to be free once (E6) e-agents enter a bend that is
 a goal one after another."""
 LINGER = 0.8
 """For this share of the time in which it would lose its place a nemesis makes the ego wait before it enters."""
 TRAIL = 3.5
-"""A nemesis minds the ego within this, metres."""
+"""Distance within which a nemesis reacts to the ego, metres."""
 GOES_NOW = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
 
 
@@ -84,7 +84,7 @@ def yield_at_line(
     return speed if free else max(0.0, line) / vehicle.period
 
 
-@jit
+@jit_rare
 def may_enter_bend(
     b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, traffic: Traffic
 ) -> bool:
@@ -129,9 +129,9 @@ def may_enter_bend(
 
 @jit_inline
 def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers) -> bool:
-    """Tell whether now is a time at which a car that minds goals enters the bend v only if nobody is in it.
+    """Tell whether a car that minds goals may now enter the bend v only if no car is in it.
 
-    Without such times cars that follow one another through a bend without end would never leave it free.
+    Without such times an endless row of cars through a bend would never leave it free.
     """
     half = ticks_of(0.5 * vehicle.goal_time, vehicle)
     if half <= 0 or tick % half < (1.0 - HUSH) * half:
@@ -162,7 +162,7 @@ def count_turn(bits: Any, way: KeptPath, car: Driver) -> bool:
 
 @jit_inline
 def to_line(left: float, x: float, y: float, way: ReferencePath, vehicle: Vehicle) -> float:
-    """Return metres to the line before which the car stays if it may not enter the disc at the end of its lane."""
+    """Return the distance, metres, to the line at which the car waits until it may enter the disc ahead."""
     edge = vehicle.disc + vehicle.reach + MARGIN
     aside = left - vehicle.middle
     return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
@@ -181,8 +181,8 @@ def shares_way(b: int, j: int, way: ReferencePath, degree: Any, state: State, ve
 def is_behind_ego(b: int, n: int, x: float, y: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether the ego is ahead in a car's lane.
 
-    Such a car takes no place in the order of the crossing while the ego's nose is in the disc: the ego may back out
-    again, and then bars the way of who would be first.
+    Such a car takes no place in the order of the crossing while the front of the ego is in the disc: the ego may back
+    out again, and then bars the way of the car that is first.
     """
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     if labels.lane[b, EGO] != drivers.car[b, n].lane:
@@ -255,7 +255,7 @@ def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
     return since > ticks_of(DUTY * vehicle.forfeit, vehicle)
 
 
-@jit_inline
+@jit_rare
 def before_ego(b: int, n: int, near: int, traffic: Traffic) -> bool:
     """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
     state, labels, roads, drivers, scratch = (

@@ -1,4 +1,4 @@
-"""How much room there is in the lane behind a disc, and who has to make some (compiled)."""
+"""Room in the lane behind a disc: how much there is, and which cars have to make some (compiled)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import sqrt
 from typing import Any
 
 from dubins_traffic.cars.state import EGO, Labels, State
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
@@ -15,19 +15,19 @@ from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_directi
 from dubins_traffic.rules.propositions import FLAG
 
 MARGIN = 0.02
-"""What a car keeps from a disc that it may not enter, metres."""
+"""Distance that a car keeps from a disc that it may not enter, metres."""
 BRISK = 0.3
-"""A car that leaves the crossing at this speed will make room, m/s."""
+"""A car that leaves the crossing at least at this speed counts as making room, m/s."""
 OVER = 0.05
-"""Who is less than this beyond the centre line of a lane still counts as in it, metres, unless he drives on the other
-side and is not left: he passes an obstacle within his lane, or sways."""
+"""A car less than this beyond the centre line of a lane still counts as in it, metres, unless it is on the other lane
+and not left: then it passes an obstacle within its own lane, or sways."""
 PRESSED = 0.4
-"""Who has a car in the disc behind it so close, metres, closes up, so that it can leave the disc."""
+"""A car with another one this close behind it in the disc, metres, closes up, so that the other can leave the disc."""
 
 
 @jit_inline
 def queue_lengths(vehicle: Vehicle) -> tuple[float, float]:
-    """Return how far behind a disc's centre a car in the lane has left it, and how far apart cars stand, metres."""
+    """Return how far from a disc's centre a car has left the disc, and how far apart waiting cars are, metres."""
     edge = vehicle.disc + vehicle.reach + MARGIN
     mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
     return mouth, 2.0 * vehicle.reach + QUEUE_GAP
@@ -46,11 +46,10 @@ def has_room(b: int, n: int, out: int, inside: int, traffic: Traffic) -> bool:
 def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     """Return how far beyond the disc at its beginning a car can drive on the lane `out`, metres.
 
-    It is negative where the car can't leave the disc. All that are in the lane drive on until they stand close behind
-    one another: behind what stands there now, behind an obstacle or before the next disc. Who drives in that disc has
-    left the lane. Of the ego nobody knows
-    whether it drives on; at a crossing, where who finds one exit barred has to take another in time, it may back up as
-    well. `inside` cars are still in the disc and will be before this one.
+    It is negative if the car can't leave the disc. The cars in the lane are assumed to drive on until they stand close
+    behind one another: behind a body that stands there now, behind an obstacle or before the next disc. A car that
+    drives in the next disc has left the lane. The ego may not drive on; at a crossing, where a car whose exit is barred
+    has to take another in time, it may even back up. `inside` cars are still in the disc and will be before this one.
     """
     state, labels, roads, drivers, scratch = (
         traffic.state,
@@ -92,7 +91,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
 
 @jit_inline
 def is_clear(b: int, n: int, way: KeptPath, labels: Labels, count: Any) -> bool:
-    """Tell whether a car is certain to have room in its exit, without obstacles: on that road all come the other way.
+    """Tell whether a car is certain to have room in its exit, without obstacles: all cars on that road are oncoming.
 
     `way` (row) is its row of `Drivers.way`; there are `count` (number) cars. What `has_room` would find with some more
     work is not looked for.
@@ -110,7 +109,7 @@ def is_clear(b: int, n: int, way: KeptPath, labels: Labels, count: Any) -> bool:
 def takes_room(
     b: int, j: Any, out: int, start: int, along: float, aside: float, labels: Labels, vehicle: Vehicle
 ) -> bool:
-    """Tell whether a car, at (along, aside) of the lane `out`, is in the way of those that come there from `start`."""
+    """Tell whether car `j` (index), in the lane `out`, is in the way of those that come there from `start` (vertex)."""
     oncoming = labels.lane[b, j] == out ^ 1 and labels.bits[b, j] & FLAG.LEFT == 0
     there = aside < vehicle.half_width + vehicle.rounding + OVER and along > vehicle.disc
     return there and not oncoming and labels.crosses[b, j] != start
@@ -118,11 +117,11 @@ def takes_room(
 
 @jit_inline
 def is_slow(b: int, j: Any, heading: float, state: State) -> bool:
-    """Tell whether a car makes no room soon; `heading` is the cosine of its angle to the lane."""
+    """Tell whether car `j` (index) makes no room soon; `heading` (cosine) is of its angle to the lane."""
     return abs(state.speed[b, j]) < BRISK or heading < 0.5
 
 
-@jit
+@jit_rare
 def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether a car can leave the disc by the lane `out` for all that is there now, wherever that may stop."""
     state, labels, roads, drivers, scratch = (
@@ -148,9 +147,9 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     return True
 
 
-@jit
+@jit_rare
 def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
-    """Tell whether nobody is in the lane `out` so near to the disc at its beginning that the exit is not free (E4)."""
+    """Tell whether the exit into the lane `out` is free (E4): no car in the lane is near the disc at its beginning."""
     state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
     j = scratch.head[out >> 1]

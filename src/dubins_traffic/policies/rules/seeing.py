@@ -23,9 +23,9 @@ STANDING_GAP, NEAR_ENOUGH = 0.72, 1.4
 the largest distance between centres, at which it still counts as blocking the lane, metres.
 """
 FACING_GAP = 0.8
-"""Gap kept from a car that comes, metres; who is on the left has to return, and goes closer."""
+"""Gap kept from an oncoming car, metres; a car on the left has to return, and goes closer."""
 OBSTACLE_GAP = 0.04
-"""Gap kept in a disc from an obstacle behind it, metres: it never moves, and who comes near may pass it then."""
+"""Gap kept in a disc from an obstacle behind the disc, metres: it never moves, and a car near it may then pass it."""
 CLOSE_GAP = 0.06
 """Gap kept by a car that tailgates, metres."""
 SIDE, NARROW = 0.04, 0.02
@@ -34,24 +34,20 @@ BACKWARD = -0.9
 """Cosine of the angle between two lanes below which the way between them counts as turning round."""
 HALF_TURN = 3.1
 """Length of the arc in which a car turns round, in units of its radius."""
-SIGHT = 3.0
-"""What is farther away than this does not matter to a car's next tick, metres."""
 HELD = 1e9
-CLOSE = 0.2
-"""The gap up to which a car is looked at for whether a motion might bring about a contact, metres."""
 AWARE = 0.06
-"""A car takes note of what is up to this much farther away than the gap it keeps, metres."""
+"""A car takes note of bodies up to this much farther away than the gap it keeps, metres."""
 
 
 @jit_inline
 def way_to_go(way: ReferencePath, x: float, y: float) -> float:
-    """Return minus the metres along the lane to the intersection at its end."""
+    """Return the coordinate of a point along the lane from the intersection at its end, metres, negative before it."""
     return (x - way.x) * way.tx + (y - way.y) * way.ty
 
 
 @jit_inline
 def alone(vehicle: Vehicle) -> float:
-    """Return metres between the centres beyond which another car makes no difference to one that just drives on."""
+    """Return the distance of centres, metres, beyond which another car does not matter to one that just drives on."""
     widest = max(MOVING_GAP, STANDING_GAP, FACING_GAP)
     return 2.0 * vehicle.reach + widest + AWARE + vehicle.fastest * vehicle.period
 
@@ -75,8 +71,8 @@ def meets_nobody(
     state: State,
     vehicle: Vehicle,
 ) -> bool:
-    """Tell whether no car of the trial makes a difference to one that just drives on: is close, or ahead on its way."""
-    far, touch = alone(vehicle), 2.0 * vehicle.reach + CLOSE
+    """Tell whether no car of the trial is close to a car that just drives on, or ahead on its way."""
+    far, touch = alone(vehicle), 2.0 * vehicle.reach + vehicle.near
     low, high = corridor(left, 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE)
     for j in range(state.count[b]):
         dx = state.x[b, j] - x
@@ -157,13 +153,13 @@ def look_ahead(
     gap = HELD
     who = -1
     close = False
-    touch = 2.0 * reach + CLOSE
+    touch = 2.0 * reach + vehicle.near
     for k in range(near):
         j = scratch.near[k]
         dx = state.x[b, j] - x
         dy = state.y[b, j] - y
         d2 = dx * dx + dy * dy
-        if d2 > SIGHT * SIGHT:
+        if d2 > vehicle.sight * vehicle.sight:
             continue
         if d2 < touch * touch:
             close = True
@@ -207,10 +203,11 @@ def see_obstacles(
         dx = obstacle.x - x
         dy = obstacle.y - y
         d2 = dx * dx + dy * dy
-        far = SIGHT + obstacle.reach
+        far = vehicle.sight + obstacle.reach
         if d2 > far * far:
             continue
-        if d2 < (vehicle.reach + obstacle.reach + 0.2) * (vehicle.reach + obstacle.reach + 0.2):
+        touch = vehicle.reach + obstacle.reach + vehicle.near
+        if d2 < touch * touch:
             close = True
         there, its_key, its_left, _, _ = on_way(way, obstacle.x, obstacle.y)
         aside = obstacle.reach - vehicle.half_width - vehicle.rounding + NARROW - SIDE

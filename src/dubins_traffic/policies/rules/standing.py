@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dubins_traffic.cars.state import State
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.passing import along, aside, half_width
 from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
@@ -13,7 +13,7 @@ from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_extent
 
 LINE, SURE = 0.002, 0.03
-"""What the body keeps from where it counts as left, and what stands from where it counts no more, metres."""
+"""Distance of the body from where it counts as left, and of what it passes from where that ends, metres."""
 
 
 @jit
@@ -43,8 +43,8 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
 def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
 
-    Who has stood is excused, and no reason to overtake any more, when one ahead of it gets its place at the
-    crossing; and it may drive off.
+    A standing car may drive off. It also becomes excused, and then is no reason to overtake, when a car ahead of it
+    gets its place in the order of the crossing.
     """
     state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
@@ -69,11 +69,11 @@ def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traff
     return found
 
 
-@jit_inline
+@jit_rare
 def watch(
     b: int, n: int, who: int, state: State, car: Driver, lane: int, scratch: Scratch
 ) -> None:  # fmt: skip
-    """Count for how long what the car may pass has not moved at all: car `who`, or what it has watched so far."""
+    """Count for how long the car that may be passed has not moved: car `who`, or the one watched so far."""
     j = scratch.head[lane >> 1]
     while j >= 0:
         if j != n and state.x[b, j] == car.watch_x and state.y[b, j] == car.watch_y:

@@ -1,4 +1,4 @@
-"""How a car that the law drives comes to its line: the command toward it, the lane's edge, a last look (compiled)."""
+"""Steering to a line: the command toward it, staying right of the centre line, the last check (compiled)."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import along
 from dubins_traffic.policies.rules.returning import NARROWLY, last_return
 from dubins_traffic.policies.rules.standing import stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
+from dubins_traffic.policies.safety import may_hit, may_meet
 from dubins_traffic.rules.propositions import FLAG
 
-HURRY = 0.25
-"""Metres in which a car returns to its way."""
+HURRY, WIDE = 0.25, 0.4
+"""Distance in which a car returns to its way: the greater of metres and units of its turning radius."""
 SLANT, STEEP, ABRUPT = 0.7, 0.9, 0.8
-"""Sine of the largest angle to its way at which a car drives; the same when it pulls out, or has to return, and when it
-is astray in a disc, where it has chosen another exit late."""
+"""Sine of the largest angle to its way at which a car drives: in general; when it pulls out or has to return; and when
+it is astray in a disc, having chosen another exit late."""
 ASTRAY = 0.18
-"""Who is this far left of its way in a disc is astray, metres."""
+"""A car this far left of its way in a disc is astray, metres."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 CREEPS, SLIDES = 0.05, 0.2
-"""Who has to return and may not drive on faster than the first goes straight to the right at the second, m/s."""
+"""A car that has to return and may not drive faster than the first goes straight to the right at the second, m/s."""
 SQUARE = 0.999
 """Sine of the angle at which it does."""
 GAIN = 8.0
@@ -37,7 +37,7 @@ GAIN = 8.0
 
 
 class Line(NamedTuple):
-    """The line that a car drives along: metres that it is left of it, its direction there, and how fast it may, m/s."""
+    """The line that a car drives along: its offset to the left of it, m, the line's direction, and the speed, m/s."""
 
     left: float
     px: float
@@ -58,7 +58,10 @@ def move(
     b: int, n: int, allowed: float, left: float, offset: float, px: float, py: float, bend: float, outside: bool,
     way: ReferencePath, near: int, trusted: int, traffic: Traffic,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful."""
+    """Return the command that leads to the line `offset` to the left of the way, if it is safe and lawful.
+
+    It is driven at the speed `allowed` (m/s) at most.
+    """
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     c, s, limit = state.c[b, n], state.s[b, n], vehicle.yaw_most
@@ -98,14 +101,14 @@ def move(
     return speed, yaw_rate
 
 
-@jit_inline
+@jit_rare
 def come_back(
     b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic
 ) -> Motion:
-    """Return what a car does that is left and returns among others, and whether that leads on.
+    """Return the motion of a car that is left and returns between other cars; `Motion` tells whether it is safe.
 
-    `motion` (m/s, rad/s) is what it would do, `near` (count) how many cars are listed. It does not turn
-    toward who bars its way back, and goes straight to the right where there is room for that only.
+    `motion` (m/s, rad/s) is the one it would have otherwise; `near` (count) cars are listed. It does not turn toward a
+    car that bars its way back, and goes straight to the right where there is room for that only.
     """
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     x, y = state.x[b, n], state.y[b, n]
@@ -132,11 +135,11 @@ def heading(line: Line, most: float) -> tuple[float, float]:
     return line.px * cosine - line.py * sine, line.py * cosine + line.px * sine
 
 
-@jit_inline
+@jit_rare
 def keep_right(
     b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, traffic: Traffic
 ) -> tuple[float, float]:
-    """Return a command that does not make the car left without a reason: it waits, or backs up into its lane."""
+    """Return a command that does not make the car left unless it overtakes: otherwise it waits or backs up."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
@@ -156,7 +159,7 @@ def keep_right(
     return -speed, -min(speed / vehicle.tightest, vehicle.yaw_most)
 
 
-@jit_inline
+@jit_rare
 def room_to_return(b: int, n: int, way: ReferencePath, traffic: Traffic) -> float:
     """Return how far a car that can't return yet may drive on and still return before the disc, metres.
 
@@ -216,9 +219,9 @@ def steer(
     `bend` is the line's curvature, 1/m, for which `speed` is `slowed`, `most` the sine of the largest angle to that
     line, `aligned` the cosine beyond which the car turns in place, unless it has a turning radius `tightest`, metres;
     `limit` is its largest yaw rate. All is worked out whatever the case, so that the loop of
-    `command_cache.look_who_coasts` has no branches.
+    `command_cache.check_command_caches` has no branches.
     """
-    sine = min(max(-left / HURRY, -most), most)
+    sine = min(max(-left / max(HURRY, WIDE * tightest), -most), most)
     cosine = sqrt(1.0 - sine * sine)
     hx = px * cosine - py * sine
     hy = py * cosine + px * sine
@@ -262,4 +265,4 @@ def is_safe_from(
         other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         if j != trusted and may_meet(pose, command, vehicle, other, travel):
             return False
-    return not may_hit(b, pose, command, vehicle, obstacles, NEAR, 0.0)
+    return not may_hit(b, pose, command, vehicle, obstacles, vehicle.near, 0.0)

@@ -1,4 +1,4 @@
-"""What the law of the road (`policies.rules.policy`) reads and writes: the drivers of a batch, and room to work in."""
+"""The tables of the law of the road (`policies.rules.policy`): the drivers of a batch, and scratch."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.policies.rules.abilities import near_of, sight_of, through_speed
 from dubins_traffic.policies.rules.kept import KeptCommands, KeptPath
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.judged import kinds_of
+from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.parameters import RuleParameters
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class _Kind(NamedTuple):
-    """How a car chooses its way, `Driver.kind`."""
+    """How a car chooses its exits, values of `Driver.kind`."""
 
     ABSENT: int = 0
     """The rules do not drive it."""
@@ -42,10 +43,6 @@ class _Kind(NamedTuple):
 KIND: Final = _Kind()
 GOES = {"wander": KIND.WANDER, "loop": KIND.LOOP, "places": KIND.PLACES}
 
-LONGEST_WAY = 2.21
-"""Length of the longest way through a disc, in units of R + rho."""
-PROMPT = 0.8
-
 
 class _Violation(NamedTuple):
     """Which rules a car breaks at present, bits of `Driver.violations`."""
@@ -62,7 +59,7 @@ VIOLATION: Final = _Violation()
 
 
 class _Company(NamedTuple):
-    """What is known of the cars around one."""
+    """What is known of the cars around a car."""
 
     ALONE: int = 0
     """That they make no difference to it."""
@@ -79,7 +76,7 @@ COMPANY: Final = _Company()
 
 @record
 class Driver:
-    """A car that the law drives: what it is given, and what it remembers."""
+    """A car that the law drives: its parameters and its memory."""
 
     kind: int
     """How the car chooses its way: `KIND`."""
@@ -185,6 +182,10 @@ class Vehicle:
     """Largest speed, m/s."""
     slowest: float
     """Smallest speed, m/s."""
+    near: float
+    """The gap up to which others are looked at for whether a motion might bring about a contact, metres."""
+    sight: float
+    """What is farther away than this does not matter to a car's next tick, metres."""
     forfeit: float
     """Seconds after which who does not enter on its turn loses its place."""
     through_speed: float
@@ -259,7 +260,8 @@ class Drivers(Tables):
 class Scratch(Tables):
     """Scratch: the cars of each segment as lists, those near a car, hops to the targets, costs of the exits, and the
     lanes that the ego will probably take; `apart` (N,): for who does not know how far cars are apart, 0; `listed` (1,):
-    who is in the lists; `real` (4, N): where cars are while a road is unrolled.
+    who is in the lists; `real` (4, N), `real_part` (4, P): where cars and obstacles are while a road is unrolled;
+    `tight` (1,): half a lane in units of its least radius, else 0.
     """
 
     head: Ints
@@ -272,10 +274,12 @@ class Scratch(Tables):
     apart: Floats
     listed: Ints
     real: Floats
+    real_part: Floats
+    tight: Floats
 
 
 class Traffic(Tables):
-    """All that the cars of a batch that the law drives go by, and the law's room to work in."""
+    """All tables by which the law drives cars of a batch, and its scratch."""
 
     state: State
     labels: Labels
@@ -285,32 +289,21 @@ class Traffic(Tables):
     scratch: Scratch
 
 
-def scratch(cars: int, segments: int) -> Scratch:
-    """Return scratch for trials of up to `cars` cars on up to `segments` segments."""
+def scratch(cars: int, segments: int, obstacles: ObstacleTable) -> Scratch:
+    """Return scratch for trials of up to `cars` cars on up to `segments` segments, with these obstacles."""
+    parts = int(np.diff(obstacles.off).max(initial=0))
     return Scratch(
-        head=np.full(segments, -1, dtype=np.int64),
-        link=np.zeros(cars, dtype=np.int64),
-        near=np.zeros(8 * cars, dtype=np.int64),
-        hops=np.zeros(2 * segments, dtype=np.int64),
-        queue=np.zeros(2 * segments, dtype=np.int64),
-        cost=np.zeros(4),
-        chain=np.zeros(4, dtype=np.int64),
-        apart=np.zeros(cars),
-        listed=np.zeros(1, dtype=np.int64),
-        real=np.zeros((4, cars)),
-    )
-
-
-def through_speed(problem: Problem) -> float:
-    """Return the speed at which the longest way through a disc takes PROMPT of the time that E4 allows, m/s."""
-    longest = LONGEST_WAY * (problem.intersection_radius + problem.car.body.reach)
-    allowed = RuleParameters.from_mapping(problem.rules).exit_time
-    return longest / (PROMPT * allowed) if allowed > 0.0 else problem.car.bounds.speed
+        head=np.full(segments, -1, dtype=np.int64), link=np.zeros(cars, dtype=np.int64),
+        near=np.zeros(8 * cars, dtype=np.int64), hops=np.zeros(2 * segments, dtype=np.int64),
+        queue=np.zeros(2 * segments, dtype=np.int64), cost=np.zeros(4), chain=np.zeros(4, dtype=np.int64),
+        apart=np.zeros(cars), listed=np.zeros(1, dtype=np.int64),
+        real=np.zeros((4, cars)), real_part=np.zeros((4, parts)), tight=np.zeros(1),
+    )  # fmt: skip
 
 
 def vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     """Return `Drivers.vehicle`."""
-    kinds, index = kinds_of(problems)
+    kinds, index = distinct_problems(problems)
     rows: Any = _vehicles_of(kinds)
     return rows[index]
 
@@ -331,6 +324,8 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
         own.disc = problem.intersection_radius
         own.period = problem.period
         own.degree = rules.crossing_degree
+        own.near = near_of(problem.car, problem.period)
+        own.sight = sight_of(problem.car.w)
         own.forfeit = rules.forfeit_time
         own.through_speed = through_speed(problem)
         own.over = rules.left_set

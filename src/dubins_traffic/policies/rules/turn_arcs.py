@@ -129,7 +129,7 @@ def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, f
 
 @jit_inline
 def in_arc(way: ReferencePath, dx: float, dy: float) -> tuple[int, float, float, float, float]:
-    """Return what `on_way` does, of a point that is known to be in the arc, (dx, dy) from its centre."""
+    """Return what `on_way` does, of a point that is known to be in the arc, `dx` (m) and `dy` (m) from its centre."""
     far = sqrt(dx * dx + dy * dy)
     ex = dx / far
     ey = dy / far

@@ -1,59 +1,76 @@
 """A road that bends as the law sees it: unrolled to a straight one, so that all else is said for straight roads only.
 
-For the car that decides, whoever is on its road stands for a moment where he would be if that ran straight into the
-intersection at its end, as far from it as along the middle of the car's own lane, and as far beside it as he is. Who is
-not on that road is left where he is, or moved rigidly with the road's beginning if he is nearer to that. Then the car
-decides as on any road. Of its command only the yaw rate changes when the road is rolled up again: it turns with the
-road. A last look asks whether that is safe where everybody really is.
+While a car decides, every car on its road is moved to where it would be if the road ran straight into the intersection
+at its end: as far from that as along the middle of the deciding car's lane, and with the same lateral offset. A car
+that is not on that road stays in place, or moves rigidly with the road's beginning if it is nearer to that. Obstacles
+are unrolled with the road beside which they lie. Then the car decides as on a straight road. When the road is rolled up
+again, only the yaw rate of its command changes: the car turns with the road. Its motion is the same except that
+distances along the road are stretched in the other lane (`policies.rules.passing`). A last check asks whether the
+command is safe at the real poses, and keeps the car right unless it overtakes.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+import numpy as np
 
 from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.records import Rows
-from dubins_traffic.kernels.trig import angle
-from dubins_traffic.policies.rules.tables import Traffic
-from dubins_traffic.policies.safety import may_meet
-from dubins_traffic.roads.bends import nearest_piece
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.policies.rules.standing import LINE, SURE
+from dubins_traffic.policies.rules.tables import VIOLATION, Traffic
+from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
+from dubins_traffic.roads.bends import bent_distance2, nearest_piece, piece_foot
 from dubins_traffic.roads.lookup import (
+    bends_before,
+    lane_coordinates,
     lane_direction,
+    lane_direction_at,
     lane_end,
     lane_end_direction,
     lane_start,
+    tightness,
     vertex_distance2,
 )
 from dubins_traffic.roads.table import Piece, Segment
+from dubins_traffic.rules.blocking import narrows
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import half_extent
 
+BESIDE = 0.3
+"""Obstacles this near to the road's edge are unrolled with it, metres."""
+AROUND = 1.5
+"""Those this near to the disc at its end stay where they are, metres; others are put out of the way:"""
+AWAY = 1e6
+"""so far off, metres."""
 SHARE = 0.8
 """Of its largest yaw rate a car uses at most this share to turn with the road."""
 
 
 @jit_inline
+def lane_of(b: int, n: int, traffic: Traffic) -> int:
+    """Return the lane of a car: in a disc the one by which it came, and from the end of its arc on the one out."""
+    seen = traffic.labels.lane[b, n]
+    return int(seen if seen >= 0 else traffic.drivers.car[b, n].lane)
+
+
+@jit_inline
 def bends_ahead(b: int, n: int, traffic: Traffic) -> bool:
     """Tell whether the road of a car bends between it and the end of its lane."""
-    state, labels, roads = traffic.state, traffic.labels, traffic.roads
-    lane = labels.lane[b, n]
-    if lane < 0:
-        return False
-    own = roads.segment[int(roads.seg_off[int(traffic.drivers.net[b])]) + int(lane >> 1)]
-    if own.piece < 0:
-        return False
-    k, _ = nearest_piece(roads.piece, own, state.x[b, n], state.y[b, n])
-    return k != (own.piece if lane & 1 else own.last)
+    lane = lane_of(b, n, traffic)
+    x, y = traffic.state.x[b, n], traffic.state.y[b, n]
+    return lane >= 0 and bends_before(traffic.roads, traffic.drivers.net[b], lane, x, y)
 
 
 @jit
 def unroll(b: int, n: int, traffic: Traffic) -> None:
-    """Put the cars of trial b where they are on the unrolled road of car n; `roll_up` puts them back."""
+    """Put cars and obstacles of trial b where they are on the unrolled road of car n; `put_back` puts them back."""
     state, labels, roads, drivers, scratch = (
         traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
     )  # fmt: skip
     net = drivers.net[b]
-    lane = int(labels.lane[b, n])
+    lane = lane_of(b, n, traffic)
     own = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
     back = lane & 1 != 0
     middle = drivers.vehicle[b].middle
@@ -62,6 +79,8 @@ def unroll(b: int, n: int, traffic: Traffic) -> None:
     ux, uy = lane_direction(roads, net, lane)
     end, start = roads.vertex[int(roads.vert_off[net]) + last], roads.vertex[int(roads.vert_off[net]) + first]
     length = to_end(roads.piece, own, back, own.last if back else own.piece, 0.0, middle)
+    scratch.tight[0] = tightness(roads, net, lane, middle)
+    unroll_obstacles(b, n, traffic)
     for j in range(state.count[b]):
         x, y, c, s = state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j]
         scratch.real[0, j], scratch.real[1, j], scratch.real[2, j], scratch.real[3, j] = x, y, c, s
@@ -86,19 +105,64 @@ def unroll(b: int, n: int, traffic: Traffic) -> None:
 
 
 @jit
-def roll_up(b: int, n: int, traffic: Traffic, commands: Floats) -> None:
-    """Put the cars back where they are, and make of the command of car n on the unrolled road that on the real one."""
-    state, labels, roads, drivers, scratch = (
-        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
-    )  # fmt: skip
+def unroll_obstacles(b: int, n: int, traffic: Traffic) -> None:
+    """Put the obstacles of trial b where they are on the unrolled road of car n, those elsewhere out of the way."""
+    roads, obstacles, drivers, scratch = traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    lane = lane_of(b, n, traffic)
+    own = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
+    back = lane & 1 != 0
+    last = lane_end(roads, net, lane)
+    end = roads.vertex[int(roads.vert_off[net]) + last]
+    tx, ty = lane_end_direction(roads, net, lane)
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        part, q = obstacles.parts[p], p - obstacles.off[b]
+        x, y, c, s = part.x, part.y, part.c, part.s
+        real = scratch.real_part
+        real[0, q], real[1, q], real[2, q], real[3, q] = x, y, c, s
+        edge = float(roads.half_width[net]) + part.reach + BESIDE
+        if bent_distance2(roads.piece, own, x, y) > edge * edge:
+            near = vehicle.disc + part.reach + AROUND
+            if vertex_distance2(roads, net, last, x, y) > near * near:
+                part.x += AWAY
+            continue
+        k, gone, left, dx, dy = place(roads.piece, own, back, x, y)
+        if k == (own.piece if back else own.last):
+            continue
+        along = -to_end(roads.piece, own, back, k, gone, vehicle.middle)
+        cosine = dx * c + dy * s
+        sine = dx * s - dy * c
+        part.x = end.x + along * tx - left * ty
+        part.y = end.y + along * ty + left * tx
+        part.c = cosine * tx - sine * ty
+        part.s = cosine * ty + sine * tx
+
+
+@jit
+def put_back(b: int, traffic: Traffic) -> None:
+    """Put cars and obstacles of trial b back where they are."""
+    state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
     for j in range(state.count[b]):
         state.x[b, j], state.y[b, j] = scratch.real[0, j], scratch.real[1, j]
         state.c[b, j], state.s[b, j] = scratch.real[2, j], scratch.real[3, j]
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        part, q = obstacles.parts[p], p - obstacles.off[b]
+        part.x, part.y = scratch.real_part[0, q], scratch.real_part[1, q]
+        part.c, part.s = scratch.real_part[2, q], scratch.real_part[3, q]
+    scratch.tight[0] = 0.0
+
+
+@jit_rare
+def roll_up(b: int, n: int, traffic: Traffic, commands: Floats) -> None:
+    """Put cars and obstacles back, and turn the command of car n on the unrolled road into that on the real one."""
+    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
+    watched = watched_car(b, n, traffic)
+    put_back(b, traffic)
     vehicle = drivers.vehicle[b]
     speed, yaw_rate = float(commands[b, n, 0]), float(commands[b, n, 1])
     if speed == 0.0:
         return
-    lane = int(labels.lane[b, n])
+    lane = lane_of(b, n, traffic)
     own = roads.segment[int(roads.seg_off[drivers.net[b]]) + (lane >> 1)]
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
     k, _, left, dx, dy = place(roads.piece, own, lane & 1 != 0, pose.x, pose.y)
@@ -106,16 +170,82 @@ def roll_up(b: int, n: int, traffic: Traffic, commands: Floats) -> None:
     turn = bend * (dx * pose.c + dy * pose.s) / max(1.0 - bend * left, 0.1)
     if abs(turn * speed) > SHARE * vehicle.yaw_most:
         speed *= SHARE * vehicle.yaw_most / abs(turn * speed)
-    commands[b, n, 0] = speed
-    commands[b, n, 1] = min(max(yaw_rate + turn * speed, -vehicle.yaw_most), vehicle.yaw_most)
-    if not is_safe(b, n, pose, Command(commands[b, n, 0], commands[b, n, 1]), traffic):
+    command = Command(speed, min(max(yaw_rate + turn * speed, -vehicle.yaw_most), vehicle.yaw_most))
+    commands[b, n, 0] = command.speed
+    commands[b, n, 1] = command.yaw_rate
+    if not (is_safe(b, n, pose, command, traffic) and keeps_right(b, n, pose, command, watched, traffic)):
         commands[b, n, 0] = 0.0
         commands[b, n, 1] = 0.0 if vehicle.half_length > 0.0 else yaw_rate
 
 
+@jit
+def watched_car(b: int, n: int, traffic: Traffic) -> int:
+    """Return the car that car n has watched for long enough to be sure that it stands, -1 if there is none."""
+    state, drivers = traffic.state, traffic.drivers
+    car, vehicle = drivers.car[b, n], drivers.vehicle[b]
+    if car.watched * vehicle.period >= vehicle.stand_time + vehicle.period:
+        for j in range(state.count[b]):
+            if j != n and state.x[b, j] == car.watch_x and state.y[b, j] == car.watch_y:
+                return j
+    return -1
+
+
+@jit
+def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traffic: Traffic) -> bool:
+    """Tell whether a command leaves the body of car n in its lane, or it overtakes in the next frame for certain.
+
+    As `policies.rules.standing.stays_right` says, on the road as it is; car `watched` (number) is sure to stand. In a
+    disc there is no lane to leave.
+    """
+    state, labels, roads, obstacles = traffic.state, traffic.labels, traffic.roads, traffic.obstacles
+    vehicle, net, lane = traffic.drivers.vehicle[b], traffic.drivers.net[b], int(labels.lane[b, n])
+    bits = np.int64(labels.bits[b, n])
+    if lane < 0 or bits & FLAG.LEFT != 0 or traffic.drivers.car[b, n].violations & VIOLATION.LEFT_SIDE != 0:
+        return True
+    x, y, c, s = advance(pose.x, pose.y, pose.c, pose.s, command.speed, command.yaw_rate, vehicle.period)
+    own, left = lane_coordinates(roads, net, lane, x, y)
+    tx, ty = lane_direction_at(roads, net, lane, x, y)
+    half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    if left + half <= vehicle.over - LINE:
+        return True
+    if bits & FLAG.OVERTAKING == 0:
+        return False
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        part = obstacles.parts[p]
+        key, its = lane_coordinates(roads, net, lane, part.x, part.y)
+        if own - part.reach <= key <= own + part.reach + vehicle.fore and abs(its + vehicle.middle) < (
+            vehicle.middle + part.reach
+        ):
+            return True
+    for j in range(state.count[b]):
+        its_bits = np.int64(labels.bits[b, j])
+        if (
+            j != n
+            and labels.lane[b, j] == lane
+            and its_bits & (FLAG.APPROACH | FLAG.STOPPED) == FLAG.APPROACH
+        ):
+            return False
+    if watched < 0 or labels.bits[b, watched] & FLAG.STANDS == 0:
+        return False
+    x, y = state.x[b, watched], state.y[b, watched]
+    key, its = lane_coordinates(roads, net, lane, x, y)
+    tx, ty = lane_direction_at(roads, net, lane, x, y)
+    half = half_extent(
+        tx,
+        ty,
+        state.c[b, watched],
+        state.s[b, watched],
+        vehicle.half_length,
+        vehicle.half_width,
+        vehicle.rounding,
+    )
+    there = own - vehicle.behind + SURE < key < own + vehicle.fore - SURE
+    return there and narrows(its - half, its + half, 2.0 * vehicle.middle, vehicle.needed)
+
+
 @jit_inline
 def is_safe(b: int, n: int, pose: Pose, command: Command, traffic: Traffic) -> bool:
-    """Tell whether a command can't bring about a contact with another car, whatever that does in this tick."""
+    """Tell whether a command can't bring about a contact, whatever other cars do in this tick."""
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     travel = vehicle.fastest * vehicle.period
     if vehicle.half_length > 0.0:
@@ -124,7 +254,7 @@ def is_safe(b: int, n: int, pose: Pose, command: Command, traffic: Traffic) -> b
         other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         if j != n and may_meet(pose, command, vehicle, other, travel):
             return False
-    return True
+    return not may_hit(b, pose, command, vehicle, traffic.obstacles, NEAR, 0.0)
 
 
 @jit_inline
@@ -144,20 +274,9 @@ def place(
     The lane is one of the segment `own` (row), from its second to its first end if `back` (flag).
     """
     k, _ = nearest_piece(pieces, own, x, y)
-    at = pieces[k]
-    if at.side == 0.0:
-        rx, ry = x - at.x, y - at.y
-        along = rx * at.tx + ry * at.ty
-        left = at.tx * ry - at.ty * rx
-        dx, dy = at.tx, at.ty
-    else:
-        ox, oy = x - at.cx, y - at.cy
-        far = max(sqrt(ox * ox + oy * oy), 1e-300)
-        along = at.radius * angle(max(ox * at.tx + oy * at.ty, 0.0), at.side * (ox * at.ty - oy * at.tx))
-        left = at.side * (at.radius - far)
-        dx, dy = -at.side * oy / far, at.side * ox / far
+    along, left, dx, dy = piece_foot(pieces[k], x, y)
     if back:
-        return k, at.length - along, -left, -dx, -dy
+        return k, pieces[k].length - along, -left, -dx, -dy
     return k, along, left, dx, dy
 
 

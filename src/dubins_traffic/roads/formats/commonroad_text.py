@@ -9,16 +9,14 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.hints import hints_text
+from dubins_traffic.roads.formats.turns import STOP_BEFORE, turn
 from dubins_traffic.roads.formats.xml_text import document, number_text
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.polylines import offset
 
 STOP_SIGN = "R1-3"
 """STOP_4_WAY among the signs of the USA."""
-STOP_BEFORE = 1.0
-"""Metres from a junction to the lines where one stops: its radius R."""
-TURN = pi / 4
-"""Roads that go on within this angle go straight on."""
+SUCCESSORS = {"right": "successorsRight", "straight": "successorsStraight", "left": "successorsLeft"}
 
 
 class _Ids:
@@ -131,18 +129,10 @@ def _intersection(root: Element, ids: _Ids, arms: list[Arm]) -> None:
     for road, back, bearing in arms:
         incoming = SubElement(element, "incoming", id=ids.new())
         SubElement(incoming, "incomingLanelet", ref=_Ids.lanelet(road, not back))
-        ways: dict[str, list[str]] = {"successorsRight": [], "successorsStraight": [], "successorsLeft": []}
+        ways: dict[str, list[str]] = {where: [] for where in SUCCESSORS}
         for other, way_back, out in arms:
             if other != road:
-                turn = (out - bearing - pi + pi) % (2.0 * pi) - pi
-                tag = (
-                    "successorsStraight"
-                    if abs(turn) < TURN
-                    else "successorsLeft"
-                    if turn > 0
-                    else "successorsRight"
-                )
-                ways[tag].append(_Ids.lanelet(other, way_back))
-        for tag, names in ways.items():
-            for name in names:
+                ways[turn(bearing + pi, out)].append(_Ids.lanelet(other, way_back))
+        for where, tag in SUCCESSORS.items():
+            for name in ways[where]:
                 SubElement(incoming, tag, ref=name)

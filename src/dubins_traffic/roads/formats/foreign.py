@@ -32,10 +32,15 @@ class ForeignFormat(ABC):
         return self.reduced(text, file).document
 
     def reduced(
-        self, text: str, file: str | None = None, settings: ImportSettings | None = None
+        self,
+        text: str,
+        file: str | None = None,
+        settings: ImportSettings | None = None,
+        *,
+        own_lanes: bool = False,
     ) -> Reduction:
-        """Return the network to which a text is reduced, and what was lost."""
-        return reduction(self.read_map(text, file), settings, file)
+        """Return the network to which a text is reduced, and what was lost; see `roads.maps.reduction.reduction`."""
+        return reduction(self.read_map(text, file), settings, file, own_lanes=own_lanes)
 
 
 class WrittenFormat(ForeignFormat):

@@ -8,6 +8,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.hints import hints_text
+from dubins_traffic.roads.formats.turns import STOP_BEFORE
 from dubins_traffic.roads.formats.xml_text import document, number_text
 from dubins_traffic.roads.maps.mercator import to_degrees, to_metres
 from dubins_traffic.roads.maps.model import Road, RoadMap
@@ -15,8 +16,6 @@ from dubins_traffic.roads.maps.polylines import offset
 
 ORIGIN = 49.0, 9.0
 """Latitude and longitude of the origin of a map, on the middle meridian of its zone of UTM."""
-STOP_BEFORE = 1.0
-"""Metres from a junction to the lines where one stops: its radius R."""
 
 
 def write_lanelet2(made: RoadMap) -> str:

@@ -14,16 +14,19 @@ from dubins_traffic.roads.formats.hints import with_hints
 from dubins_traffic.roads.formats.opendrive_text import write_opendrive
 from dubins_traffic.roads.formats.xml_text import Reader, parse, place, root_name
 from dubins_traffic.roads.maps.geometry import Placed, clothoid, cubic, cubic_over, straight
-from dubins_traffic.roads.maps.junctions import End, Union, joined_where_equal, junctions_of
+from dubins_traffic.roads.maps.junctions import End, joined_where_equal, junctions_of
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.pairing import OneWay, paired
-from dubins_traffic.roads.maps.polylines import cleaned
+from dubins_traffic.roads.maps.polylines import along, cleaned
+from dubins_traffic.roads.maps.union import Union
 
 LANE_WIDTH = 3.5
 """Width of a lane that gives none."""
 FOR_CARS = frozenset({"driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "bidirectional"})
 LONGEST = 1e6
 """Metres of one piece."""
+WIDEST_GAP = 1.0
+"""Metres between the end of a piece and the beginning of the next: they meet, but for what rounding leaves."""
 
 
 class OpenDrive(WrittenFormat):
@@ -65,9 +68,9 @@ class OpenDrive(WrittenFormat):
 
 def _joined(
     reader: Reader, elements: Mapping[str, Element], outer: Mapping[str, Element], lines: Mapping[str, Floats]
-) -> Union:
+) -> Union[End]:
     """Return which ends of roads outside junctions belong together: by their links, or since they are at one point."""
-    union = Union()
+    union = Union[End]()
     at: dict[str, list[End]] = {}
     for name, each in outer.items():
         for tag, begins in (("predecessor", True), ("successor", False)):
@@ -94,11 +97,41 @@ def _line(reader: Reader, road: Element) -> Floats:
     geometry = road.findall("planView/geometry")
     if not geometry:
         raise reader.fault("has no line", road, None, "<planView> with a <geometry>")
-    parts = [_piece(reader, each) for each in sorted(geometry, key=lambda each: reader.number(each, "s"))]
-    line = cleaned(np.concatenate(parts))
+    line = _shifted(reader, road, cleaned(np.concatenate(_pieces(reader, geometry))))
     if float(np.abs(line - line[0]).max()) < 1e-9:
         raise reader.fault("has no length", road, road.get("length"), "a line longer than nothing")
     return line
+
+
+def _pieces(reader: Reader, geometry: list[Element]) -> list[Floats]:
+    """Return points along the pieces of a reference line, in their order; each begins where the one before ends."""
+    geometry = sorted(geometry, key=lambda each: reader.number(each, "s"))
+    found = [_piece(reader, each) for each in geometry]
+    for each, before, after in zip(geometry[1:], found[:-1], found[1:], strict=True):
+        gap = float(np.hypot(*(after[0] - before[-1])))
+        if gap > WIDEST_GAP:
+            expected = f"one that begins within {WIDEST_GAP:g} m of there"
+            raise reader.fault("not where the piece before ends", each, f"{gap:.3g} m away", expected)
+    return found
+
+
+def _shifted(reader: Reader, road: Element, line: Floats) -> Floats:
+    """Return a reference line moved to the left by the lane offset, so that it runs between the two directions."""
+    rows = road.findall("lanes/laneOffset")
+    if not rows:
+        return line
+    begins = np.array([reader.number(each, "s") for each in rows])
+    cubics = np.array([_coefficients(reader, each, "abcd", "") for each in rows])
+    s = along(line)
+    place = np.searchsorted(begins, s + 1e-9, side="right") - 1
+    past = s - begins[place]
+    a, b, c, d = cubics[place].T
+    left = np.where(place >= 0, a + past * (b + past * (c + past * d)), 0.0)
+    step = np.diff(line, axis=0)
+    unit = step / np.maximum(np.sqrt((step * step).sum(axis=1)), 1e-300)[:, None]
+    both = np.concatenate([unit[:1], unit[:-1] + unit[1:], unit[-1:]])
+    both /= np.maximum(np.sqrt((both * both).sum(axis=1)), 1e-300)[:, None]
+    return line + left[:, None] * np.stack([-both[:, 1], both[:, 0]], axis=-1)
 
 
 def _piece(reader: Reader, geometry: Element) -> Floats:
@@ -144,10 +177,13 @@ def _coefficients(reader: Reader, shape: Element, names: str, suffix: str) -> Fl
 
 
 def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:
-    """Return the lanes for cars along a road and against it, and their width; the first section counts."""
-    section = road.find("lanes/laneSection")
-    if section is None:
+    """Return the lanes for cars along a road and against it, and their width; the longest section counts."""
+    sections = road.findall("lanes/laneSection")
+    if not sections:
         raise InputError("has no lanes", file=reader.file, field=place(road), expected="a <laneSection>")
+    begins = [reader.number(each, "s", 0.0) for each in sections]
+    lengths = np.diff([*begins, max(reader.number(road, "length", 0.0), begins[-1])])
+    section = sections[int(np.argmax(lengths))]
     sides = [
         [lane for lane in section.findall(f"{side}/lane") if lane.get("type") in FOR_CARS]
         for side in ("right", "left")

@@ -16,6 +16,7 @@ from typing import Any, Protocol, cast, runtime_checkable
 
 from dubins_traffic import outside
 from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.files import GZIP
 from dubins_traffic.outside import Seam
 from dubins_traffic.roads.formats.rnd_text import may_be
 
@@ -151,8 +152,11 @@ def is_map(text: str) -> bool:
 
 
 def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps | None:
-    """Return the format that writes files called so, that with the longest suffix; None if there is none."""
-    name = Path(path).name.lower()
+    """Return the format that writes files called so, that with the longest suffix; None if there is none.
+
+    What ends in ``.gz`` is a file of what stands before that, packed.
+    """
+    name = Path(path).name.lower().removesuffix(GZIP)
     forms = chain([] if further is None else [further], registered())
     found = [(form, suffix) for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes]
     fitting = [(form, suffix) for form, suffix in found if name.endswith(suffix)]

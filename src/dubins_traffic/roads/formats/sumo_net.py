@@ -10,13 +10,13 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.hints import hints_text
+from dubins_traffic.roads.formats.turns import turn
 from dubins_traffic.roads.formats.xml_text import document, number_text
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.polylines import offset, true_length
 
 SPEED = 1.0
-TURN = pi / 4
-"""Roads that go on within this angle go straight on."""
+DIRECTIONS = {"straight": "s", "left": "l", "right": "r"}
 
 
 class Lane(NamedTuple):
@@ -41,9 +41,14 @@ def write_net(made: RoadMap) -> str:
         lanes += _lanes(number, road)
         _edge(root, lanes[-2], road, road.line)
         _edge(root, lanes[-1], road, road.line[::-1])
-    links = {name: _links(name, lanes) for name in made.junctions}
+    out: dict[str, list[Lane]] = {name: [] for name in made.junctions}
+    into: dict[str, list[Lane]] = {name: [] for name in made.junctions}
+    for lane in lanes:
+        out[lane.first].append(lane)
+        into[lane.last].append(lane)
+    links = {name: _links(into[name], out[name]) for name in made.junctions}
     for name in made.junctions:
-        _junction(root, name, made, [lane for lane in lanes if lane.last == name], links[name])
+        _junction(root, name, made, into[name], links[name])
     for name, own in links.items():
         _connections(root, own, made.junctions[name].all_way_stop)
     return document(root, hints_text(made, [road.name for road in made.roads]))
@@ -75,10 +80,8 @@ def shape_text(line: Floats) -> str:
     return " ".join(f"{number_text(float(x))},{number_text(float(y))}" for x, y in line)
 
 
-def _links(name: str, lanes: list[Lane]) -> list[tuple[Lane, Lane]]:
+def _links(into: list[Lane], out: list[Lane]) -> list[tuple[Lane, Lane]]:
     """Return the pairs of lanes into and out of a junction; turning round only at a dead end."""
-    out = [lane for lane in lanes if lane.first == name]
-    into = [lane for lane in lanes if lane.last == name]
     return [(a, b) for a in into for b in out if b.road != a.road or len(out) == 1]
 
 
@@ -105,7 +108,5 @@ def _connections(root: Element, links: list[tuple[Lane, Lane]], stop: bool) -> N
         element = SubElement(
             root, "connection", {"from": a.edge, "to": b.edge, "fromLane": "0", "toLane": "0"}
         )
-        turn = (b.out - a.into + pi) % (2.0 * pi) - pi
-        way = "t" if a.road == b.road else "s" if abs(turn) < TURN else "l" if turn > 0.0 else "r"
-        element.set("dir", way)
+        element.set("dir", "t" if a.road == b.road else DIRECTIONS[turn(a.into, b.out)])
         element.set("state", "w" if stop else "M")

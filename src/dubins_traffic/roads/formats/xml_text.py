@@ -15,6 +15,8 @@ MOST_SIGNS = 1 << 27
 MOST_ELEMENTS = 3_000_000
 DEEPEST = 64
 LONGEST_NUMBER = 64
+LARGEST_NUMBER = 1e100
+"""Largest number: squares and products of some such are numbers, too."""
 _BEFORE_ROOT = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->", re.DOTALL)
 _NAME = re.compile(r"<([A-Za-z_][\w.-]*)")
 
@@ -127,7 +129,7 @@ class Reader:
         return self.parsed(self.text(element, name), f"{place(element)}.{name}")
 
     def parsed(self, text: str, field: str) -> float:
-        """Return the finite number that a text is."""
+        """Return the number that a text is."""
         try:
             number = float(text) if len(text) <= LONGEST_NUMBER else math.nan
         except ValueError:
@@ -136,6 +138,9 @@ class Reader:
             raise InputError(
                 "not a number", file=self.file, field=field, value=text, expected="a finite number"
             )
+        if abs(number) > LARGEST_NUMBER:
+            expected = f"at most {LARGEST_NUMBER:g} in size"
+            raise InputError("too large", file=self.file, field=field, value=text, expected=expected)
         return number
 
     def child(self, element: Element, tag: str) -> Element:

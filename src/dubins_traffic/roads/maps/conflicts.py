@@ -13,6 +13,9 @@ from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.roads.maps.settings import Room
 from dubins_traffic.roads.maps.strands import Strand
 
+_RUN = 256
+"""Points of a line that are compared with others at once."""
+
 
 def conflicts(
     strands: Sequence[Strand],
@@ -74,6 +77,15 @@ def on_itself(line: Floats, room: Room) -> bool:
     """Tell whether a line comes too near itself: nearer than two roads may be, farther along than a half turn."""
     points = dense(line, 0.3 * room.roads)
     where = along(points)
-    step = points[:, None, :] - points[None]
-    near = (step * step).sum(axis=2) < room.roads * room.roads
-    return bool((near & (np.abs(where[:, None] - where) > room.half_turn)).any())
+    runs = [slice(k, k + _RUN) for k in range(0, len(points), _RUN)]
+    low = np.array([points[run].min(axis=0) for run in runs]) - room.roads
+    high = np.array([points[run].max(axis=0) for run in runs])
+    for k, run in enumerate(runs):
+        meets = ((low[k:] <= high[k]) & (low[k] <= high[k:])).all(axis=1)
+        for other in np.flatnonzero(meets).tolist():
+            rest = runs[k + other]
+            step = points[run][:, None, :] - points[rest][None]
+            near = (step * step).sum(axis=2) < room.roads * room.roads
+            if (near & (np.abs(where[run][:, None] - where[rest][None]) > room.half_turn)).any():
+                return True
+    return False

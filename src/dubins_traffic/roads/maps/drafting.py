@@ -11,11 +11,12 @@ import numpy as np
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.arms import spread
 from dubins_traffic.roads.maps.conflicts import conflicts
+from dubins_traffic.roads.maps.contracting import Contraction
 from dubins_traffic.roads.maps.fitting import Aim, Fit, Limits, fit, line_of
 from dubins_traffic.roads.maps.model import Junction, RoadMap
 from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.roads.maps.settings import ImportSettings
-from dubins_traffic.roads.maps.strands import Strand, cut, moved, strands_of
+from dubins_traffic.roads.maps.strands import Strand, cut, strands_of
 from dubins_traffic.roads.room import LARGEST_DEGREE
 
 Drops = dict[int, Reason]
@@ -80,32 +81,9 @@ class Drafter:
 
     def _contract(self, draft: Draft) -> Drops:
         """Draw the ends of strands that are too short together; return those with which that can't be done."""
-        least = 2.0 * self._limits.straight
-        while True:
-            ends = draft.ends()
-            short = [s for s, strand in enumerate(draft.strands) if strand.length < least]
-            drops: Drops = {}
-            for s in sorted(short, key=lambda each: draft.strands[each].length):
-                strand = draft.strands[s]
-                degrees = len(ends[strand.first]), len(ends[strand.last])
-                inner = min(degrees) > 1 and strand.first != strand.last
-                if not inner or sum(degrees) - 2 > LARGEST_DEGREE:
-                    drops[s] = Reason.LENGTH
-            if drops or not short:
-                return drops
-            self._merge(draft, min(short, key=lambda each: draft.strands[each].length))
-
-    def _merge(self, draft: Draft, s: int) -> None:
-        """Replace a strand and both its ends by one junction in its middle."""
-        gone = draft.strands.pop(s)
-        a, b = draft.junctions[gone.first], draft.junctions[gone.last]
-        place = 0.5 * (a.x + b.x), 0.5 * (a.y + b.y)
-        name = f"{gone.first}+{gone.last}"
-        draft.junctions[name] = Junction(*place, a.all_way_stop and b.all_way_stop)
-        for end in (gone.first, gone.last):
-            for k in range(len(draft.strands)):
-                while end in (draft.strands[k].first, draft.strands[k].last):
-                    draft.strands[k] = moved(draft.strands[k], end, name, place)
+        found = Contraction(draft.strands, draft.junctions, 2.0 * self._limits.straight)
+        draft.strands = found.strands
+        return dict.fromkeys(found.stuck, Reason.LENGTH)
 
     def _crowded(self, draft: Draft) -> Drops:
         """Return the fifth roads of junctions, and roads at junctions that are too near each other."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Junction
+from dubins_traffic.roads.maps.union import Union
 
 SAME = 1e-6
 """Ends nearer than this are one point."""
@@ -28,27 +29,7 @@ class End(NamedTuple):
         return f"{self.road}{'<' if self.begins else '>'}"
 
 
-class Union:
-    """Ends that belong together."""
-
-    def __init__(self) -> None:
-        self._parent: dict[End, End] = {}
-
-    def root(self, end: End) -> End:
-        """Return the end that stands for all that belong together with one."""
-        while self._parent.setdefault(end, end) != end:
-            self._parent[end] = self._parent[self._parent[end]]
-            end = self._parent[end]
-        return end
-
-    def join(self, ends: Iterable[End]) -> None:
-        """Let ends belong together."""
-        roots = [self.root(end) for end in ends]
-        for root in roots[1:]:
-            self._parent[self.root(root)] = self.root(roots[0])
-
-
-def joined_where_equal(union: Union, lines: Mapping[str, Floats]) -> None:
+def joined_where_equal(union: Union[End], lines: Mapping[str, Floats]) -> None:
     """Join the ends of lines that are at one point."""
     near: dict[tuple[int, int], list[tuple[End, Floats]]] = {}
     for name, line in lines.items():
@@ -62,7 +43,7 @@ def joined_where_equal(union: Union, lines: Mapping[str, Floats]) -> None:
 
 
 def junctions_of(
-    union: Union, lines: Mapping[str, Floats], stops: Iterable[End] = ()
+    union: Union[End], lines: Mapping[str, Floats], stops: Iterable[End] = ()
 ) -> tuple[dict[str, Junction], dict[End, str]]:
     """Return the junctions of the ends of lines, and the name of that at each end; at `stops` everybody stops."""
     groups: dict[End, list[End]] = {}

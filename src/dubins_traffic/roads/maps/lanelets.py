@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.junctions import End, Union, joined_where_equal, junctions_of
+from dubins_traffic.roads.maps.junctions import End, joined_where_equal, junctions_of
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.polylines import along, at, cleaned, dense, to_segments
+from dubins_traffic.roads.maps.union import Union
 
 LONGEST_LINK = 60.0
 """A lanelet between two others that is longer than this is a road, not a way through a junction, metres."""
@@ -52,7 +53,7 @@ def lanelet_map(lanelets: Mapping[str, Lanelet]) -> RoadMap:
         ends[name] = End(name, True), End(name, False)
         if back is not None:
             ends[back] = End(name, False), End(name, True)
-    union = Union()
+    union = Union[End]()
     _join(union, lanelets, ends)
     joined_where_equal(union, lines)
     stops = [ends[name][1] for name, lanelet in lanelets.items() if lanelet.stops and name in ends]
@@ -94,7 +95,7 @@ def _roads(lanelets: Mapping[str, Lanelet]) -> dict[str, str | None]:
     return found
 
 
-def _join(union: Union, lanelets: Mapping[str, Lanelet], ends: Mapping[str, tuple[End, End]]) -> None:
+def _join(union: Union[End], lanelets: Mapping[str, Lanelet], ends: Mapping[str, tuple[End, End]]) -> None:
     """Join where one road ends with where the next begins, directly or by lanelets through a junction."""
     for name, (_, end) in ends.items():
         waiting = list(_inner(lanelets, name))

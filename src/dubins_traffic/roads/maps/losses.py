@@ -13,6 +13,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Road
 from dubins_traffic.roads.maps.polylines import dense, to_segments
 from dubins_traffic.roads.maps.reasons import Reason
+from dubins_traffic.roads.maps.settings import W
 
 
 class Outcome(NamedTuple):
@@ -68,12 +69,18 @@ class Losses:
         Metres of the network in one of the map.
     segments : int
         Segments of the network.
+    w : float
+        Half the width of the network's lanes, metres of it.
+    network : tuple of array (N, 2)
+        Lines of its segments, metres of the map.
     """
 
     fates: tuple[Fate, ...]
     tolerance: float
     scale: float
     segments: int
+    w: float = W
+    network: tuple[Floats, ...] = ()
 
     @property
     def plain_length(self) -> float:
@@ -107,6 +114,7 @@ class Losses:
             "scale": self.scale,
             "tolerance": self.tolerance,
             "segments": self.segments,
+            "w": self.w,
             "one_plus_one": {"length": round(self.plain_length, 3), "kept_share": round(self.kept_share, 6)},
             "table": [
                 {"fate": fate, "reason": reason, "roads": number, "length": round(metres, 3)}
@@ -130,7 +138,7 @@ class Losses:
             f"{self.segments} segments of {len(self.fates)} roads, 1 m of the map is {self.scale:.6g} m; of "
             f"{self.plain_length:.0f} m with one lane in each direction {100.0 * self.kept_share:.1f} % kept "
             f"within {self.tolerance:g} m"
-        )
+        ) + ("" if self.w == W else f"; lanes of 2w, w = {self.w:.6g} m")
         rows = [("", "roads", "metres", "why"), *((a, str(n), f"{m:.0f}", b) for a, b, n, m in self.rows())]
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
         table = [
@@ -143,9 +151,13 @@ class Losses:
 FATES = ("kept", "altered", "dropped")
 
 
-def losses(outcomes: Sequence[Outcome], tolerance: float, scale: float, segments: int) -> Losses:
+def losses(
+    outcomes: Sequence[Outcome], tolerance: float, scale: float, segments: int, w: float = W
+) -> Losses:
     """Return what became of roads."""
-    return Losses(tuple(_fate(each, tolerance) for each in outcomes), tolerance, scale, segments)
+    fates = tuple(_fate(each, tolerance) for each in outcomes)
+    lines = {id(line): line for each in outcomes for line in each.lines}
+    return Losses(fates, tolerance, scale, segments, w, tuple(lines.values()))
 
 
 def _fate(outcome: Outcome, tolerance: float) -> Fate:

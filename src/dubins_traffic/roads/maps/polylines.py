@@ -6,10 +6,13 @@ from math import acos, ceil, sqrt
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.maps.model import Corner
 
-_LARGEST_BLOCK = 1 << 20
+_FEW = 1 << 13
+"""So many pairs of points and sides are measured at once, all of them."""
+_RUN = 64
+"""Points that are measured together otherwise."""
 
 
 def along(line: Floats) -> Floats:
@@ -68,18 +71,44 @@ def simplified(line: Floats, tolerance: float) -> Floats:
 
 def to_segments(points: Floats, line: Floats) -> Floats:
     """Return the distance of each of some points (N, 2) to a polyline (M, 2)."""
+    return nearest(points, line)[0]
+
+
+def nearest(points: Floats, line: Floats) -> tuple[Floats, Ints]:
+    """Return the distance of each of some points (N, 2) to a polyline (M, 2), and the number of its nearest side.
+
+    Points are best in the order of a line: those that follow each other are measured together, to the sides alone
+    that can be nearest to one of them.
+    """
     a, step = line[:-1], np.diff(line, axis=0)
     square = np.maximum((step * step).sum(axis=1), 1e-300)
-    block = max(1, _LARGEST_BLOCK // max(1, len(a)))
-    found = [_nearest(points[k : k + block], a, step, square) for k in range(0, len(points), block)]
-    return np.concatenate(found) if found else np.empty(0)
+    away, side = np.empty(len(points)), np.empty(len(points), dtype=np.int64)
+    few = len(points) * len(a) <= _FEW
+    count = max(1, len(points)) if few else _RUN
+    for k in range(0, len(points), count):
+        run = points[k : k + count]
+        near = np.arange(len(a)) if few else _reachable(run, a, step, square)
+        gap = _gaps(run, a[near], step[near], square[near])
+        least = np.argmin(gap, axis=1)
+        side[k : k + len(run)] = near[least]
+        away[k : k + len(run)] = np.sqrt(gap[np.arange(len(run)), least])
+    return away, side
 
 
-def _nearest(points: Floats, a: Floats, step: Floats, square: Floats) -> Floats:
+def _gaps(points: Floats, a: Floats, step: Floats, square: Floats) -> Floats:
+    """Return the squared distances (N, M) of points to sides that begin at `a`."""
     away = points[:, None, :] - a[None]
     share = np.clip((away * step).sum(axis=2) / square, 0.0, 1.0)
     gap = away - share[..., None] * step
-    return np.sqrt((gap * gap).sum(axis=2).min(axis=1))
+    return (gap * gap).sum(axis=2)
+
+
+def _reachable(points: Floats, a: Floats, step: Floats, square: Floats) -> Ints:
+    """Return the sides that can be nearest to one of some points, seen from their middle."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    reach = float(np.sqrt(((points - middle) ** 2).sum(axis=1)).max())
+    away = np.sqrt(_gaps(middle[None], a, step, square)[0])
+    return np.flatnonzero(away <= (float(away.min()) + 2.0 * reach) * (1.0 + 1e-9) + 1e-9)
 
 
 def turns(polygon: Floats) -> Floats:
@@ -96,14 +125,14 @@ def rounded(start: Floats, corners: tuple[Corner, ...], end: Floats, sagitta: fl
     polygon = np.array([start, *((x, y) for x, y, _ in corners), end])
     parts = [polygon[:1]]
     for k, (_, _, radius) in enumerate(corners):
-        parts.append(_arc(polygon[k], polygon[k + 1], polygon[k + 2], radius, sagitta))
+        parts.append(arc(polygon[k], polygon[k + 1], polygon[k + 2], radius, sagitta))
     return np.concatenate([*parts, polygon[-1:]])
 
 
-def _arc(before: Floats, corner: Floats, after: Floats, radius: float, sagitta: float) -> Floats:
+def arc(before: Floats, corner: Floats, after: Floats, radius: float, sagitta: float) -> Floats:
     """Return points on the arc that rounds a corner, its ends among them."""
     first, second = before - corner, after - corner
-    first, second = first / np.hypot(*first), second / np.hypot(*second)
+    first, second = (leg / max(float(np.hypot(*leg)), 1e-300) for leg in (first, second))
     tangent = float(turns(np.stack([before, corner, after]))[0]) * radius
     middle = first + second
     size = float(np.hypot(*middle))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.choosing import chosen
+from dubins_traffic.roads.maps.choosing import Chooser
 from dubins_traffic.roads.maps.drafting import Draft, Drafter
 from dubins_traffic.roads.maps.fitting import line_of
 from dubins_traffic.roads.maps.losses import Losses, Outcome, losses
@@ -16,7 +16,10 @@ from dubins_traffic.roads.maps.ours import network_document
 from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.roads.maps.settings import ImportSettings
 
-MOST_ROUNDS = 300
+MOST_WORK = 300
+"""Most drafts of the whole map, or so many times as many of a small part of it."""
+LONGEST_ROAD, LONGEST_MAP = 1e5, 1e6
+"""Most metres of a road, and of all roads of a map."""
 WIDTH_PLAY = 0.01
 """A lane is of another width if it differs by more than this share."""
 
@@ -37,7 +40,11 @@ class Reduction(NamedTuple):
 
 
 def reduction(
-    road_map: RoadMap, settings: ImportSettings | None = None, file: str | None = None
+    road_map: RoadMap,
+    settings: ImportSettings | None = None,
+    file: str | None = None,
+    *,
+    own_lanes: bool = False,
 ) -> Reduction:
     """Return the road network that holds as much of a map as it can.
 
@@ -49,29 +56,47 @@ def reduction(
         Scale, tolerance and what the network must keep.
     file : str, optional
         For messages.
+    own_lanes : bool
+        Whether `w` is half the usual lane of the map at the scale, instead of that of `settings`.
 
     Raises
     ------
     InputError
-        If nothing of the map can be held.
+        If the map is larger than that of a town, or nothing of it can be held.
     """
     settings = settings or ImportSettings()
     if settings.scale is None and (document := network_document(road_map)) is not None:
         outcomes = [Outcome(road, (road.line,), ()) for road in road_map.roads]
-        return Reduction(document, losses(outcomes, settings.tolerance, 1.0, len(outcomes)))
+        return Reduction(document, losses(outcomes, settings.tolerance, 1.0, len(outcomes), settings.w))
+    _check_length(road_map.roads, file)
     width = usual_width(road_map.roads)
+    if own_lanes:
+        settings = settings.with_lanes(width)
     scale = settings.scale if settings.scale is not None else 2.0 * settings.w / width
-    drafter = Drafter(road_map, settings, scale)
+    chooser, drafter = Chooser(road_map.roads), Drafter(road_map, settings, scale)
     dropped: dict[int, Reason] = {}
-    for _ in range(MOST_ROUNDS):
-        numbers = chosen(road_map.roads, dropped)
-        if not numbers:
-            break
+    work = MOST_WORK * len(road_map.roads)
+    while work > 0 and (numbers := chooser.chosen()):
         draft = drafter.draft(numbers)
         if not draft.gone:
             return _made(road_map, draft, dropped, settings, scale, width)
         dropped |= draft.gone
+        chooser.drop(draft.gone)
+        work -= len(numbers)
     raise InputError("nothing of the map can be held", file=file, expected="roads that a network can hold")
+
+
+def _check_length(roads: Sequence[Road], file: str | None) -> None:
+    """Raise InputError if roads are longer than those of any town."""
+    lengths = [road.length for road in roads]
+    longest = max(lengths)
+    if longest > LONGEST_ROAD:
+        field = f"road {roads[lengths.index(longest)].name}"
+        expected = f"at most {LONGEST_ROAD:g} m"
+        raise InputError("too long", file=file, field=field, value=round(longest), expected=expected)
+    if sum(lengths) > LONGEST_MAP:
+        expected = f"at most {LONGEST_MAP:g} m of roads"
+        raise InputError("too large a map", file=file, value=round(sum(lengths)), expected=expected)
 
 
 def usual_width(roads: Sequence[Road]) -> float:
@@ -101,7 +126,8 @@ def _made(
         Outcome(road, tuple(lines.get(number, ())), _reasons(road, number, dropped, width, number in lines))
         for number, road in enumerate(road_map.roads)
     ]
-    return Reduction(_document(draft, scale), losses(outcomes, settings.tolerance, scale, len(draft.strands)))
+    lost = losses(outcomes, settings.tolerance, scale, len(draft.strands), settings.w)
+    return Reduction(_document(draft, scale), lost)
 
 
 def _reasons(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, isfinite, pi
 from typing import NamedTuple
 
@@ -12,6 +12,8 @@ from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, c
 
 SPARE = 1e-3
 """What is made is larger than what is demanded by this share."""
+W = 0.3
+"""Half the width of a lane of networks that do not say another, metres."""
 HALF_TURN = 9.0
 """Points of a road this many w apart along it are apart like those of two roads."""
 LEAST_BEND = 3.0
@@ -51,7 +53,7 @@ class ImportSettings:
         How far a road may be from that of the map where it counts as kept, metres of the map.
     """
 
-    w: float = 0.3
+    w: float = W
     radius: float | None = None
     reach: float = 0.177
     slack: float = SEGMENT_SLACK
@@ -69,6 +71,14 @@ class ImportSettings:
         if self.scale is not None:
             self._check("scale", self.scale, 1e-6, 1e6)
         self._check("radius", self.disc, LEAST_RADIUS * self.w - 1e-9, 1e4)
+
+    def with_lanes(self, width: float) -> ImportSettings:
+        """Return the same with half the width of a lane of the map (metres of it) as `w`, at the scale.
+
+        Reach and slack grow with `w`: at bends wider roads need more room beside intersections.
+        """
+        w = 0.5 * width * (1.0 if self.scale is None else self.scale)
+        return replace(self, w=w, reach=self.reach * w / self.w, slack=self.slack * w / self.w)
 
     def _check(self, name: str, value: float, low: float, high: float) -> None:
         if not (isfinite(value) and low <= value <= high):

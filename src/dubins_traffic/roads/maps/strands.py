@@ -38,11 +38,7 @@ class Strand:
 def strands_of(
     roads: Sequence[Road], numbers: Iterable[int], junctions: Mapping[str, Junction]
 ) -> list[Strand]:
-    """Return the strands of some roads: joined where only two meet, without loops and twins.
-
-    A strand that would end where it begins is cut in three, and the longer of two between the same junctions in two:
-    bends are put in where the road is straightest.
-    """
+    """Return the strands of some roads: two that meet alone at a junction become one."""
     rows: dict[int, Strand] = {}
     meet: dict[str, list[int]] = {}
     for key, number in enumerate(numbers):
@@ -68,18 +64,17 @@ def _join(rows: dict[int, Strand], meet: dict[str, list[int]], name: str, one: i
     head, tail = rows[one].end_at(name), rows[other].end_at(name).backward()
     line = np.concatenate([head.line, tail.line[1:]])
     rows[one] = Strand(head.roads + tail.roads, head.first, tail.last, line)
-    del rows[other], meet_of(meet, name)[:]
+    del rows[other]
+    meet[name].clear()
     keys = meet[tail.last]
     keys[keys.index(other)] = one
 
 
-def meet_of(meet: dict[str, list[int]], name: str) -> list[int]:
-    """Return the strands that meet at a junction."""
-    return meet[name]
-
-
 def cut(strands: list[Strand], straight: float) -> tuple[list[Strand], dict[str, Junction]]:
     """Return strands without loops and twins, and the junctions that were put in.
+
+    A strand that ends where it begins is cut in three, the longer of two between the same junctions in two, where it is
+    straightest. What is too short for that is left out.
 
     Parameters
     ----------
@@ -100,10 +95,12 @@ def cut(strands: list[Strand], straight: float) -> tuple[list[Strand], dict[str,
 
 
 def _split(strand: Strand, parts: int, straight: float, added: dict[str, Junction]) -> list[Strand]:
-    """Return a strand in parts of about equal length."""
+    """Return a strand in parts of about equal length; none if they are too short."""
+    if parts == 1:
+        return [strand]
     length = strand.length
-    if parts == 1 or length < 2.0 * parts * straight:
-        return [] if parts > 1 else [strand]
+    if length < 2.0 * parts * straight:
+        return []
     cuts = [0.0]
     names = [strand.first]
     for k in range(1, parts):

@@ -1,1 +1,1 @@
-"""Gazebo: the same trials on wheels, with inertia and contact, behind the same protocol."""
+"""The simulator `gazebo`: the same trials with wheels, inertia and contact forces, behind the same protocol."""

@@ -21,12 +21,12 @@ PLUGIN: Final = "libdubins_traffic_world.so"
 CONFINEMENT: Final = "libdubins_traffic_confine.so"
 OPTIONS: Final = ("-std=c++17", "-O1", "-fPIC", "-shared", "-w", f"-DDUBINS_TRAFFIC_PROTOCOL={PROTOCOL}")
 LIMIT: Final = 300.0
-"""Seconds after which a compiler is given up."""
+"""Seconds after which a compiler is ended."""
 
 
 @cache
 def folder_name() -> str:
-    """Return the name of the folder that holds what was built of these sources."""
+    """Return the name of the folder for the libraries built from these sources."""
     digest = hashlib.sha256(" ".join(OPTIONS).encode())
     for source in (WORLD, CONFINE):
         digest.update(source.read_bytes())

@@ -1,4 +1,4 @@
-"""From contacts of the physics to those of the record: one for each time that two bodies meet."""
+"""Turns contacts of the physics engine into those of records: one each time that two bodies meet."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 SLOWEST: Final = 0.01
-"""Below this speed, m/s, a body counts as standing: wheels and contacts always shiver a little."""
+"""Speed below which a body counts as standing, m/s: simulated wheels and contacts always move a little."""
 
 
 class Contacts:
-    """Knows which bodies have touched and have not parted since."""
+    """Keeps which bodies have touched and have not parted since."""
 
     def __init__(self, instance: Instance, step: float) -> None:
         problem = instance.problem

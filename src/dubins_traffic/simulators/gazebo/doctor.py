@@ -1,4 +1,4 @@
-"""Looks whether Gazebo can be used, one thing after the other."""
+"""Checks step by step whether Gazebo can be used."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from dubins_traffic.simulators.gazebo.world import world
 STEPS: Final = 200
 SPEED: Final = 0.5
 SLACK: Final = 0.01
-"""How far, metres, the car may be from where it should be after `STEPS` steps of 5 ms at `SPEED` m/s."""
+"""Largest error of the car's position after `STEPS` steps of 5 ms at `SPEED` m/s, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at: whether it is well, and what was seen."""
+    """One check: whether it passed, and what was observed."""
 
     what: str
     well: bool
@@ -35,7 +35,7 @@ class Finding:
 
 
 def examine(folder: Path) -> Iterator[Finding]:
-    """Yield what is found about the installation in `folder`; what follows from a failure is left out."""
+    """Yield the checks of the installation in `folder`; after a failure those that depend on it are left out."""
     try:
         yield Finding("compiler", True, build.compiler())
     except InputError as error:

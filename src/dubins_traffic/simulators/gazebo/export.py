@@ -1,4 +1,4 @@
-"""Road networks as worlds of their own, to look at in Gazebo: what the program genroad made in 2016."""
+"""Writes road networks as worlds for Gazebo, as the program genroad did in 2016."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _grass() -> Element:
 
 
 def outlook(network: RoadNetwork) -> list[Element]:
-    """Return what makes a trial worth looking at: light, roads, and a camera from which all of them are seen."""
+    """Return the elements that make a trial visible: light, roads, and a camera that sees all of them."""
     low, high = network.points.min(axis=0), network.points.max(axis=0)
     x, y = (0.5 * (low + high)).tolist()
     away = 3.0 + 1.2 * float((high - low).max())

@@ -1,4 +1,4 @@
-"""Installs Gazebo into a folder of the user's, and checks it."""
+"""Installs Gazebo into a folder of the user, and checks it."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ OWN: Final = "This machine's own Gazebo is used: {server}\n  only its plugin is 
 
 
 def announcement(folder: Path) -> str:
-    """Return what people should know before `install` begins: how much, how long, under which licences."""
+    """Return the notice before `install` begins: size, time and licences."""
     server = own_server()
     return ANNOUNCEMENT.format(folder=folder) if server is None else OWN.format(server=server, folder=folder)
 
 
 def install(folder: Path, progress: Progress) -> None:
-    """Make the installation in `folder` whole: fetch, unpack, compile, try. Goes on where it stopped before.
+    """Complete the installation in `folder`: fetch, unpack, compile, try. It goes on where it stopped before.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def own_server() -> Path | None:
 
 
 def server_version(server: Path, root: Path | None) -> str:
-    """Return what gzserver says its version is.
+    """Return the version that gzserver reports.
 
     Raises
     ------

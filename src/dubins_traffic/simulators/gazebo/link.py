@@ -25,7 +25,7 @@ CONTACT: Final = 7 + 2 * BODY
 
 
 LINGER: Final = 0.002
-"""Seconds for which an answer is looked for before it is waited for; a tick of a dozen cars takes less."""
+"""Seconds for which the socket is polled before a blocking wait; a tick of a dozen cars takes less."""
 
 
 class Kind(IntEnum):
@@ -41,11 +41,11 @@ class Kind(IntEnum):
 
 
 class LostError(DubinsTrafficError):
-    """The plugin has gone, is silent or answers nonsense."""
+    """The plugin has ended, is silent or answers nonsense."""
 
 
 class Link:
-    """One end of the socket whose other end the plugin holds.
+    """The end of the socket to the plugin that this process holds.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Link:
         self.be_patient(patience)
 
     def be_patient(self, seconds: float) -> None:
-        """Wait that long for each answer from now on."""
+        """Set how long to wait for each answer, seconds."""
         self.patience = seconds
         # The kernel keeps the time: a timeout of Python's own costs further calls for each message.
         limit = struct.pack("ll", int(seconds), int(seconds % 1.0 * 1e6))
@@ -86,7 +86,7 @@ class Link:
             raise LostError(f"its socket is closed ({error.strerror or error})") from None
 
     def ready(self, seconds: float) -> bool:
-        """Whether there is something to receive, or will be within that time."""
+        """Tell whether there is data to receive, or will be within the given time."""
         return bool(select.select([self._line], [], [], seconds)[0])
 
     def receive(self, kind: Kind) -> Floats:
@@ -110,7 +110,7 @@ class Link:
         self._line.close()
 
     def _look(self) -> bytes:
-        """Return what comes soon; to be woken up takes longer than to look. Whoever else wants the core gets it."""
+        """Return data that arrives soon, by polling: faster than being woken up. It yields the processor meanwhile."""
         until = monotonic() + LINGER
         while monotonic() < until:
             with contextlib.suppress(BlockingIOError):

@@ -34,14 +34,14 @@ HEADERS: Final = (
     "libsdformat-dev",
     "uuid-dev",
 )
-"""What the plugin is compiled against; what these depend on is not needed."""
+"""Packages that the plugin is compiled against; their dependencies are not needed."""
 FROM_HOST: Final = ("libc6", "libgcc-s1", "libstdc++6")
-"""Never unpacked: programs run on this machine's own."""
+"""Packages that are never unpacked: programs use this machine's own."""
 WORKERS: Final = 2
 PATIENCE: Final = 0.3
 
 Progress = Callable[[str, float], None]
-"""Is told what is being done and which share of it is done."""
+"""Called with a text on what is being done, and the share of it that is done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class Apt:
         )
 
     def wanted(self) -> list[Package]:
-        """Return what is to be fetched and unpacked, headers last."""
+        """Return the packages to fetch and unpack, headers last."""
         elsewhere = self.home / "none"  # what is here already would be left out
         (elsewhere / "partial").mkdir(parents=True, exist_ok=True)
         run = self._apt("--print-uris", "-qq", "-o", f"Dir::Cache::archives={elsewhere}", "install", *RUN)
@@ -106,7 +106,7 @@ class Apt:
         return [package for package in packages if package.name not in FROM_HOST]
 
     def fetch(self, packages: Sequence[Package], progress: Progress) -> None:
-        """Download what is not here yet.
+        """Download the packages that are missing.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class Apt:
                 progress("unpack", (k + 1) / len(packages))
 
     def left(self, packages: Sequence[Package]) -> list[Package]:
-        """Return those that have not been unpacked yet."""
+        """Return the packages that have not been unpacked yet."""
         return [package for package in packages if not (self.home / "unpacked" / package.file).exists()]
 
     def _command(self, *arguments: str) -> list[str]:

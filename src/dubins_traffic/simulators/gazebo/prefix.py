@@ -1,4 +1,4 @@
-"""Where Gazebo is: a folder of ours, or the machine's own; and what its programs need around them."""
+"""Finds Gazebo, in a folder of this package or on the machine, and the environment that its programs need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COMMAND: Final = "dubins-traffic gazebo install"
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """A Gazebo that can be started: `root` is what was unpacked, or None where the machine's own is used."""
+    """A Gazebo that can be started: `root` is the unpacked installation, or None for the machine's own."""
 
     prefix: Path
     gzserver: Path
@@ -112,7 +112,7 @@ def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
 
 
 def read_manifest(folder: Path) -> Mapping[str, Any] | None:
-    """Return what the last finished installation wrote down, or None."""
+    """Return the marker of the last finished installation, or None."""
     try:
         found: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -122,7 +122,7 @@ def read_manifest(folder: Path) -> Mapping[str, Any] | None:
 
 
 def write_manifest(folder: Path, gzserver: Path, *, own: bool, version: str) -> None:
-    """Write down that the installation is finished."""
+    """Write the marker of a finished installation."""
     manifest = {
         "format": FORMAT,
         "gazebo": version,

@@ -1,4 +1,4 @@
-"""What SDF documents are made of: elements, poses, boxes, spheres, cylinders, colours."""
+"""Elements of SDF documents: poses, boxes, spheres, cylinders, colours."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def cylinder(radius: float, length: float) -> Element:
 
 
 def visual(name: str, where: Element, geometry: Element, colour: Sequence[float]) -> Element:
-    """Return what is seen of a link; `colour` is red, green, blue in [0, 1]."""
+    """Return the visual of a link; `colour` is red, green, blue in [0, 1]."""
     paint = tag("material", *(numbers(kind, *colour, 1.0) for kind in ("ambient", "diffuse")))
     return tag("visual", where, geometry, paint, name=name)
 

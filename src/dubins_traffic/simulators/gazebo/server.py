@@ -1,4 +1,4 @@
-"""One gzserver: started for one world, spoken to over a socket that it inherits, and ended without a trace."""
+"""One gzserver: started for one world, commanded over a socket that it inherits, and ended without leftovers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ GRACE: Final = 1.0
 
 
 class PortTakenError(InputError):
-    """Another program listens on the port that Gazebo's programs find each other by."""
+    """Another program listens on the port by which Gazebo's programs find each other."""
 
 
 class Server:
@@ -218,7 +218,7 @@ def _folder() -> Folder:
 
 
 def _guardian() -> str:
-    """Return the process with which the server shall die, empty where this thread might end before the process."""
+    """Return the process with which the server has to end, empty if this thread might end before the process."""
     return str(os.getpid()) if threading.current_thread() is threading.main_thread() else ""
 
 

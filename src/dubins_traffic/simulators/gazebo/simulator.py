@@ -1,4 +1,4 @@
-"""The simulator `gazebo`: cars on wheels, with inertia and contact, stepped in lockstep."""
+"""The simulator `gazebo`: cars with wheels, inertia and contact forces, stepped in lockstep."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ STEP: Final = 0.005
 
 
 class Gazebo:
-    """Gazebo 11 behind the protocol of simulators, a fresh server for each trial.
+    """Gazebo 11 as a simulator, with a new server for each trial.
 
     Parameters
     ----------

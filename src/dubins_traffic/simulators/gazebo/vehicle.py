@@ -24,7 +24,7 @@ TRACK: Final = 0.23
 GRIP: Final = 10.0
 """Coefficient of friction of a wheel on the ground."""
 TORQUE: Final = 1.6
-"""The most that the motor of a wheel gives, N m."""
+"""Largest torque of the motor of a wheel, N m."""
 BUMPER: Final = 0.02
 """Height at which hulls touch, metres: that of the centre of mass."""
 HEIGHT: Final = 0.12
@@ -34,7 +34,7 @@ STIFFNESS: Final = 1e5
 DAMPING: Final = 1e3
 """Of the tyres, N s/m."""
 LIFT: Final = 0.0005
-"""How far the casters hang above the ground while the car is level, metres: it never rests on four points."""
+"""Gap between casters and ground while the car is level, metres: so it never rests on four points."""
 BEHIND: Final = 0.01
 """How far the centre of mass lies behind the axle, metres."""
 SCRAPE: Final = 0.3
@@ -90,7 +90,7 @@ def model(name: str, start: Pose, body: Body, *, ego: bool) -> Element:
 
 
 def surface(friction: float, mask: int) -> Element:
-    """Return how a collision shape rubs, which others it meets, and, on the ground, how it gives way."""
+    """Return the surface of a collision shape: friction, which shapes it meets, and, on the ground, its stiffness."""
     rubs = tag("friction", tag("ode", tag("mu", friction), tag("mu2", friction)))
     meets = [tag("collide_bitmask", mask)]
     if mask == GROUND:
@@ -120,7 +120,7 @@ def _moments(body: Body) -> tuple[float, float, float]:
 
 
 def _hull(body: Body) -> Element:
-    """Return what collides: a disc is the equator of a sphere, whose contacts the engine finds exactly."""
+    """Return the collision shape: a disc is the equator of a sphere, whose contacts the engine finds exactly."""
     shape = sphere(body.radius) if isinstance(body, Disc) else box(body.length, body.width, 2.0 * BUMPER)
     contacts = tag("max_contacts", 4)
     return tag("collision", pose(0.0, 0.0, BUMPER), contacts, shape, surface(SCRAPE, HULLS), name="hull")

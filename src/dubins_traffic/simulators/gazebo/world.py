@@ -70,7 +70,7 @@ def car_name(n: int) -> str:
 
 
 def physics(step: float) -> Element:
-    """Return the settings of the engine: as fast as can be, `step` seconds an iteration."""
+    """Return the settings of the physics engine: as fast as possible, `step` seconds an iteration."""
     solver = tag("solver", tag("type", "world"))
     engine = tag("ode", solver, tag("constraints", tag("cfm", SOFTNESS)))
     times = (tag("max_step_size", step), tag("real_time_update_rate", 0))

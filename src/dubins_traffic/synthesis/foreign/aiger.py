@@ -13,6 +13,9 @@ from dubins_traffic.synthesis.foreign.machine import Letter, State, damaged
 
 WHAT: Final = "AIGER"
 MOST_VARIABLES: Final = 4_000_000
+"""Most variables of a circuit, and most inputs, latches, outputs and gates."""
+LONGEST_DELTA: Final = 28
+"""Bits of a number of binary AIGER after which there are at most seven more."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +73,11 @@ def read_aiger(data: bytes) -> Circuit:
     """Return the machine in a file; InputError if it is none."""
     head, _, rest = data.partition(b"\n")
     words = head.split()
-    sizes = [int(word) for word in words[1:] if word.isdigit()]
+    sizes = [int(word) for word in words[1:] if word.isdigit() and len(word) < 20]
     if len(sizes) != len(words) - 1 or len(sizes) < 5 or any(sizes[5:]):
         raise damaged(WHAT, "not a header", value=head.decode("latin-1")[:80])
-    if sizes[0] > MOST_VARIABLES:
-        raise damaged(WHAT, "too large a circuit", value=sizes[0])
+    if max(sizes) > MOST_VARIABLES:
+        raise damaged(WHAT, "too large a circuit", value=max(sizes))
     reader = _Reader(rest, sizes, binary=words[0] == b"aig")
     try:
         return reader.circuit()
@@ -144,6 +147,8 @@ class _Reader:
             shift += 7
             if byte < 128:
                 return found
+            if shift > LONGEST_DELTA:
+                raise ValueError("a number of no variable")
 
     def _symbols(self) -> dict[str, str]:
         names: dict[str, str] = {}

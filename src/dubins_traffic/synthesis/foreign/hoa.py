@@ -7,14 +7,30 @@ machine is won. `controllable-AP` is not needed, as propositions are known by th
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from itertools import islice
 from typing import Final
 
 from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, State, damaged
 
 WHAT: Final = "HOA v1 with labels on its edges"
+MOST_NAMES: Final = 1024
+"""Most propositions; a game has some dozens."""
 MOST_CUBES: Final = 4096
-_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|/\*.*?\*/|@[\w-]+|[\w-]+:|\{[^}]*\}|[\w-]+|[\[\]()!&|]', re.DOTALL)
+"""Most cubes of a label."""
+MOST_STEPS: Final = 1 << 24
+"""Most pairs of cubes that are looked at, of all labels together."""
+MOST_LITERALS: Final = 1 << 24
+"""Most literals in the cubes of all edges."""
+DEEPEST: Final = 50
+"""Most brackets and negations of a label around each other."""
+LONGEST: Final = 18
+"""Most digits of a number."""
+_TOKEN = re.compile(
+    r'"(?:[^"\\]|\\(?:.|\Z))*(?:"|\Z)|/\*.*?(?:\*/|\Z)|@[\w-]+|[\w-]+:|\{[^}]*(?:\}|\Z)|[\w-]+|[\[\]()!&|]',
+    re.DOTALL | re.ASCII,
+)
+"""A token; a text, a comment or a set that is not closed reaches to the end, so that each sign is looked at once."""
 _Cube = dict[int, bool]
 
 
@@ -29,53 +45,113 @@ def read_hoa(text: str) -> Explicit:
     body, ended, _ = rest.partition("--END--")
     if not found or not ended:
         raise damaged(WHAT, "--BODY-- or --END-- is missing")
-    names, start = _header(head)
-    edges: dict[State, list[Edge]] = {}
-    state: int | None = None
-    tokens = [token for token in _TOKEN.findall(body) if not token.startswith(("/*", "{", '"'))]
-    place = 0
-    while place < len(tokens):
-        if tokens[place] == "State:":
-            state, place = _number(tokens, place + 1), place + 2
-            edges.setdefault(state, [])
-        elif tokens[place] == "[" and state is not None:
-            label = _Label(tokens, place + 1, len(names))
-            cubes = label.read()
-            target = _number(tokens, label.place)
-            edges[state] += [Edge({names[k]: value for k, value in cube.items()}, target) for cube in cubes]
-            place = label.place + 1
-        else:
-            raise damaged(WHAT, "not an edge with a label", value=tokens[place])
+    names, start = _header(_tokens(head))
+    edges = _Body([token for token in _tokens(body) if not token.startswith(('"', "{"))], names).edges()
     if start not in edges:
         raise damaged(WHAT, "the state in which it starts is missing", value=start)
     return Explicit(edges, start, names)
 
 
-def _header(text: str) -> tuple[list[str], int]:
+def _tokens(text: str) -> list[str]:
+    """Return the tokens of a text without its comments."""
+    return [token for token in _TOKEN.findall(text) if not token.startswith("/*")]
+
+
+def _header(tokens: list[str]) -> tuple[list[str], int]:
     """Return the propositions and the initial state."""
-    start = re.findall(r"^\s*Start:\s*(\d+)\s*$", text, re.MULTILINE)
-    names = re.findall(r"^\s*AP:\s*(\d+)((?:\s+\"[^\"]*\")*)\s*$", text, re.MULTILINE)
+    places = [place for place, token in enumerate(tokens) if token.endswith(":")]
+    items = [
+        (tokens[place], tokens[place + 1 : end])
+        for place, end in zip(places, [*places[1:], len(tokens)], strict=True)
+    ]
+    start = [values for key, values in items if key == "Start:"]
+    names = [values for key, values in items if key == "AP:"]
     if len(start) != 1 or len(names) != 1:
         raise damaged(WHAT, "not one Start: and one AP:")
-    found = re.findall(r'"([^"]*)"', names[0][1])
-    if len(found) != int(names[0][0]):
-        raise damaged(WHAT, "AP: with another number of names", value=names[0][0])
-    return found, int(start[0])
+    if len(start[0]) != 1:
+        raise damaged(WHAT, "not one state in which it starts", value=" ".join(start[0][:8]))
+    count, found = _number(names[0], 0), [name.strip('"') for name in names[0][1:]]
+    if len(found) != count or not all(name.startswith('"') for name in names[0][1:]):
+        raise damaged(WHAT, "AP: with another number of names", value=count)
+    if count > MOST_NAMES:
+        raise damaged(WHAT, f"more than {MOST_NAMES} propositions", value=count)
+    return found, _number(start[0], 0)
 
 
 def _number(tokens: list[str], place: int) -> int:
-    if place >= len(tokens) or not tokens[place].isdigit():
-        raise damaged(WHAT, "no state's number", value=tokens[place] if place < len(tokens) else None)
-    return int(tokens[place])
+    token = tokens[place] if place < len(tokens) else ""
+    if not token.isdigit() or len(token) > LONGEST:
+        raise damaged(WHAT, "no state's number", value=token)
+    return int(token)
+
+
+class _Body:
+    """Reads the states and their edges."""
+
+    def __init__(self, tokens: list[str], names: list[str]) -> None:
+        self._tokens = tokens
+        self._names = names
+        self._work = _Work()
+        self._literals = 0
+
+    def edges(self) -> dict[State, list[Edge]]:
+        """Return the edges of each state."""
+        edges: dict[State, list[Edge]] = {}
+        state: int | None = None
+        place = 0
+        while place < len(self._tokens):
+            if self._tokens[place] == "State:":
+                state, place = _number(self._tokens, place + 1), place + 2
+                edges.setdefault(state, [])
+            elif self._tokens[place] == "[" and state is not None:
+                found, place = self._edges(place + 1)
+                edges[state] += found
+            else:
+                raise damaged(WHAT, "not an edge with a label", value=self._tokens[place])
+        return edges
+
+    def _edges(self, place: int) -> tuple[list[Edge], int]:
+        """Return the edges of the label that begins at a token, and where the next token stands."""
+        label = _Label(self._tokens, place, len(self._names), self._work)
+        cubes = label.read()
+        target = _number(self._tokens, label.place)
+        self._literals += sum(map(len, cubes)) + len(cubes)
+        if self._literals > MOST_LITERALS:
+            raise damaged(WHAT, f"more than {MOST_LITERALS} literals on its edges")
+        names = self._names
+        edges = [Edge({names[k]: value for k, value in cube.items()}, target) for cube in cubes]
+        return edges, label.place + 1
+
+
+class _Work:
+    """Counts the pairs of cubes that have been looked at: short labels may have long products."""
+
+    def __init__(self) -> None:
+        self._steps = 0
+
+    def met(self, cubes: list[_Cube], others: list[_Cube]) -> list[_Cube]:
+        """Return the cubes in which one of each holds."""
+        self._steps += len(cubes) * len(others)
+        if self._steps > MOST_STEPS:
+            raise damaged(WHAT, "labels that take too long", value=f"{self._steps} pairs of cubes")
+        pairs = (
+            cube | other
+            for cube in cubes
+            for other in others
+            if all(cube.get(name, value) == value for name, value in other.items())
+        )
+        return _bounded(list(islice(pairs, MOST_CUBES + 1)))
 
 
 class _Label:
     """Reads a label as cubes: what must hold of some propositions, by their numbers; any of them suffices."""
 
-    def __init__(self, tokens: list[str], place: int, names: int) -> None:
+    def __init__(self, tokens: list[str], place: int, names: int, work: _Work) -> None:
         self.place = place
         self._tokens = tokens
         self._names = names
+        self._work = work
+        self._depth = 0
 
     def read(self) -> list[_Cube]:
         """Return the cubes of a label, up to behind its bracket."""
@@ -100,30 +176,45 @@ class _Label:
         while self._next() == "|":
             self.place += 1
             parts.append(self._both())
-        return lambda wanted: _any(parts, True) if wanted else _all(parts, False)
+        return lambda wanted: _any(parts, True) if wanted else self._all(parts, False)
 
     def _both(self) -> Callable[[bool], list[_Cube]]:
         parts = [self._literal()]
         while self._next() == "&":
             self.place += 1
             parts.append(self._literal())
-        return lambda wanted: _all(parts, True) if wanted else _any(parts, False)
+        return lambda wanted: self._all(parts, True) if wanted else _any(parts, False)
 
     def _literal(self) -> Callable[[bool], list[_Cube]]:
         token = self._next()
         self.place += 1
-        if token == "!":
-            inner = self._literal()
-            return lambda wanted: inner(not wanted)
-        if token == "(":
-            found = self._either()
-            self._take(")")
-            return found
+        if token in ("!", "("):
+            return self._around(token)
         if token in ("t", "f"):
             return lambda wanted: [{}] if wanted == (token == "t") else []
-        if not token.isdigit() or int(token) >= self._names:
+        if not token.isdigit() or len(token) > LONGEST or int(token) >= self._names:
             raise damaged(WHAT, "not a label", value=token)
         return lambda wanted: [{int(token): wanted}]
+
+    def _around(self, token: str) -> Callable[[bool], list[_Cube]]:
+        """Read what stands behind a negation or in brackets."""
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise damaged(WHAT, f"a label nested more than {DEEPEST} deep")
+        if token == "!":
+            inner = self._literal()
+            self._depth -= 1
+            return lambda wanted: inner(not wanted)
+        found = self._either()
+        self._take(")")
+        self._depth -= 1
+        return found
+
+    def _all(self, parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube]:
+        found: list[_Cube] = [{}]
+        for part in parts:
+            found = self._work.met(found, part(wanted))
+        return found
 
 
 def _any(parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube]:
@@ -131,21 +222,7 @@ def _any(parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube
     return _bounded(found)
 
 
-def _all(parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube]:
-    found: list[_Cube] = [{}]
-    for part in parts:
-        found = _bounded(list(_met(found, part(wanted))))
-    return found
-
-
-def _met(cubes: list[_Cube], others: list[_Cube]) -> Iterator[_Cube]:
-    for cube in cubes:
-        for other in others:
-            if all(cube.get(name, value) == value for name, value in other.items()):
-                yield cube | other
-
-
 def _bounded(cubes: list[_Cube]) -> list[_Cube]:
     if len(cubes) > MOST_CUBES:
-        raise damaged(WHAT, "too long a label", value=f"{len(cubes)} cubes")
+        raise damaged(WHAT, "too long a label", value=f"more than {MOST_CUBES} cubes")
     return cubes

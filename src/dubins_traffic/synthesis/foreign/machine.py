@@ -82,7 +82,7 @@ class Explicit:
         return None
 
 
-def damaged(what: str, problem: str, *, value: Any = None, line: int | None = None) -> InputError:
-    """Return the error for a file of a strategy that is not as its format says."""
+def damaged(what: str, problem: str, *, line: int | None = None, **found: Any) -> InputError:
+    """Return the error for a file of a strategy that is not as its format says; `value` is what was found there."""
     where = None if line is None else f"line {line}"
-    return InputError(problem, field=where, value=value, expected=f"a strategy in {what}")
+    return InputError(problem, field=where, expected=f"a strategy in {what}", **found)

@@ -13,8 +13,8 @@ from typing import Any, Final
 from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, State, damaged
 
 WHAT: Final = "slugs' JSON or its explicit text"
-FIRST: Final = "first"
-"""The state before the first letter."""
+FIRST: Final = ("first",)
+"""The state before the first letter, which no node is called."""
 _STATE = re.compile(r"^State (\S+) with rank \S+ -> <([^>]*)>\s*$")
 _FOLLOWING = re.compile(r"^\s*With successors\s*:\s*(.*)$")
 
@@ -27,7 +27,7 @@ def is_slugs_text(text: str) -> bool:
 def read_slugs_json(document: Any) -> Explicit:
     """Return the machine in a JSON object; InputError if it is none."""
     try:
-        names = document["variables"] if "variables" in document else _declared(document)
+        names = [str(name) for name in document.get("variables") or _declared(document)]
         nodes = {
             key: ([bool(bit) for bit in node["state"]], list(node["trans"]))
             for key, node in document["nodes"].items()
@@ -35,7 +35,7 @@ def read_slugs_json(document: Any) -> Explicit:
         initial = [key for key, node in document["nodes"].items() if node.get("initial")]
     except (KeyError, TypeError, AttributeError):
         raise damaged(WHAT, "not an object with variables and nodes") from None
-    return _machine([str(name) for name in names], nodes, initial)
+    return _machine(names, nodes, initial)
 
 
 def _declared(document: Any) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import warnings
 from collections.abc import Iterator
 from typing import Final
 
@@ -19,16 +20,22 @@ def is_tulip(text: str) -> bool:
 def read_tulip(text: str) -> Explicit:
     """Return the machine in a file; nothing of it is run. InputError if it is not as TuLiP writes it."""
     try:
-        (strategy,) = ast.parse(text).body
+        (strategy,) = _parsed(text).body
         assert isinstance(strategy, ast.ClassDef)
         functions = {item.name: item for item in strategy.body if isinstance(item, ast.FunctionDef)}
         first = _initial(functions["__init__"])
         (choice,) = [item for item in functions["move"].body if isinstance(item, ast.If)]
         edges = {state: list(_edges(body)) for state, body in _cases(choice)}
-    except (SyntaxError, ValueError, KeyError, AssertionError, AttributeError, RecursionError):
+    except (SyntaxError, ValueError, KeyError, AssertionError, AttributeError, RecursionError, MemoryError):
         raise damaged(WHAT, "not as tulip.dumpsmach writes it") from None
     names = dict.fromkeys(name for own in edges.values() for edge in own for name in edge.cube)
     return Explicit(edges, first, list(names))
+
+
+def _parsed(text: str) -> ast.Module:
+    """Return the syntax tree of a text, of which Python has nothing to say but whether it is one."""
+    with warnings.catch_warnings(action="ignore"):
+        return ast.parse(text)
 
 
 def _initial(function: ast.FunctionDef) -> State:

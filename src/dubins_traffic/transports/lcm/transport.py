@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.rules.labels import Caption
+from dubins_traffic.transports.joining import closing_if_refused
 from dubins_traffic.transports.lcm import connection, encoding
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     command_t,
@@ -71,11 +72,8 @@ class Lcm:
         self._mailbox = mailbox
         self._lcm = connection.connect(self.url)
         self._open = True
-        try:
+        with closing_if_refused(self.close):
             self._look_for_others()
-        except TransportError:
-            self.close()
-            raise
         self._lcm.subscribe(connection.MODE, self._mode_requested)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:

@@ -87,7 +87,7 @@ class Graph:
         reader.__del__()
 
     def heard(self, writer: Any) -> bool:
-        """Whether somebody reads what is written."""
+        """Tell whether somebody reads what is written."""
         return bool(writer.get_matched_subscriptions())
 
     def put(self, writer: Any, message: Any) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import Ending, Mailbox, View
+from dubins_traffic.transports.joining import closing_if_refused
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
@@ -73,11 +74,8 @@ class Ros2:
         self._mailbox = mailbox
         self._graph = Graph(self.domain, here=self._here)
         self._open = True
-        try:
+        with closing_if_refused(self.close):
             self._look_for_others()
-        except TransportError:
-            self.close()
-            raise
         self._world = World(self._graph, clock=self._clock)
         self._services = MaestroServices(self._graph, mailbox, self._maestro)
 
