@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ import dubins_traffic as dt
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.ros2 import messages as m
+from dubins_traffic.transports.ros2.graph import Graph
 from tests.conformance.transport import frames
 from tests.ros2_client import READY, RESET, RESTART, START, Client, law
 from tests.tools import program
@@ -77,6 +79,32 @@ def reference(config: str, tmp_path: Path) -> tuple[bytes, Any]:
     instance = dt.draw(dt.load_config(config), 1, 0)
     run_trial(instance, Law(), record=tmp_path / "here.mcap")
     return frames(tmp_path / "here.mcap"), instance
+
+
+def test_peers_are_counted_while_others_come_and_go(domain: int) -> None:
+    """Cyclone's list of peers fails when one comes while it is made: some in a thousand counts here."""
+    graph, over = Graph(domain), threading.Event()
+    writer, reader = graph.writer("rt/counted", m.Twist), graph.reader("rt/counted", m.Twist)
+
+    def come_and_go() -> None:
+        others = Graph(domain, here=False)
+        while not over.is_set():
+            there = [others.writer("rt/counted", m.Twist), others.reader("rt/counted", m.Twist)]
+            others.drop(there.pop())
+            there.pop().__del__()
+        others.close()
+
+    thread = threading.Thread(target=come_and_go)
+    thread.start()
+    try:
+        for _ in range(100_000):
+            assert graph.heard(writer)
+            assert graph.writers(reader) >= 1
+    finally:
+        over.set()
+        thread.join()
+        del writer, reader
+        graph.close()
 
 
 def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:

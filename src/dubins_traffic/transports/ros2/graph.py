@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -88,7 +89,11 @@ class Graph:
 
     def heard(self, writer: Any) -> bool:
         """Tell whether somebody reads what is written."""
-        return bool(writer.get_matched_subscriptions())
+        return bool(counted(writer.get_matched_subscriptions))
+
+    def writers(self, reader: Any) -> int:
+        """Count who writes what is read."""
+        return counted(reader.get_matched_publications)
 
     def put(self, writer: Any, message: Any) -> None:
         """Write a message; one that can't be written at once is dropped, since nobody is waited for."""
@@ -112,6 +117,17 @@ class Graph:
         """Leave the domain."""
         self._conditions.clear()
         del self._waitset, self._subscriber, self._publisher, self._participant, self._domain
+
+
+def counted(matched: Callable[[], Sequence[int]]) -> int:
+    """Count the peers that `matched` lists.
+
+    Cyclone asks for their number first, and makes room for so many; who comes between makes its list fail by an
+    IndexError. They are counted again then.
+    """
+    while True:
+        with suppress(IndexError):
+            return len(matched())
 
 
 def quality(*, latched: bool, depth: int) -> Qos:

@@ -125,7 +125,7 @@ class Ros2:
         """Tell the mailbox who has come and gone, as far as DDS knows: of who was killed it knows after seconds."""
         with self._looking:
             for car, reader in self._readers.items():
-                there = len(reader.get_matched_publications())
+                there = self._graph.writers(reader)
                 for _ in range(there, self._there[car]):
                     self._mailbox.left(car)
                 for _ in range(self._there[car], there):
@@ -144,7 +144,7 @@ class Ros2:
         probe = self._graph.reader(INSTANCE, m.ProblemInstanceJSON)
         until = monotonic() + MEET
         while monotonic() < until:
-            if probe.get_matched_publications():
+            if self._graph.writers(probe):
                 raise TransportError(
                     f"another session is running in DDS domain {self.domain}, or was killed some seconds ago: "
                     "end it, or take another --domain"
