@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import select, text
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.settings import Quota
@@ -155,6 +155,34 @@ def test_a_service_that_was_away_ends_no_lease(tmp_path: Path) -> None:
         housekeeping.end_silent(office)
         with office.database.reading() as session:
             assert (session.scalars(select(Chunk.state)).one() == "leased") == left
+    office.close()
+
+
+def test_no_lease_ends_while_writers_find_the_database_away(tmp_path: Path) -> None:
+    """A disk was full between two sweeps: heartbeats failed, but housekeeping, which had nothing to write, did not."""
+    office = Office(tmp_path, clock=lambda: now[0])
+    office.database.migrate()
+    now, tries = [30.0], list[int]()
+    with office.database.writing() as session:
+        phase, people = furnished(session)
+        sent(session, phase, people[0], "x")
+        assert queue.take(session, "w", now[0], 60.0) is not None
+    keeper = housekeeping.Housekeeper(office)
+    keeper.sweep()
+
+    def beat(_session: Session) -> None:
+        tries.append(len(tries))
+        if len(tries) == 1:
+            raise OperationalError("UPDATE chunk", None, Exception("database or disk is full"))
+
+    for away, state in ((True, "leased"), (False, "waiting")):
+        now[0] += 61.0
+        if away:
+            office.database.patiently(beat)
+        keeper.sweep()
+        with office.database.reading() as session:
+            assert session.scalars(select(Chunk.state)).one() == state
+    assert tries == [0, 1]
     office.close()
 
 

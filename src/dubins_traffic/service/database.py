@@ -7,6 +7,7 @@ So what a writer has read is still true when it commits, and one text of the que
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 from collections.abc import Callable, Generator
 from pathlib import Path
@@ -23,6 +24,8 @@ WRITERS_LOCK = 0x64756269
 """Number of the lock that writers hold on PostgreSQL."""
 PATIENCE_S = 60.0
 """How long a writer waits for the database to come back."""
+LONGEST_PAUSE_S = 0.5
+"""How long a writer waits at most until it tries again: well under the shortest lease of use."""
 Found = TypeVar("Found")
 
 
@@ -40,6 +43,7 @@ class Database:
         options: dict[str, Any] = {"connect_args": {"timeout": 30}} if sqlite else {"pool_pre_ping": True}
         self.engine: Engine = create_engine(url, pool_size=16, max_overflow=32, **options)
         self._writes = self.engine.execution_options(writes=True)
+        self._failed = threading.Event()
         if sqlite:
             event.listen(self.engine, "connect", _prepare_sqlite)
             event.listen(self.engine, "begin", _begin_sqlite)
@@ -75,10 +79,18 @@ class Database:
                     return work(session)
             except DBAPIError as error:
                 away = isinstance(error, OperationalError) or error.connection_invalidated
+                if away:
+                    self._failed.set()
                 if not away or time.monotonic() > until:
                     raise
             time.sleep(pause)
-            pause = min(2.0, 2.0 * pause)
+            pause = min(LONGEST_PAUSE_S, 2.0 * pause)
+
+    def was_away(self) -> bool:
+        """Tell whether a patient writer has found the database away since this was asked last."""
+        failed = self._failed.is_set()
+        self._failed.clear()
+        return failed
 
     def migrate(self, revision: str = "head") -> None:
         """Bring the tables to those of this version of the package, whatever version made them."""

@@ -29,7 +29,8 @@ def end_silent(office: Office, *, was_away: bool = False) -> None:
     office : Office
         The service.
     was_away : bool
-        The service or its database was away until now. No worker could renew its lease then, so all leases begin anew.
+        The service or its database was away until now, for some writers at least. Workers could not renew their
+        leases then, so all leases begin anew.
     """
     with office.database.writing() as session:
         if was_away:
@@ -121,12 +122,17 @@ class Housekeeper(threading.Thread):
         super().__init__(name="housekeeper", daemon=True)
         self._office = office
         self._stop_asked = threading.Event()
+        self._looked_after = False
 
     def run(self) -> None:
         """Sweep until told to stop."""
-        here = False
         while not self._stop_asked.wait(PAUSE_S):
-            here = sweep(self._office, was_away=not here)
+            self.sweep()
+
+    def sweep(self) -> None:
+        """Sweep once; leases begin anew if the last sweep, or a writer since then, has found the database away."""
+        was_away = self._office.database.was_away() or not self._looked_after
+        self._looked_after = sweep(self._office, was_away=was_away)
 
     def stop(self) -> None:
         """End the sweeping, and wait for the last."""
