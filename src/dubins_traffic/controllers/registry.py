@@ -21,6 +21,8 @@ COMPILED = "rules"
 SHIELDED = "+shield"
 """Suffix of the name of a controller that drives under the shield (`controllers.shield`); a colon and when the ego may
 overtake may follow it, as in ``lanes+shield:never``."""
+USUAL = "sure"
+"""When a shield overtakes whose name does not say it."""
 _SHIELD = re.compile(re.escape(SHIELDED) + r"(?::(?P<overtakes>\w*))?$")
 
 
@@ -84,9 +86,8 @@ def load(spec: str) -> Controller:
         loaded or constructed (then a `ConstructionError`); or if the object lacks a method of
         `dubins_traffic.protocols.Controller`. Only Ctrl-C passes through.
     """
-    if is_shielded(spec):
-        return under_shield(load(_SHIELD.sub("", spec)), spec)
-    return named.load(spec)
+    found = shield_of(spec)
+    return named.load(spec) if found is None else under_shield(load(found[0]), spec)
 
 
 def is_shielded(spec: str) -> bool:
@@ -95,11 +96,11 @@ def is_shielded(spec: str) -> bool:
 
 
 def shield_of(spec: str) -> tuple[str, str] | None:
-    """Return the name of the controller under the shield, and when that overtakes, "" if it is not said; None if there
-    is no shield.
-    """
+    """Split a name into that of the controller under the shield and when that overtakes; None without a shield."""
     found = _SHIELD.search(spec)
-    return None if found is None else (spec[: found.start()], found["overtakes"] or "")
+    if found is None:
+        return None
+    return spec[: found.start()], USUAL if found["overtakes"] is None else found["overtakes"]
 
 
 def shielded(spec: str) -> str:
@@ -131,15 +132,14 @@ def dressed(spec: str, *, shield: bool = False, sandbox: str | None = None) -> s
 
 
 def under_shield(controller: Controller, spec: str = SHIELDED) -> Controller:
-    """Return `controller` under the shield that the suffix of the name `spec` describes.
+    """Return `controller` under the shield that the suffix of the name `spec` describes, the usual one without any.
 
     Raises
     ------
     InputError
         If there is no such shield.
     """
-    ending = _SHIELD.search(spec)
-    given = None if ending is None else ending["overtakes"]
     from dubins_traffic.controllers.shield import Shield
 
-    return Shield(controller) if given is None else Shield(controller, overtakes=cast("Overtakes", given))
+    _, overtakes = shield_of(spec) or (spec, USUAL)
+    return Shield(controller, overtakes=cast("Overtakes", overtakes))

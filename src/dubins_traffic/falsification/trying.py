@@ -267,7 +267,7 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
 def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
     """Tell whether a name is that of `lanes`, and when its shield overtakes; None without a shield."""
     bare, overtakes = controllers.shield_of(name) or (name, None)
-    return bare == "lanes", None if overtakes is None else check_overtakes(overtakes or "sure")
+    return bare == "lanes", None if overtakes is None else check_overtakes(overtakes)
 
 
 def broken_formulas(score: Score) -> dict[str, float]:

@@ -142,9 +142,8 @@ def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
             barren = 0 if results else barren + len(lost[:1])
         barren = 0
         while suspects and barren < MOST_BARREN:
-            crew.submit(
-                replace(suspects[0], overwrite=True)
-            )  # a record that exists already is one that this job began
+            # a record that exists already is one that this job began
+            crew.submit(replace(suspects[0], overwrite=True))
             results, lost = crew.wait()
             yield from results
             dead += [suspects.popleft()] if lost else []
@@ -223,10 +222,8 @@ def deaf_to_interrupts() -> Generator[None]:
     threads of this process may take a signal in the meantime, so that holding it back in this one is not enough.
     """
     came: list[int] = []
-    heard = (
-        {number: signal.getsignal(number) for number in DEAF_TO} if current_thread() is main_thread() else {}
-    )
-    handlers = {number: handler for number, handler in heard.items() if callable(handler)}
+    mine = DEAF_TO if current_thread() is main_thread() else ()
+    handlers = {number: handler for number in mine if callable(handler := signal.getsignal(number))}
     for number in handlers:
         signal.signal(number, lambda number, _frame: came.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, DEAF_TO)
