@@ -45,7 +45,7 @@ from dubins_traffic.shield.tables import REASONS, egos, shield_tables
 DURATION = 60.0
 SEED = 2016
 TOGETHER = 240
-TRIALS, TRIALS_ON_BENDS = 20000, 2000
+TRIALS, TRIALS_ON_CURVES = 20000, 2000
 BENT = 0.7
 """About this share of the segments bends in the trials on roads that bend."""
 BODIES: tuple[dict[str, Any], ...] = (
@@ -232,8 +232,8 @@ def measured(count: int = TRIALS, jobs: int = 2, first: int = 0, bent: float = 0
 
 def measure() -> list[Row]:
     """Run all trials and return the table of the bars."""
-    on_bends = bars(measured(TRIALS_ON_BENDS, bent=BENT))
-    return bars(measured()) + [replace(row, name=f"on roads that bend: {row.name}") for row in on_bends]
+    on_curves = bars(measured(TRIALS_ON_CURVES, bent=BENT))
+    return bars(measured()) + [replace(row, name=f"on roads that bend: {row.name}") for row in on_curves]
 
 
 def main() -> None:

@@ -332,7 +332,7 @@ class Reference:
         return (min(found), max(found)) if found else None
 
     def outline(self, lane: tuple[int, int], vertices: Any) -> Any:
-        """The outline of an obstacle in coordinates of a lane; on bends by points, cut at the edges of the road."""
+        """The outline of an obstacle in coordinates of a lane; on curves by points, cut at the edges of the road."""
         corners = list(zip(vertices, [*vertices[1:], vertices[0]], strict=True))
         if lane[0] not in self.tracks:
             return [tuple(self.coordinates(lane, *corner) for corner in pair) for pair in corners]

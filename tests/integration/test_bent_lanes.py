@@ -56,20 +56,20 @@ def test_a_path_runs_along_the_middle_of_the_right_lane(network: Any) -> None:
 
 @pytest.mark.parametrize("trial", range(3))
 @pytest.mark.parametrize("network", [RING, SNAKE], ids=["ring", "snake"])
-def test_a_lone_car_keeps_to_the_middle_of_its_lane_round_all_bends(
+def test_a_lone_car_keeps_to_the_middle_of_its_lane_round_all_curves(
     network: Any, trial: int, tmp_path: Path
 ) -> None:
     record = tmp_path / "trial.mcap"
     score = run_trial(_instance(network, trial, duration=90), "lanes", record=record).score
     frames = load_record(record).frames
     tracks = [Track(network, s) for s in range(len(network.segments))]
-    worst, on_bends = 0.0, 0
+    worst, on_curves = 0.0, 0
     for x, y, s in zip(frames.x[:, 0], frames.y[:, 0], frames.segment[:, 0].tolist(), strict=True):
         foot = tracks[s].foot(float(x), float(y))
         if network.bent[s] and 1.7 < foot.along < tracks[s].length - 1.7:
             worst = max(worst, abs(abs(foot.left) - W))
-            on_bends += 1
-    assert on_bends > 150
+            on_curves += 1
+    assert on_curves > 150
     assert worst < 0.06
     assert sum(goal.visits for goal in score.goals) >= 2
     assert score.driven.off_road_s == 0.0
@@ -98,7 +98,7 @@ def test_a_car_on_the_wrong_side_of_a_bend_comes_back_to_its_lane(tmp_path: Path
     assert min(abs(one + W) for one in left[60:150]) < 0.03
 
 
-def test_a_car_that_turns_slowly_slows_in_bends() -> None:
+def test_a_car_that_turns_slowly_slows_in_curves() -> None:
     found = _instance(RING, 1, duration=60)
     clumsy = replace(found.problem, car=Car(bounds=Bounds(speed=0.7, yaw_rate=0.9)))
     score = run_trial(replace(found, problem=clumsy), "lanes").score

@@ -43,10 +43,10 @@ def _along_the_road(seen: Any, track: Track, back: bool) -> Any:
 
 
 @pytest.mark.parametrize("network", [RING, SNAKE], ids=["ring", "snake"])
-def test_what_is_shown_of_lanes_is_measured_along_the_bends(network: Any) -> None:
+def test_what_is_shown_of_lanes_is_measured_along_the_curves(network: Any) -> None:
     tracks = [Track(network, s) for s in range(len(network.segments))]
     env = single(_configured(network), observation="object")
-    on_bends, worst = 0, 0.0
+    on_curves, worst = 0, 0.0
     for seed in range(4):
         seen, info = env.reset(seed=seed)
         observe = FlatObserver(info["trial"].problem)
@@ -65,13 +65,13 @@ def test_what_is_shown_of_lanes_is_measured_along_the_bends(network: Any) -> Non
             end = max(track.length - along, 0.0)
             expected = [left / 0.6, turned.real, turned.imag, along / track.length, 1.0 - 1.0 / (end + 1.0)]
             worst = max(worst, float(np.abs(np.clip(expected, -1.0, 1.0) - shown[1:]).max()))
-            on_bends += bool(network.bent[lane >> 1]) and 1.6 < along < track.length - 1.6
+            on_curves += bool(network.bent[lane >> 1]) and 1.6 < along < track.length - 1.6
             seen = env.step(_along_the_road(seen, track, bool(lane & 1)))[0]
     assert worst < 1e-6
-    assert on_bends > 50
+    assert on_curves > 50
 
 
-def test_the_way_to_a_goal_falls_by_what_is_driven_along_the_bends() -> None:
+def test_the_way_to_a_goal_falls_by_what_is_driven_along_the_curves() -> None:
     env = single(_configured(**{"e-agents": []}), observation="object")
     compared = 0
     for seed in range(6):
@@ -94,7 +94,7 @@ def test_the_way_to_a_goal_falls_by_what_is_driven_along_the_bends() -> None:
     assert compared > 200
 
 
-def test_an_episode_on_bends_is_the_trial_that_it_cites(tmp_path: Path) -> None:
+def test_an_episode_on_curves_is_the_trial_that_it_cites(tmp_path: Path) -> None:
     config = _configured(
         network=RING, **{"e-agents": [{"type": "lawful", "name": "car", "count": 2}], "duration": 8}
     )

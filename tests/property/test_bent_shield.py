@@ -26,19 +26,19 @@ BENT = 0.7
 ROADS = [s for s in range(len(RING.segments)) if RING.bent[s]]
 
 
-def test_no_kind_of_bad_driving_breaks_a_rule_on_bends() -> None:
+def test_no_kind_of_bad_driving_breaks_a_rule_on_curves() -> None:
     found = trials(range(len(KINDS)), 20.0, bent=BENT)
     assert [one for one in found if one.own or one.at_fault or one.end != "duration"] == []
     assert all(any(one.reasons for one in found if one.kind == kind) for kind in ("left", "rams", "runs"))
 
 
-def test_the_shield_leaves_rules_alone_on_bends() -> None:
+def test_the_shield_leaves_rules_alone_on_curves() -> None:
     found = [ruled(number, 15.0, BENT) for number in range(4)]
     assert [one for one in found if one.own or one.reasons] == []
 
 
 @pytest.mark.parametrize("keeps_ego", [True, False])
-def test_no_e_agent_under_a_shield_breaks_e1_or_e2_on_bends(keeps_ego: bool) -> None:
+def test_no_e_agent_under_a_shield_breaks_e1_or_e2_on_curves(keeps_ego: bool) -> None:
     first = 300 + 100 * keeps_ego
     found, reasons = driven([trial(first + k, 15.0, bent=BENT) for k in range(8)], first, keeps_ego)
     assert [one for own in found for one in own if one.rule in KEPT and (keeps_ego or one.car > 0)] == []
@@ -70,7 +70,7 @@ def _instance(road: int, along: float, left: float, heading: float, agents: int)
     st.integers(0, 3),
     st.sampled_from(["sure", "law"]),
 )
-def test_nothing_that_is_asked_breaks_a_rule_on_bends(
+def test_nothing_that_is_asked_breaks_a_rule_on_curves(
     phases: list[Phase], road: int, place: tuple[float, float, float], agents: int, overtakes: Overtakes
 ) -> None:
     instance = _instance(road, *place, agents)

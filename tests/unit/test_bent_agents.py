@@ -75,20 +75,20 @@ def test_places_along_a_bend_are_those_of_the_network(network: Any) -> None:
 @pytest.mark.parametrize("car", [{}, {"bounds": {"turning_radius": 0.3}}], ids=["pivots", "curves"])
 @pytest.mark.parametrize("kind", ["wander", "loop"])
 @pytest.mark.parametrize("network", [RING, SNAKE], ids=["ring", "snake"])
-def test_they_drive_round_bends_on_their_side_of_the_road(
+def test_they_drive_round_curves_on_their_side_of_the_road(
     network: Any, kind: str, car: dict[str, Any], tmp_path: Path
 ) -> None:
     tracks = [Track(network, s) for s in range(len(network.segments))]
-    on_bends, worst = 0, 0.0
+    on_curves, worst = 0, 0.0
     for trial in range(2):
         agents = [{"type": kind, "name": "car", "parameters": {"speed": 0.6}}]
         frames = _driven(_instance(network, agents, 90.0, trial, **({"car": car} if car else {})), tmp_path)
         for k, (s, along, left, way) in enumerate(_off(frames, 1, tracks)):
             ahead = (way.conjugate() * complex(frames.c[k, 1], frames.s[k, 1])).real
             if network.bent[s] and 2.4 < along < tracks[s].length - 2.4 and abs(ahead) > 0.9:
-                on_bends += 1
+                on_curves += 1
                 worst = max(worst, abs(left * ahead / abs(ahead) + RIGHT))
-    assert on_bends > 200
+    assert on_curves > 200
     assert worst < 0.12
 
 
@@ -106,7 +106,7 @@ def test_who_parks_in_a_bend_drives_off_along_it(tmp_path: Path) -> None:
     assert max(abs(left + RIGHT) for _, left in on_road) < 0.12
 
 
-def test_who_follows_comes_after_the_ego_round_bends(tmp_path: Path) -> None:
+def test_who_follows_comes_after_the_ego_round_curves(tmp_path: Path) -> None:
     tracks = [Track(RING, s) for s in range(len(RING.segments))]
     starts: list[Pose] = []
     for along in (2.6, 1.4):

@@ -53,7 +53,7 @@ def _driven(instance: Instance, folder: Path) -> tuple[Frames, Verdict]:
 TIGHT = [
     ([[0, 0, 9, 0, 1.5, 0, 1, 4.5, 2, 1, 7, 0, 1]], "segments[0]", "corner 0: too near to the first end"),
     ([[0, 0, 9, 0, 2.5, 0, 1, 4.5, 2, 1, 7.8, 0, 1]], "segments[0]", "corner 2: too near to the second end"),
-    ([[0, 0, 9, 0, 2.5, 0, 1, 4.5, 2, 0.8, 6.5, 0, 1]], "segments[0]", "corner 1: too sharp a bend"),
+    ([[0, 0, 9, 0, 2.5, 0, 1, 4.5, 2, 0.8, 6.5, 0, 1]], "segments[0]", "corner 1: too sharp a curve"),
     (
         [
             [0, 0, 16, 0, 4, 0, 1, 6, 4, 1, 10, 4, 1, 12, 0, 1],
@@ -102,17 +102,17 @@ def test_cars_start_on_the_right_lane_headed_with_it() -> None:
             assert foot.left * ahead == pytest.approx(-0.3)
 
 
-def test_a_lone_car_follows_the_middle_of_its_lane_round_all_bends(tmp_path: Path) -> None:
+def test_a_lone_car_follows_the_middle_of_its_lane_round_all_curves(tmp_path: Path) -> None:
     frames, verdict = _driven(_instance(cars=0, duration=60), tmp_path)
     tracks = [Track(RING, s) for s in range(len(RING.segments))]
-    worst, round_bends = 0.0, 0
+    worst, round_curves = 0.0, 0
     for x, y, s in zip(frames.x[:, 0], frames.y[:, 0], frames.segment[:, 0].tolist(), strict=True):
         foot = tracks[s].foot(float(x), float(y))
         if RING.bent[s] and 1.6 < foot.along < tracks[s].length - 1.6:
             worst = max(worst, abs(abs(foot.left) - 0.3))
-            round_bends += 1
+            round_curves += 1
     assert verdict.clean
-    assert round_bends > 300
+    assert round_curves > 300
     assert worst < 0.03
 
 

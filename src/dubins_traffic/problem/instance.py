@@ -10,7 +10,7 @@ from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
-from dubins_traffic.problem.bend_preconditions import check_bends
+from dubins_traffic.problem.curve_preconditions import check_curves
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -142,7 +142,7 @@ class Instance(Pictured):
     def __post_init__(self) -> None:
         problem = self.problem
         if not problem.network.is_straight:
-            check_bends(
+            check_curves(
                 problem.network,
                 problem.intersection_radius,
                 problem.car,

@@ -7,8 +7,8 @@ from math import sqrt
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
-from dubins_traffic.roads.bend_clearance import TIGHTEST
 from dubins_traffic.roads.clearance import clearance_faults
+from dubins_traffic.roads.curve_clearance import TIGHTEST
 from dubins_traffic.roads.formats.rnd import Corners
 from dubins_traffic.roads.network import RoadNetwork
 

@@ -1,6 +1,6 @@
 """The segments of a network that bend, as arrays of pieces in the world, and where points lie along them, in NumPy.
 
-`roads.bends` says the same for kernels, bit for bit.
+`roads.curves` says the same for kernels, bit for bit.
 """
 
 from __future__ import annotations

@@ -9,15 +9,15 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.bend_clearance import bend_faults
 from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.chains import Bars
+from dubins_traffic.roads.curve_clearance import curve_faults
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
 
 ROUNDING = 1e-9
 STRAIGHTENED = 1e-3
-"""How far a bend may be from the bars that stand for it where its clearance is measured, metres."""
+"""How far a curve may be from the bars that stand for it where its clearance is measured, metres."""
 
 
 class Tight(NamedTuple):
@@ -133,7 +133,7 @@ def clearance_faults(
         expected = f"at least {LEAST_RADIUS} w = {LEAST_RADIUS * w:.6g} m"
         faults.append(InputError("too small", field="intersection_radius", value=radius, expected=expected))
     if not network.is_straight:
-        faults += bend_faults(network, radius, reach, w, slack)
+        faults += curve_faults(network, radius, reach, w, slack)
         if faults:
             return faults
     if least not in network.known:

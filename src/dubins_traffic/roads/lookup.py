@@ -11,7 +11,7 @@ from math import sqrt
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import record
-from dubins_traffic.roads.bends import bent_coordinates, bent_direction, bent_distance2, nearest_piece
+from dubins_traffic.roads.curves import bent_coordinates, bent_direction, bent_distance2, nearest_piece
 from dubins_traffic.roads.road_raster import CELL
 from dubins_traffic.roads.table import RoadTable
 

@@ -12,7 +12,7 @@ from dubins_traffic.roads.network import RoadNetwork
 
 HINT_SPACING = 4.0
 SAGITTA = 0.005
-"""How far what is drawn may be from a bend, metres."""
+"""How far what is drawn may be from a curve, metres."""
 
 
 class Extent(NamedTuple):
@@ -35,7 +35,7 @@ class Extent(NamedTuple):
 
 
 def road_lines(network: RoadNetwork) -> Floats:
-    """Return lines that stand for the segments, (K, 2, 2) metres: one for each that is straight, chords of bends."""
+    """Return lines that stand for the segments, (K, 2, 2) metres: one for each that is straight, chords of curves."""
     _, start, end = network.surface.bars(SAGITTA)
     return np.stack([start, end], axis=1)
 
@@ -59,7 +59,7 @@ def centre_lines(network: RoadNetwork, half_width: float) -> Floats:
 
 
 def centre_paths(network: RoadNetwork, half_width: float) -> list[Floats]:
-    """Return `centre_lines` with the chords of a bend as one line (N, 2), along which strokes go on evenly."""
+    """Return `centre_lines` with the chords of a curve as one line (N, 2), along which strokes go on evenly."""
     lines = centre_lines(network, half_width)
     cuts = np.flatnonzero((lines[1:, 0] != lines[:-1, 1]).any(axis=1)) + 1
     return [np.concatenate([run[:1, 0], run[:, 1]]) for run in np.split(lines, cuts)]

@@ -104,7 +104,7 @@ def decide_trial(
             commands[b, n, 0] = 0.0
             commands[b, n, 1] = 0.0
             continue
-        unrolled = bends and unroll_bend(b, n, tick, sight2, traffic)
+        unrolled = bends and unroll_curve(b, n, tick, sight2, traffic)
         if unrolled:
             company = COMPANY.UNROLLED
         if company >= COMPANY.CROWDED or not repeat_command(b, n, tick, kind, company, traffic, commands):
@@ -116,7 +116,7 @@ def decide_trial(
 
 
 @jit_rare
-def unroll_bend(b: int, n: int, tick: int, sight2: float, traffic: Traffic) -> bool:
+def unroll_curve(b: int, n: int, tick: int, sight2: float, traffic: Traffic) -> bool:
     """Unroll the road of a car if it bends between it and the end of its lane; tell whether it does.
 
     A car in a disc may have come to the lane out in this tick; then that lane counts. `sight2` (m^2) is the square of

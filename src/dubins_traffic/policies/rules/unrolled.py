@@ -21,7 +21,7 @@ from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.standing import LINE, SURE
 from dubins_traffic.policies.rules.tables import VIOLATION, Traffic
 from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
-from dubins_traffic.roads.bends import bent_distance2, nearest_piece, piece_foot
+from dubins_traffic.roads.curves import bent_distance2, nearest_piece, piece_foot
 from dubins_traffic.roads.lookup import (
     bends_before,
     lane_coordinates,

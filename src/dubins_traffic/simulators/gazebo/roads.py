@@ -20,7 +20,7 @@ MARKER: Final = 0.12
 """Width of the marker between the lanes, metres."""
 THICKNESS: Final = 0.002
 SAGITTA: Final = 0.02
-"""Largest distance of the shown chords from a bend, metres."""
+"""Largest distance of the shown chords from a curve, metres."""
 SURFACE_COLOUR: Final = (0.25, 0.25, 0.27)
 MARKER_COLOUR: Final = (0.9, 0.8, 0.2)
 

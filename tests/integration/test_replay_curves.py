@@ -13,7 +13,7 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.record.reader import read
 from dubins_traffic.roads.network import RoadNetwork
 from tests.browser import browsing, need_browser
-from tests.integration.test_gazebo_bends import CONFIGURATION
+from tests.integration.test_gazebo_curves import CONFIGURATION
 from tests.pages import press
 
 COLOURS = """

@@ -10,13 +10,13 @@ from dubins_traffic.roads.clearance import SEGMENT_SLACK, clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 
 
-def check_bends(
+def check_curves(
     network: RoadNetwork,
     radius: float,
     car: Car,
     rules: Mapping[str, Any],
 ) -> None:
-    """Refuse a network with a bend that is too tight for its roads.
+    """Refuse a network with a curve that is too tight, or too near to other roads.
 
     Raises
     ------

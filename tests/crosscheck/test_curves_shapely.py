@@ -46,7 +46,7 @@ def look_up(t, net, p, s, left, d2, on):
 
 
 @pytest.mark.parametrize("block", range(5))
-def test_places_on_bends_agree_with_shapely(block: int) -> None:
+def test_places_on_curves_agree_with_shapely(block: int) -> None:
     networks = [_chain(number) for number in range(block * CHAINS // 5, (block + 1) * CHAINS // 5)]
     table = pack(networks, [WIDE] * len(networks))
     for net, network in enumerate(networks):

@@ -20,7 +20,7 @@ FAR_ALONG = 9.0
 ROUNDING = 1e-9
 
 
-def bend_faults(
+def curve_faults(
     network: RoadNetwork, radius: float, reach: float, w: float, slack: float
 ) -> list[InputError]:
     """Return where segments that bend are not straight near their ends, too sharp, or too close to others.
@@ -39,10 +39,10 @@ def bend_faults(
                 expected = f"a straight road for at least {straight:.6g} m from there"
                 faults.append(_fault(problem, s, float(chains.length[k]), expected))
         for corner, (_, _, given) in enumerate(network.corners[s]):
-            bend = given * network.length
-            if bend < TIGHTEST * w - ROUNDING:
+            own_radius = given * network.length
+            if own_radius < TIGHTEST * w - ROUNDING:
                 expected = f"a radius of at least {TIGHTEST:g} w = {TIGHTEST * w:.6g} m"
-                faults.append(_fault(f"corner {corner}: too sharp a bend", s, bend, expected))
+                faults.append(_fault(f"corner {corner}: too sharp a curve", s, own_radius, expected))
     return faults or _overlaps(network, straight, 4.0 * w + reach, w)
 
 
