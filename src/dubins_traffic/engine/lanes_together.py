@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 
+STAND = (0.0, 0.0)
+"""The command of an ego whose trial has ended."""
+
+
 class LanesTogether:
     """The trials of one group, and who drives their egos.
 
@@ -61,22 +65,35 @@ class LanesTogether:
         """Take all trials that have not ended to their next frame."""
         group = self.group
         now: list[int] = group.ticks.tolist()
-        bare = self._shields is None
-        active: list[int] = group.active.tolist()
-        for b in active:
-            lanes, radius = self._seats[b]
-            self._guard.tick = now[b]
-            try:
-                with self._guard:
-                    command = lanes.act_in(b, now[b], radius, group.state)
-                group.commands[b, EGO] = checked_command(command, now[b]) if bare else command
-            except ControllerError as error:
-                self._end(b, error)
+        driven: list[int] = group.active.tolist()
+        commands = [self._command(b, now[b]) for b in driven]
+        if driven:
+            group.commands[driven, EGO] = commands
         if self._shields is not None:
             self._ticks[:] = -1
             self._ticks[group.active] = group.ticks[group.active]
             self._shields.filter(self._ticks, group.commands)
         group.advance()
+
+    def _command(self, b: int, tick: int) -> tuple[float, float]:
+        """Return the command of the ego of trial b; a fault ends the trial.
+
+        The guard, whose `with` takes as long as some commands, is entered only when something has been raised.
+        """
+        lanes, radius = self._seats[b]
+        try:
+            command = lanes.act_in(b, tick, radius, self.group.state)
+            return command if self._shields is not None else checked_command(command, tick)
+        except ControllerError as error:
+            self._end(b, error)
+        except Exception:
+            self._guard.tick = tick
+            try:
+                with self._guard:
+                    raise
+            except ControllerError as error:
+                self._end(b, error)
+        return STAND
 
     def _end(self, b: int, error: ControllerError) -> None:
         self.group.end(b, End(error.reason), error.detail)

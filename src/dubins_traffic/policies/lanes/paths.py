@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
@@ -141,9 +142,9 @@ class PathMaker:
             rows += self._turn_rows(lane, turn)
             begin = turn.after
         path = table(PathRow, len(rows))
-        for k, values in enumerate(rows):
-            for name, value in values.items():
-                setattr(path[k], name, value)
+        for name in dict.fromkeys(chain.from_iterable(rows)):
+            usual = path[name].tolist()
+            path[name] = [values.get(name, own) for values, own in zip(rows, usual, strict=True)]
         self._bound(path)
         return Path(path, loop_row)
 
