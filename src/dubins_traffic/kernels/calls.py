@@ -35,7 +35,7 @@ def bound(kernel: Callable[P, R]) -> Callable[P, R]:
 
 
 class Bound(Generic[R]):
-    """Calls that look only at arguments that are others than before, and are interpreted until there is machine code.
+    """A kernel that is called again and again: it looks at an argument only if that is another object than last time.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Bound(Generic[R]):
         self._call: Callable[..., R] | None = None
 
     def __call__(self, *args: Any) -> R:
-        """Run the kernel."""
+        """Run the kernel, interpreted until there is machine code."""
         call = self._call or self._find(args)
         if call is None:
             return self._kernel.interpreted(*args)

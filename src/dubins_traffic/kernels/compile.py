@@ -69,7 +69,7 @@ def jit_inline(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def jit_look(function: Callable[P, bool]) -> Callable[P, bool]:
-    """Compile as `jit_inline` does a look into a cache, which tells whether what is kept holds, and may always say no.
+    """Compile as `jit_inline` does a function that tells whether a cached value still holds; it may always say no.
 
     With `CACHES` set to ``off`` it always does, and kernels run interpreted: the same bits come out.
     """

@@ -271,7 +271,7 @@ class Link:
         return min(period, max(0.0, (now - self._sent) * period / wall))
 
     def _settle(self) -> None:
-        """Let further answers to what has been shown more than once arrive, where they say not what they answer."""
+        """Let surplus answers to a frame that was shown twice arrive, where answers do not name their frame."""
         self._repeated = False
         if self.clock.lockstep and not self.transport.tagged:
             self._wait(lambda: False, monotonic() + self._patience.settle, None, still=True)

@@ -8,7 +8,7 @@ from dubins_traffic.cars.state import Labels, State
 
 
 def kept(state: State, labels: Labels) -> tuple[State, Labels]:
-    """Return copies of what is its makers' own and changes with the next tick."""
+    """Return copies of arrays that belong to others and change with the next tick."""
     return State(*(column.copy() for column in state)), Labels(*(row.copy() for row in labels))
 
 
