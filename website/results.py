@@ -29,8 +29,9 @@ This page shows how every built-in controller does, with and without the [shield
 
 In the tables of controllers the best one stands first. Numbers in brackets are 95 % intervals. *Counted rounds* are
 rounds through all goals in [trials that are clean](scores.md#what-ranks-controllers); *satisfied*, *violated*,
-*excused* and *unfinished* are [verdicts](verdicts.md). A trial *came to nothing* if it could not be drawn or
-scored, or killed its process. Times are of a wall clock, and depend on the machine; all other numbers are the same
+*excused* and *unfinished* are [verdicts](verdicts.md). The controller *ended* a trial if it raised, gave up, fell
+silent or overran a limit; such a trial is never clean. A trial *came to nothing* if it could not be drawn or scored,
+or killed its process. Times are of a wall clock, and depend on the machine; all other numbers are the same
 wherever the suite is run.
 
 `make results` makes the files. The controller `keyboard` is not here, since it needs a person, and `synthesized` is

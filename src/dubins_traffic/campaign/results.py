@@ -13,6 +13,7 @@ from dubins_traffic.campaign import manifest, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.display import pandas
 from dubins_traffic.errors import InputError
+from dubins_traffic.scoring.score import outcome
 from dubins_traffic.viewer.notebook import shares_html
 
 
@@ -44,7 +45,7 @@ class CampaignResults:
         shares = {name: Counter[str]() for name in self.campaign.controllers}
         columns = (self.table[name].to_pylist() for name in ("controller", "verdict", "end"))
         for controller, verdict, end in zip(*columns, strict=True):
-            shares[controller][verdict or end] += 1
+            shares[controller][outcome(verdict, end)] += 1
         return shares_html("Campaign", f"{self.folder}: {self._trials_text()}", shares)
 
     def asdict(self) -> dict[str, list[Any]]:

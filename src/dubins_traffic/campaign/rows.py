@@ -21,6 +21,8 @@ FAILED = "failed"
 """End of a trial that could not be run or scored; its reason tells the error."""
 CRASHED = "crashed"
 """End of a trial that ends its process whenever it is run."""
+NOTHING = frozenset({FAILED, CRASHED})
+"""Ends of trials that came to nothing."""
 LONGEST_REASON = 500
 COMPRESSION = "zstd"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from enum import Enum
 from pathlib import Path
@@ -16,6 +17,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.metric import Column
+from dubins_traffic.scoring.notice import fault_notice
 
 RESULTS = "results.parquet"
 WALL = "wall.parquet"
@@ -91,16 +93,17 @@ def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = K
         raise InputError(f"can't be read ({error})", file=str(whole)) from None
 
 
-def faulty(folder: Path) -> tuple[int, str]:
-    """Return how many trials of a finished campaign failed or ended by a fault, and the first of them."""
+def faulty(folder: Path) -> str:
+    """Return the notice that trials of a finished campaign failed or ended by a fault; empty if none did."""
     made = rows.arrow()
     compute: Any = made.compute
     found = made.parquet.read_table(folder / RESULTS, columns=["number", "controller", "end", "reason"])
-    bad = found.filter(compute.is_in(found["end"], made.array(sorted(FAULTS | {rows.FAILED, rows.CRASHED}))))
+    bad = found.filter(compute.is_in(found["end"], made.array(sorted(FAULTS | rows.NOTHING))))
     if not len(bad):
-        return 0, ""
+        return ""
     first = bad.slice(0, 1).to_pylist()[0]
-    return len(bad), f"trial {first['number']} with {first['controller']}: {first['end']}: {first['reason']}"
+    told = f"trial {first['number']} with {first['controller']}: {first['end']}: {first['reason']}"
+    return fault_notice(Counter(bad["end"].to_pylist()), len(found), told)
 
 
 def assumption(folder: Path) -> tuple[int, int]:

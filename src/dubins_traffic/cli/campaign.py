@@ -111,10 +111,7 @@ def _conclude(ran: Ran) -> None:
     notice = assumption_notice(*assumption(ran.folder))
     if notice:
         faults.tell(notice)
-    count, first = faulty(ran.folder)
-    if count:
-        faults.tell(f"{count} of {ran.campaign.total} trials ended by a fault; the first: {first}")
-        raise typer.Exit(faults.FAILED)
+    faults.fail_if(faulty(ran.folder))
 
 
 @campaign.command("report", epilog=REPORT_EXAMPLES)

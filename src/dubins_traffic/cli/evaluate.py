@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -79,6 +80,7 @@ def evaluate(
     from dubins_traffic.competition.contents import EVALUATIONS, check_apart
     from dubins_traffic.competition.submission import check_submission
     from dubins_traffic.competition.visibility import summary
+    from dubins_traffic.scoring.notice import fault_notice
 
     own = _competition(competition).phase(phase)
     base = Path(output or EVALUATIONS)
@@ -100,8 +102,9 @@ def evaluate(
         print(json_text.dumps({**done.to_json(), "summary": summary(own, done.results)}, indent=2))
     else:
         _show(done, own, folder)
-    if any(result.owner is not None for result in done.results):
-        raise typer.Exit(faults.FAILED)
+    bad = [own for own in done.results if own.owner is not None]
+    first = f"trial {bad[0].number}: {bad[0].end}: {bad[0].row['reason'] or ''}" if bad else ""
+    faults.fail_if(fault_notice(Counter(own.end for own in bad), len(done.results), first))
 
 
 def _competition(place: str) -> Competition:
@@ -136,7 +139,6 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
     console.print(table)
     faulty = [own for own in done.results if own.owner is not None]
     if faulty:
-        console.print(f"trial {faulty[0].number} ended by {faulty[0].end}: {faulty[0].row['reason'] or ''}")
         console.print(tail(faulty[0].log, phase.model.log_lines))
     means = summary(phase, done.results) or {"trials": 0}
     told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")

@@ -70,6 +70,13 @@ def tell_failed(trials: Iterable[tuple[Instance, Ending]]) -> bool:
     return not failed
 
 
+def fail_if(notice: str) -> None:
+    """Tell of trials that ended by a fault, and end the command with status 1; an empty `notice`: there are none."""
+    if notice:
+        tell(notice)
+        raise typer.Exit(FAILED)
+
+
 def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:
     """Return the exit status where something wanted the program to end, as libraries do whose output nobody reads.
 

@@ -140,6 +140,8 @@ def run(
     seconds: SecondsOption = 600.0,
 ) -> None:
     """Run a suite, or what is left of it; write a file of results to send, and a page. What is finished is kept."""
+    from dubins_traffic.campaign import table
+    from dubins_traffic.suites import cases
     from dubins_traffic.suites.comparing import open_sources
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
@@ -155,6 +157,10 @@ def run(
     report = Path(folder) / "report"
     print(write_results(found, open_sources([str(path)]), report), end="")
     options.tell(str(path), str(report / PAGE))
+    if found.model.cases is not None:
+        faults.fail_if(cases.faulty(Path(folder), found))
+    elif found.model.campaign is not None:
+        faults.fail_if(table.faulty(Path(folder)))
 
 
 def _check_options(

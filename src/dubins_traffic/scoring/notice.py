@@ -1,6 +1,8 @@
-"""The notice that most verdicts of some trials mean little, since e-agents broke the assumption."""
+"""What is said once of many trials: that e-agents broke the assumption in most, and that some ended by a fault."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 
 def assumption_notice(broken: int, judged: int) -> str:
@@ -16,3 +18,21 @@ def assumption_notice(broken: int, judged: int) -> str:
     trials = "trial" if judged == 1 else "trials"
     verdicts = "this verdict says" if judged == 1 else "these verdicts say"
     return f"the assumption was broken in {broken} of {judged} {trials}: {verdicts} little"
+
+
+def fault_notice(ends: Mapping[str, int], trials: int, first: str) -> str:
+    """Return the notice that trials ended by a fault (`record.sink.FAULTS`) or came to nothing; empty if none did.
+
+    Parameters
+    ----------
+    ends
+        How many trials ended so, by each end.
+    trials
+        Number of all trials.
+    first
+        Which trial was the first of them, its end and the reason.
+    """
+    if not ends:
+        return ""
+    each = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
+    return f"{sum(ends.values())} of {trials} trials ended by a fault ({each}); the first: {first}"

@@ -14,7 +14,7 @@ from dubins_traffic.display import Pictured, Tabulated, count
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.reader import Record
-from dubins_traffic.record.sink import Ending
+from dubins_traffic.record.sink import BY_CONTROLLER, Ending
 from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
@@ -30,7 +30,7 @@ from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.metric import Measured, MetricSpec
 from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.verdict import Verdict
+from dubins_traffic.scoring.verdict import Ruling, Verdict
 
 _BLOCK = 512
 
@@ -111,6 +111,11 @@ class Score(Tabulated):
             parts.append(self.verdict.verdict.value)
         parts += [count(self.rounds, "round"), count(len(self.collisions), "collision")]
         return ", ".join(parts)
+
+    @property
+    def outcome(self) -> str:
+        """The verdict in a word; the end if the trial is not judged, or its controller ended it before a breach."""
+        return outcome(None if self.verdict is None else self.verdict.verdict, self.end)
 
     def asdict(self) -> dict[str, Any]:
         """Return the score as `to_json` does."""
@@ -262,10 +267,7 @@ class ScoreSheet(Pictured, Tabulated):
     @property
     def summary(self) -> str:
         """The scores in a few words: their number, and the number of each verdict, or, unjudged, of each end."""
-        found = Counter(
-            (own.end or "cut off") if own.verdict is None else own.verdict.verdict.value
-            for own in self.trials
-        )
+        found = Counter(own.outcome for own in self.trials)
         return ", ".join(
             [count(len(self.trials), "trial"), *(f"{n} {name}" for name, n in sorted(found.items()))]
         )
@@ -273,6 +275,11 @@ class ScoreSheet(Pictured, Tabulated):
     def asdict(self) -> dict[str, Any]:
         """Return the scores as `to_json` does."""
         return self.to_json()
+
+    @property
+    def ended_by_controller(self) -> int:
+        """Number of trials that the controller ended (`record.sink.BY_CONTROLLER`); none of them is clean."""
+        return sum(score.end in BY_CONTROLLER for score in self.trials)
 
     @property
     def counted_rounds_sum(self) -> int:
@@ -300,10 +307,18 @@ class ScoreSheet(Pictured, Tabulated):
         """Return what ``run --json`` and ``score --json`` print."""
         return {
             "trials": [score.to_json() for score in self.trials],
+            "ended_by_controller": self.ended_by_controller,
             "counted_rounds_sum": self.counted_rounds_sum,
             "paper_sum": self.paper_sum,
             "icra2016_sum": self.icra2016_sum,
         }
+
+
+def outcome(verdict: str | None, end: str | None) -> str:
+    """Return what became of a trial in a word, as `Score.outcome`."""
+    if verdict is None or (verdict == Ruling.UNFINISHED and end in BY_CONTROLLER):
+        return str(end or "cut off")
+    return str(verdict)
 
 
 def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], ending: Ending | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -15,12 +16,16 @@ from dubins_traffic.files import locked, make_folder, read_text, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
+from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.runs.jobs import Job, run_trials
+from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.suites.results import KEPT, save
 from dubins_traffic.suites.settings import CaseEntry
 from dubins_traffic.suites.suite import Suite
 
 FILE: Final = "cases.jsonl"
+COLUMNS: Final = (*KEPT, "reason", *rows.WALL)
+"""What is kept of a case; reasons stay in the folder."""
 Found = dict[str, dict[str, dict[str, Any]]]
 """What came of each case, by controller and case: columns of a campaign's table."""
 
@@ -126,9 +131,20 @@ def _run(
         jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one) for one in left]
         for result in run_trials(jobs, workers):
             row = rows.row(0, result.ending, result.score, result.wall.act_s)
-            own[cases[_key(result.instance)]] = {column: row[column] for column in (*KEPT, *rows.WALL)}
+            own[cases[_key(result.instance)]] = {column: row[column] for column in COLUMNS}
             _keep(file, suite, found)
             progress(sum(map(len, found.values())), total)
+
+
+def faulty(folder: Path, suite: Suite) -> str:
+    """Return the notice that cases in a folder ended by a fault; empty if none did."""
+    ended = [
+        (f"{case} with {name}: {row['end']}: {row['reason'] or ''}".rstrip(": "), row["end"])
+        for name, own in _kept(folder / FILE, suite).items()
+        for case, row in own.items()
+    ]
+    bad = [(told, end) for told, end in ended if end in FAULTS]
+    return fault_notice(Counter(end for _, end in bad), len(ended), bad[0][0] if bad else "")
 
 
 def _key(instance: Instance) -> str:
@@ -153,7 +169,9 @@ def _kept(file: Path, suite: Suite) -> Found:
             raise InputError("results of another suite", file=str(file), expected="a new folder")
         found: Found = {}
         for line in rest:
+            if line["row"].keys() != set(COLUMNS):
+                raise KeyError("row")
             found.setdefault(line["controller"], {})[line["case"]] = line["row"]
         return found
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError("can't be read as results", file=str(file), expected="a new folder") from None

@@ -8,6 +8,7 @@ from typing import Any
 from dubins_traffic.campaign.report.markup import base_style, document, section, table, text
 from dubins_traffic.campaign.report.statistics import share
 from dubins_traffic.errors import InputError
+from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
 from dubins_traffic.suites.comparing import Source, check_suite, named_entries
 from dubins_traffic.suites.markdown import markdown_table
 from dubins_traffic.suites.suite import Suite
@@ -59,15 +60,20 @@ def cases_page(suite: Suite, found: Mapping[str, Columns], how: str) -> str:
 def _body(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
     rows = [[case.name, *(_said(own, k) for own in found.values())] for k, case in enumerate(cases)]
-    return [*rows, ["clean", *(_clean(own) for own in found.values())]]
+    ended = ["ended by the controller", *(str(_ended(own)) for own in found.values())]
+    return [*rows, ["clean", *(_clean(own) for own in found.values())], ended]
 
 
 def _said(columns: Columns, case: int) -> str:
-    """Return the verdict on a case, and how many rules the ego broke."""
-    verdict, broken = columns["verdict"][case], columns["breaches"][case]
-    if verdict is None:
-        return str(columns["end"][case]).replace("_", " ")
+    """Return the verdict on a case, or how it ended if by a fault, and how many rules the ego broke."""
+    verdict, end, broken = (columns[name][case] for name in ("verdict", "end", "breaches"))
+    if verdict is None or end in FAULTS:
+        verdict = str(end).replace("_", " ")
     return f"{verdict}, {broken} breach{'es' if broken != 1 else ''}" if broken else str(verdict)
+
+
+def _ended(columns: Columns) -> int:
+    return sum(end in BY_CONTROLLER for end in columns["end"])
 
 
 def _clean(columns: Columns) -> str:

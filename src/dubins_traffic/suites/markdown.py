@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import Comparison
 from dubins_traffic.campaign.report.metrics import WALL_METRICS, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share
@@ -28,7 +29,13 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     verdicts = [ruling.value for ruling in Ruling] if judged else []
     head = ["controller", "trials", f"{metric.heading}, mean", "sum"]
     head += ["clean", *verdicts] if judged else []
-    head += ["collisions", "fault of the ego", "came to nothing", *(f"{own.heading}, ms" for own in timed)]
+    head += [
+        "collisions",
+        "fault of the ego",
+        "ended by the controller",
+        "came to nothing",
+        *(f"{own.heading}, ms" for own in timed),
+    ]
     ranked = sorted(comparison.standings, key=lambda own: -(own.estimates[metric.name].mean or 0.0))
     body = [
         [
@@ -43,7 +50,8 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             ),
             str(standing.collisions),
             str(standing.faults["the ego"] + standing.faults["both"]),
-            str(sum(standing.ends[end].count for end in ("failed", "crashed") if end in standing.ends)),
+            str(standing.ended.count),
+            str(sum(standing.ends[end].count for end in rows.NOTHING if end in standing.ends)),
             *(_milliseconds(standing.estimates[own.name].mean) for own in timed),
         ]
         for standing in ranked

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dubins_traffic.problem.faults import Strict, fault
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.suites.settings import Count
 
 FORMAT = "dubins-traffic suite results"
@@ -30,6 +31,10 @@ class TrialsEntry(Strict):
     def _of_one_length(self) -> TrialsEntry:
         if len({len(values) for values in self.columns.values()}) > 1:
             raise fault("columns of several lengths", "one value a trial in each", "columns")
+        for clean, end in zip(self.columns.get("clean", ()), self.columns.get("end", ()), strict=False):
+            if clean and end in BY_CONTROLLER:
+                expected = "false where the controller ended the trial: run the suite again"
+                raise fault("a clean trial that its controller ended", expected, "columns.clean", end)
         return self
 
 

@@ -89,8 +89,7 @@ def sheet_html(heading: str, sheet: ScoreSheet) -> str:
     """Return the HTML of scores: the shares of their verdicts, or ends, and the first trials as a table."""
     found: dict[str, Counter[str]] = {}
     for own in sheet.trials:
-        word = (own.end or "cut off") if own.verdict is None else own.verdict.verdict.value
-        found.setdefault(own.controller or "-", Counter())[word] += 1
+        found.setdefault(own.controller or "-", Counter())[own.outcome] += 1
     head = ("trial", "controller", "verdict", "end", "rounds", "goals visited", "collisions")
     rows = [
         (

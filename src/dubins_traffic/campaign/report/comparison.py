@@ -16,6 +16,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.metrics import FAULTS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.scoring.columns import REPORTED
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
@@ -30,10 +31,11 @@ HELD: tuple[str, ...] = get_args(Status)
 class Standing:
     """What is said of one controller.
 
-    `estimates` holds a row a metric, by column; `clean` is the share of clean trials in the judged ones, `near` that of
-    excused trials whose excuses were near; `verdicts` holds the share of each verdict in the judged trials, `ends` that
-    of each end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each
-    part of the assumption; `faults` counts collisions by who was at fault. `formulas` holds the share of each verdict
+    `estimates` holds a row a metric, by column; `clean` is the share of clean trials in the judged ones and those that
+    came to nothing, `ended` that of trials that the controller ended (`BY_CONTROLLER`) in all, `near` that of excused
+    trials whose excuses were near; `verdicts` holds the share of each verdict in the judged trials, `ends` that of each
+    end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each part of
+    the assumption; `faults` counts collisions by who was at fault. `formulas` holds the share of each verdict
     on each formula of the user's own, by its name, in the trials that carry it.
     """
 
@@ -42,6 +44,7 @@ class Standing:
     judged: int
     estimates: Mapping[str, Estimate]
     clean: Share
+    ended: Share
     near: Share
     verdicts: Mapping[str, Share]
     ends: Mapping[str, Share]
@@ -171,6 +174,7 @@ def _standing(
     verdicts: list[str | None] = own["verdict"].to_pylist()
     judged = sum(verdict is not None for verdict in verdicts)
     seen = [verdict.value for verdict in Ruling]
+    nothing = sum(ends.count(end) for end in rows.NOTHING)
 
     def happened(column: str) -> Share:
         return share(int((_floats(own[column]) > 0).sum()), judged)
@@ -180,7 +184,8 @@ def _standing(
         len(own),
         judged,
         {metric.name: estimate(values[metric.name][chosen]) for metric in metrics},
-        happened("clean"),
+        share(int((_floats(own["clean"]) > 0).sum()), judged + nothing if judged else 0),
+        share(sum(ends.count(end) for end in BY_CONTROLLER), len(ends)),
         share(int((_floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
         {end: share(ends.count(end), len(ends)) for end in sorted(set(ends))},

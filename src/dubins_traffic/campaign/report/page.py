@@ -17,12 +17,13 @@ from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
 
+ENDED = "ended by the controller"
 MINUS = "\N{MINUS SIGN}"
 HOW = (
     "Every controller is run on the same instances. Brackets hold 95 % intervals: of means and medians percentiles of "
     "1,000 bootstrap resamples (of more than 2,000 values the normal interval, and order statistics), of shares "
     "those of Wilson. A difference is taken trial by trial and set in bold where its interval leaves out 0. Trials "
-    "that came to nothing count among the ends, and in no metric."
+    "that came to nothing are not clean and count among the ends, and in no metric."
 )
 
 
@@ -103,12 +104,19 @@ def _overview(comparison: Comparison) -> str:
         [
             _name(standing, k),
             _count(standing.trials),
+            _count(standing.ended.count),
             _count(standing.collisions),
             *(_count(standing.faults[who]) for who in plots.FAULTS),
         ]
         for k, standing in enumerate(comparison.standings)
     ]
-    at_fault = ["controller", "trials", "collisions of the ego", *(f"fault of {who}" for who in plots.FAULTS)]
+    at_fault = [
+        "controller",
+        "trials",
+        ENDED,
+        "collisions of the ego",
+        *(f"fault of {who}" for who in plots.FAULTS),
+    ]
     ruled = ["controller", "judged", "clean", "counted rounds", *plots.VERDICTS]
     return f'<div class="figures wide">{figures}</div>{note}{table(ruled, judged)}{table(at_fault, collided)}'
 

@@ -73,7 +73,8 @@ def _shares(comparison: Comparison) -> Table:
     for standing in comparison.standings:
         judged = {"clean": standing.clean} if standing.judged else {}
         near = {"excused, near": standing.near} if standing.near.total else {}
-        for name, share in {**judged, **standing.verdicts, **near, **standing.ends}.items():
+        ended = {"ended by the controller": standing.ended} if standing.ended.count else {}
+        for name, share in {**judged, **standing.verdicts, **near, **ended, **standing.ends}.items():
             table.add_row(words(name), standing.controller, str(share.count), *_share(share))
         for who, count in standing.faults.items():
             table.add_row(f"fault of {who}", standing.controller, str(count), "", "")

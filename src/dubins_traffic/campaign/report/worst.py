@@ -44,9 +44,6 @@ SUMMARY = (
 
 OTHER_WAY = "went another way when it was run again"
 
-NOTHING = frozenset({rows.FAILED, rows.CRASHED})
-"""Ends of trials that came to nothing."""
-
 
 @dataclass(frozen=True, slots=True)
 class Bad:
@@ -74,7 +71,7 @@ def order(results: Any) -> Ints:
         return compute.fill_null(results[column].cast("float64"), 0.0).to_numpy(zero_copy_only=False)
 
     keys = (
-        -among(NOTHING),
+        -among(rows.NOTHING),
         -among(FAULTS),
         -(number("collisions_ego_fault") + number("collisions_both_fault")),
         -number("breaches"),
@@ -140,7 +137,7 @@ def _first(own: Any, count: int) -> list[Mapping[str, Any]]:
 
 
 def _bad(campaign: Campaign, row: Mapping[str, Any], folder: Path) -> Bad:
-    if row["end"] in NOTHING:
+    if row["end"] in rows.NOTHING:
         return Bad(row, why(row), None, "not run again")
     name = replay_name(row["number"])
     try:
