@@ -9,7 +9,19 @@ from typing import Any
 import pytest
 
 from dubins_traffic.campaign.results import load_results
+from dubins_traffic.cars.state import Observation
 from dubins_traffic.cli.main import main
+from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.crew import Here
+from dubins_traffic.falsification.estimate import by_counting
+from dubins_traffic.falsification.intervals import clopper_pearson
+from dubins_traffic.falsification.sampling import prepared
+from dubins_traffic.falsification.search import falsify
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw_many
+from dubins_traffic.runs.single import run_trial
+
+CASES = Path(__file__).parent.parent / "cases"
 
 CONTROLLERS = '''
 class Raises:
@@ -176,3 +188,106 @@ def test_a_campaign_and_its_report(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line[-5:-3] for line in counts] == [["2", "100.0%"]] * 2
     page = Path("out/report/index.html").read_text()
     assert "<th>ended by the controller</th>" in page
+
+
+def test_no_estimate_rests_on_trials_that_their_controller_ended(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["estimate", "junction", "--controller", "own.py:Raises", "--trials", "8", "--duration", "1"]
+    assert main(arguments) == 1
+    out, err = capsys.readouterr()
+    assert out == "1.collision is broken: no estimate, since all 8 trials ended by a fault\n"
+    assert (
+        "8 of 8 trials ended by a fault (8 controller_fault); the first: trial 0: controller_fault: " in err
+    )
+    assert "out of ideas" in err
+    assert main([*arguments, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["probability"], found["interval"], found["wilson"]) == (None, [0.0, 1.0], None)
+    assert (found["trials"], found["left_out"], found["events"]) == (8, 8, 0)
+    assert main([*arguments, "--method", "splitting", "--particles", "10"]) == 1
+    assert "ended by a fault (controller_fault: " in capsys.readouterr().err
+
+
+def test_an_estimate_leaves_out_who_ended_a_trial_before_the_event_and_counts_who_did_after() -> None:
+    drawn = list(draw_many(prepared(load_config("junction"), 4.0, {}), 0, range(16)))
+    ticks = {own.trial: 6 + 6 * own.trial if own.trial % 2 else 10**6 for own in drawn}
+
+    class Wild:
+        """Drives in circles; in every second trial it raises after a while."""
+
+        made = 0
+
+        def __init__(self) -> None:
+            self.trial, Wild.made = Wild.made - 1, Wild.made + 1
+
+        def start(self, problem: object) -> None:
+            pass
+
+        def act(self, observation: Observation) -> tuple[float, float]:
+            if observation.tick == ticks[self.trial]:
+                raise RuntimeError("out of ideas")
+            return 0.8, 0.6
+
+    broke: list[bool] = []
+    for own in drawn:
+        Wild.made = own.trial + 1
+        result = run_trial(own, Wild(), sketch=False)
+        assert result.score.verdict is not None
+        found = {one.rule for one in result.score.verdict.violations if one.car == "ego"}
+        broke.append("1.road" in found)
+    left = sum(own.trial % 2 and not bad for own, bad in zip(drawn, broke, strict=True))
+    assert 0 < left < 8, "some of both kinds"
+    Wild.made = 0
+    once = by_counting(drawn, Here(Wild, "wild"), "1.road", 0.0, lambda _: None)
+    assert (once.trials, once.left_out, once.events) == (16, left, sum(broke))
+    assert once.probability == sum(broke) / (16 - left)
+    assert once.interval == clopper_pearson(sum(broke), 16 - left)
+    assert once.fault.startswith("8 of 16 trials ended by a fault (8 controller_fault); the first: trial 1: ")
+
+
+@pytest.mark.parametrize("below", ["nan", "inf", "-inf"])
+def test_a_margin_that_is_no_number_is_refused(below: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "junction", f"--below={below}", "--trials", "2"]) == 2
+    assert f"--below: not a margin: got {below}; expected a finite number" in capsys.readouterr().err
+    with pytest.raises(InputError, match="--seconds"):
+        falsify("junction", seconds=float("nan"))
+    for name in ("begin", "silence"):
+        assert main(["lines", "run", "junction", f"--{name}={below}"]) == 2
+        assert f"--{name}: not a time: got {below}" in capsys.readouterr().err
+
+
+@WHO
+def test_a_search_names_the_fault_and_tests_nothing_by_it(
+    who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["falsify", "junction", "--controller", f"own.py:{who}", "-o", "out"]
+    for trials in ("32", "64"):
+        assert main([*arguments, "--trials", trials, "--resume"]) == 1
+        out, err = capsys.readouterr()
+        assert f"{trials} ended by a fault; 0 kinds of failure" in out
+        assert (
+            f"{trials} of {trials} trials ended by a fault ({trials} {end}); the first: trial 0: {end}: "
+            in err
+        )
+        assert reason in err
+    report = json.loads(Path("out/search.json").read_text())
+    assert (report["faulty"], report["faults"]) == (64, {end: 64})
+    assert all(row["tested"] == 0 for row in report["coverage"])
+
+
+@WHO
+def test_who_ends_a_case_has_not_passed_it_and_can_not_be_shrunk_by_it(
+    who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = CASES / "lanes" / "3.order.json"
+    Path("cases").mkdir()
+    (Path("cases") / "one.json").write_text(case.read_text())
+    assert main(["regress", "cases", "--controller", f"own.py:{who}"]) == 1
+    out = capsys.readouterr().out
+    assert out.startswith(f"one.json: {end}: ")
+    assert reason in out
+    assert "0 of 1 cases passed, 1 ended by a fault" in out
+    assert main(["shrink", "cases/one.json", "--controller", f"own.py:{who}", "-o", "small.json"]) == 1
+    err = capsys.readouterr().err
+    assert f"{end}: " in err
+    assert reason in err
+    assert not Path("small.json").exists()

@@ -65,7 +65,8 @@ def test_a_passage_is_what_the_ego_did_in_the_disc(last: tuple[int, int], manoeu
     assert found.cell("1.collision", 0, 5) == Cell("1.collision", manoeuvre, 4)
     assert found.cell("3.stop", 0, 3) == Cell("3.stop", manoeuvre, 4)
     assert found.cell("1.collision", 0, 2) == Cell("1.collision", Manoeuvre.DRIVING, 4)
-    tested = found.exercised(3)
+    assert not found.exercised(3, np.array([False])).any(), "a trial that ended by a fault tests nothing"
+    tested = found.exercised(3, np.array([True]))
     assert tested[Cell("3.order", manoeuvre, 4).number] == 1
     assert tested[Cell("3.clear", manoeuvre, 4).number] == 1
     assert tested[Cell("2.left", Manoeuvre.DRIVING, 4).number] == 0

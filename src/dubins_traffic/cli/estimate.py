@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json as json_text
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dubins_traffic.cli import faults, options
 from dubins_traffic.cli.falsify import WorkersOption
 from dubins_traffic.cli.progress import progress
+
+if TYPE_CHECKING:
+    from dubins_traffic.falsification.estimate import Probability
 
 EXAMPLES = options.examples(
     "estimate junction --controller lanes --event 3.clear --trials 2000 --duration 15",
@@ -65,13 +68,24 @@ def estimate(
         )  # fmt: skip
     if json:
         print(json_text.dumps(found.to_json(), indent=2))
+    else:
+        _show(found)
+    faults.fail_if(found.fault)
+
+
+def _show(found: Probability) -> None:
+    """Print an estimate for people."""
+    if found.left_out == found.trials:
+        print(f"{found.event}: no estimate, since all {found.trials} trials ended by a fault")
         return
     low, high = found.interval
     print(f"{found.event}: {found.probability:.3g}, 95 % interval {low:.3g} to {high:.3g}")
     if found.wilson is not None:
-        print(
-            f"{found.events} of {found.trials} trials; Wilson's interval {found.wilson[0]:.3g} to {found.wilson[1]:.3g}"
-        )
+        low, high = found.wilson
+        known = found.trials - found.left_out
+        print(f"{found.events} of {known} trials; Wilson's interval {low:.3g} to {high:.3g}")
+        if found.left_out:
+            print(f"{found.left_out} of {found.trials} trials are left out: they ended by a fault before")
         if found.discarded:
             faults.tell(
                 f"{found.discarded} trials don't count: the assumption was broken before the ego broke anything"

@@ -128,6 +128,7 @@ def falsify(
         raise typer.Exit(faults.FAILED) from None
     _show(found, json=json)
     options.tell(output, str(found.page))
+    faults.fail_if(found.fault)
 
 
 @contextlib.contextmanager
@@ -204,8 +205,10 @@ def regress(
         print(json_text.dumps([own.to_json() for own in found], indent=2))
     else:
         for own in found:
-            print(f"{own.file.name}: {own.sentence or own.verdict}")
-        print(f"{sum(own.passed for own in found)} of {len(found)} cases passed")
+            print(f"{own.file.name}: {own.sentence or own.fault or own.verdict}")
+        faulty = sum(bool(own.fault) for own in found)
+        ended = f", {faulty} ended by a fault" if faulty else ""
+        print(f"{sum(own.passed for own in found)} of {len(found)} cases passed{ended}")
     if not all(own.passed for own in found):
         raise typer.Exit(faults.FAILED)
 
@@ -217,6 +220,7 @@ def _show(found: Found, *, json: bool) -> None:
             "trials": found.trials,
             "discarded": found.discarded,
             "faulty": found.faulty,
+            "fault": found.fault,
             "violated": found.violated,
             "cases": {name: case.story.sentence for name, case in found.cases.items()},
             "coverage": [row.to_json() for row in found.coverage],

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NoReturn
 import typer
 
 from dubins_traffic.controllers.blame import DEBUG
-from dubins_traffic.errors import DubinsTrafficError, InputError, WorkerLostError, shown
+from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, WorkerLostError, shown
 from dubins_traffic.outside import put_back
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def _no_silent_end() -> Generator[None]:
 def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
     if isinstance(error, InputError):
         return error.on_command_line(), WRONG_INPUT
-    if isinstance(error, WorkerLostError):
+    if isinstance(error, WorkerLostError | ControllerError):
         return str(error), FAILED
     if isinstance(error, DubinsTrafficError):
         return str(error), WRONG_INPUT

@@ -124,7 +124,9 @@ SolverOption = Annotated[
 ]
 SecondsOption = Annotated[
     float,
-    typer.Option("--seconds", metavar="S", min=0.001, help="Longest time of that command for one game."),
+    typer.Option(
+        "--seconds", metavar="S", min=0.001, max=1e6, help="Longest time of that command for one game."
+    ),
 ]
 
 

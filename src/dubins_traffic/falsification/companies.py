@@ -11,7 +11,7 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Controlled, Maker, grouped
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
-from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.records import table
@@ -88,15 +88,15 @@ class Steered(Watched):
 
         Raises
         ------
-        DubinsTrafficError
-            If one of them ends by a fault.
+        ControllerError
+            If one of them ends by a fault: then there is no estimate.
         """
         for _ in range(ticks):
             self._seats.ask_each()
             for outcome in self._seats.step(self._name):
                 if outcome.ending.ticks < outcome.instance.ticks:
-                    detail = f"{outcome.ending.end}: {outcome.ending.detail}"
-                    raise DubinsTrafficError(f"{outcome.instance.title} ended by a fault ({detail})")
+                    told = f"{outcome.instance.title} ended by a fault ({outcome.ending})"
+                    raise ControllerError(outcome.ending.end.value, told)
 
     def reseeded(self, seeds: Sequence[int]) -> Steered:
         """Return forks of all trials that go on from these seeds."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.companies import beginner
+from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.crew import Crew, crew_of, maker
 from dubins_traffic.falsification.intervals import Interval, clopper_pearson, of_mean, wilson
 from dubins_traffic.falsification.liveness import TARGETS
@@ -55,6 +57,11 @@ class Probability:
         e-agents broke the assumption before the ego broke anything.
     runs : tuple of float
         The estimates of the independent runs of splitting.
+    left_out : int
+        Trials that ended by a fault before the event: they are no evidence, and all of Monte Carlo's figures are those
+        of the others. If these are none, the probability is not a number.
+    fault : str
+        How many trials ended by which fault, and why the first; empty if none did.
     """
 
     method: str
@@ -66,19 +73,23 @@ class Probability:
     events: int | None
     discarded: int | None
     runs: tuple[float, ...] = ()
+    left_out: int = 0
+    fault: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return the estimate as a JSON object."""
         return {
             "method": self.method,
             "event": self.event,
-            "probability": self.probability,
+            "probability": None if math.isnan(self.probability) else self.probability,
             "interval": list(self.interval),
             "wilson": None if self.wilson is None else list(self.wilson),
             "trials": self.trials,
             "events": self.events,
             "discarded": self.discarded,
             "runs": list(self.runs),
+            "left_out": self.left_out,
+            "fault": self.fault,
         }
 
 
@@ -137,6 +148,8 @@ def estimate(
         raise InputError(
             "no such method", file="--method", value=method, expected=f"one of {', '.join(METHODS)}"
         )
+    if not math.isfinite(below):
+        raise InputError("not a margin", file="--below", value=below, expected="a finite number")
     own = prepared(own, duration, {})
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
     told = progress or _silent
@@ -152,17 +165,21 @@ def by_counting(
     instances: Iterable[Instance], crew: Crew, event: str, below: float, progress: Progress
 ) -> Probability:
     """Return what Monte Carlo gives on some trials; the parameters are those of `estimate`."""
-    count = happened = discarded = 0
+    counts = Counts()
+    happened = left_out = 0
     waiting: list[Instance] = []
 
     def run() -> None:
-        nonlocal count, happened, discarded
-        for tried in crew.run(waiting).tried:
-            discarded += tried.discarded
-            happened += not tried.discarded and tried.margins.get(event, np.inf) <= below
-        count += len(waiting)
+        nonlocal happened, left_out
+        for number, tried in enumerate(crew.run(waiting).tried, counts.trials):
+            met = not tried.discarded and tried.margins.get(event, np.inf) <= below
+            happened += met
+            left_out += tried.faulty and not met
+            counts.discarded += tried.discarded and not tried.faulty
+            counts.take_fault(number, tried.fault)
+        counts.trials += len(waiting)
         waiting.clear()
-        progress(count)
+        progress(counts.trials)
 
     for instance in instances:
         waiting.append(instance)
@@ -170,9 +187,15 @@ def by_counting(
             run()
     if waiting:
         run()
+    known = counts.trials - left_out
+    told = (), left_out, counts.fault_notice()
+    if not known:
+        return Probability(
+            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *told
+        )
     return Probability(
-        "monte-carlo", words(event, below), happened / count, clopper_pearson(happened, count),
-        wilson(happened, count), count, happened, discarded,
+        "monte-carlo", words(event, below), happened / known, clopper_pearson(happened, known),
+        wilson(happened, known), counts.trials, happened, counts.discarded, *told,
     )  # fmt: skip
 
 

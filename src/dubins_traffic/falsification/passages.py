@@ -90,8 +90,10 @@ class Passages:
         whole: list[int] = number.tolist()
         return [tuple(sorted(set(whole[a:b]))) for a, b in pairwise(ends)]
 
-    def exercised(self, crossing_degree: int) -> Ints:
+    def exercised(self, crossing_degree: int, sound: Bools) -> Ints:
         """Return how often each cell was put to the test, (`CELLS`,): what could have been broken there.
+
+        Only trials that are `sound`, (K,), put anything to the test.
 
         Rule 3 is put to the test by entering a crossing (a disc where `crossing_degree` roads meet, or more), its order
         and clearance only if somebody was before the ego or in the crossing; rule 2 by something that stands in the
@@ -112,8 +114,9 @@ class Passages:
         }
         within = self.manoeuvre * DEGREES + self.degree
         count = np.zeros(CELLS, dtype=np.int64)
+        counted = sound[self.trial]
         for rule, happened in tested.items():
-            numbers = EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[happened]
+            numbers = EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[happened & counted]
             count += np.bincount(numbers, minlength=CELLS)
         return count
 

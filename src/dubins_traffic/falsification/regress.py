@@ -41,6 +41,8 @@ class Outcome:
         is about.
     sentence : str
         Who did what when; empty if the ego broke nothing.
+    fault : str
+        The end of a trial that ended by a fault and the reason, ``END: REASON``.
     """
 
     file: Path
@@ -48,11 +50,12 @@ class Outcome:
     verdict: str
     broken: tuple[str, ...]
     sentence: str
+    fault: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether the ego broke nothing for which it must answer, and no fault ended the trial."""
-        return not self.broken and self.verdict in {own.value for own in Ruling}
+        return not self.broken and not self.fault
 
     def to_json(self) -> dict[str, Any]:
         """Return the outcome as a JSON object."""
@@ -62,6 +65,7 @@ class Outcome:
             "verdict": self.verdict,
             "broken": list(self.broken),
             "sentence": self.sentence,
+            "fault": self.fault,
             "passed": self.passed,
         }
 
@@ -109,11 +113,11 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         own = own if verdict.verdict is Ruling.VIOLATED else []
         if case.story.rule not in EGO_RULES and (asked := judged.breach(case.story.rule)) is not None:
             own = [*own, asked]
-        faulty = ending is not None and ending.end in FAULTS
-        said = ending.end.value if faulty and ending is not None else verdict.verdict.value
+        fault = ending if ending is not None and ending.end in FAULTS else None
+        said = verdict.verdict.value if fault is None else fault.end.value
         of_it = [broken for broken in own if broken.rule == case.story.rule] or own
         told = sentence_of(judged.record, judged.score, of_it[0]) if own else ""
-        yield Outcome(path, case, said, _rules(own), told)
+        yield Outcome(path, case, said, _rules(own), told, "" if fault is None else str(fault))
 
 
 def _rules(own: Sequence[Violation]) -> tuple[str, ...]:

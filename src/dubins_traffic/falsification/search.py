@@ -15,6 +15,7 @@ import numpy as np
 
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import archive as archives
 from dubins_traffic.falsification.archive import Archive
 from dubins_traffic.falsification.case import Case
@@ -63,6 +64,8 @@ class Found:
         and in how many the ego broke a rule that was asked for.
     coverage : list of Row
         Which rule, manoeuvre and crossing were put to the test.
+    fault : str
+        How many trials ended by which fault, and why the first; empty if none did.
     """
 
     folder: Path
@@ -72,6 +75,7 @@ class Found:
     faulty: int
     violated: int
     coverage: list[Row]
+    fault: str = ""
 
     @property
     def page(self) -> Path:
@@ -146,6 +150,7 @@ class Search:
         self._expected.update(cell.number for cell in possible(places.values()))
         for number, genome, tried in zip(numbers, genomes, findings.tried, strict=True):
             self._least.take(number, genome, tried)
+            self.counts.take_fault(number, tried.fault)
             self._strategy.tell(number, genome, tried, self._count(tried))
         self.counts.exercised += findings.exercised
         self.counts.trials += len(numbers)
@@ -154,7 +159,6 @@ class Search:
         """Count a trial; tell whether it broke a rule."""
         counts, wanted = self.counts, self._wanted(tried)
         counts.discarded += tried.discarded
-        counts.faulty += tried.faulty
         counts.violated += bool(wanted)
         for cell in wanted:
             if cell.number >= 0:
@@ -186,7 +190,7 @@ class Search:
         counts = self.counts
         return Found(
             self.archive.folder, dict(sorted(self.archive.cases.items())), counts.trials, counts.discarded,
-            counts.faulty, counts.violated, self.coverage(),
+            counts.faulty, counts.violated, self.coverage(), counts.fault_notice(),
         )  # fmt: skip
 
     def coverage(self) -> list[Row]:
@@ -301,6 +305,8 @@ def falsify(
     KeyboardInterrupt
         On Ctrl-C; what has been found is kept.
     """
+    if seconds is not None and not seconds >= 0.0:
+        raise InputError("not a time", file="--seconds", value=seconds, expected="a number >= 0")
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
     targets = targets_of(rules, formula, least_score=least_score)
     own = prepared(own, duration, {} if formula is None else {ASKED: formula})

@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dubins_traffic.engine.controlled import Maker
-from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.falsification.case import Case, Story, read_case
 from dubins_traffic.falsification.crew import driver_of
-from dubins_traffic.falsification.judging import Judged, Make, confirm
+from dubins_traffic.falsification.judging import Judged, Make, confirm, judge
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
 from dubins_traffic.falsification.sentences import sentence_of
@@ -47,6 +47,8 @@ def shrink(
     ------
     InputError
         If the case does not break its rule with that controller.
+    ControllerError
+        If that is since the controller ends the trial before.
     """
     own = case if isinstance(case, Case) else read_case(case)
     driver = own.story.controller if controller is None else controller
@@ -55,6 +57,9 @@ def shrink(
     shrinker = _Shrinker(driver, make, name, own.story.rule)
     found = confirm(own.instance, own.story.rule, make, name)
     if found is None:
+        ending = judge(own.instance, make, name).record.ending
+        if ending is not None and ending.by_controller:
+            raise ControllerError(ending.end.value, f"the case ended by a fault: {ending}")
         file = None if isinstance(case, Case) else os.fspath(case)
         raise InputError(
             "the ego does not break the rule", file=file, field="case.rule", value=own.story.rule,

@@ -67,6 +67,8 @@ class Tried:
         The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame.
     situations : tuple of int
         What it met with (`passages.Passages.situations`); empty where nobody asks for it.
+    fault : str
+        The end of a faulty trial and the reason, ``END: REASON``.
     """
 
     discarded: bool
@@ -74,11 +76,14 @@ class Tried:
     margins: dict[str, float]
     cells: tuple[tuple[Cell, int], ...]
     situations: tuple[int, ...] = ()
+    fault: str = ""
 
 
 @dataclass(slots=True)
 class Findings:
-    """What came of some trials, in their order, and how often each cell was put to the test, (CELLS,)."""
+    """What came of some trials, in their order, and how often those that did not end by a fault put each cell to the
+    test, (CELLS,).
+    """
 
     tried: list[Tried]
     exercised: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
@@ -183,7 +188,8 @@ class Laboratory:
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        whole.exercised += passages.exercised(_crossing_degree(group.instances[0]))
+        sound = np.array([outcome.ending.end not in FAULTS for outcome in outcomes])
+        whole.exercised += passages.exercised(_crossing_degree(group.instances[0]), sound)
         rate = group.instances[0].problem.rate
         situations = passages.situations(len(outcomes))
         for b, outcome in enumerate(outcomes):
@@ -195,15 +201,18 @@ class Laboratory:
         if self._remote is not None:
             record = self._remote.drive(instance)
             found, passages = judged_record(record)
-            whole.exercised += passages.exercised(_crossing_degree(instance))
-            tried = tried_of(found, record.ending, passages, 0, instance.problem.rate)
-            return replace(tried, situations=passages.situations(1)[0])
+            return self._tried(instance, found, record.ending, passages, whole)
         ego = EgoTrace()
         driver = controllers.made(self._make)
         result = run_trial(instance, driver, sinks=[ego], name=self._name, sketch=False)
-        passages = ego.passages()
-        whole.exercised += passages.exercised(_crossing_degree(instance))
-        tried = tried_of(result.score, result.ending, passages, 0, instance.problem.rate)
+        return self._tried(instance, result.score, result.ending, ego.passages(), whole)
+
+    def _tried(
+        self, instance: Instance, found: Score, ending: Ending | None, passages: Passages, whole: Findings
+    ) -> Tried:
+        """Take over what came of a trial that was run alone."""
+        tried = tried_of(found, ending, passages, 0, instance.problem.rate)
+        whole.exercised += passages.exercised(_crossing_degree(instance), np.array([not tried.faulty]))
         return replace(tried, situations=passages.situations(1)[0])
 
 
@@ -240,13 +249,13 @@ def judged_record(record: Record) -> tuple[Score, Passages]:
 def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int, rate: float) -> Tried:
     """Return what a search keeps of a trial that has been judged: number `trial` of `passages`, at `rate` Hz."""
     verdict = score.verdict
-    faulty = ending is not None and ending.end in FAULTS
+    fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
         f"{FORMULA} {own.name}": own.robustness for own in score.formulas if own.robustness is not None
     }
     margins[DONE] = score.counted_rounds + score.goals_visited + METRE * score.driven.distance_m
     if verdict is None:
-        return Tried(False, faulty, margins, ())
+        return Tried(False, bool(fault), margins, (), fault=fault)
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
     late = spare(verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
@@ -261,7 +270,7 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
     discarded = verdict.verdict is Ruling.EXCUSED or (not own and assumption_broken)
     ordered = sorted(first.items(), key=lambda item: (item[1], item[0]))
     cells = () if discarded else tuple((passages.cell(rule, trial, tick), tick) for rule, tick in ordered)
-    return Tried(discarded, faulty, margins, cells)
+    return Tried(discarded, bool(fault), margins, cells, fault=fault)
 
 
 def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
