@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -25,6 +26,7 @@ from tests import foreign
 from tests.games import ALL, board
 from tests.grammars import slugs_sections, tlsf_sections
 
+MACHINE = foreign.machine
 FORMS = ("hoa", "aag", "aig", "slugs json", "slugs text", "tulip")
 
 
@@ -87,15 +89,97 @@ def test_the_machine_goes_round_and_keeps_the_rules(strategies: dict[str, Path])
     assert [one for one in score.verdict.violations if one.car == "ego"] == []
 
 
-def test_where_a_machine_has_no_answer_the_ego_goes_on_by_the_rules(tmp_path: Path) -> None:
-    """A machine whose first answer is another cell than the one in which the ego starts."""
-    text = foreign.as_hoa()
-    first, _ = foreign.machine()
-    path = tmp_path / "other"
-    path.write_text(text.replace(f"Start: {first}", f"Start: {(first + 1) % 4}"))
-    record = drive(str(path), tmp_path)
-    kinds = [event.kind for block in record.blocks for event in block.events]
-    assert STRATEGY_LEFT in kinds
+def elsewhere() -> tuple[int, dict[tuple[int, int], int]]:
+    """Return a machine whose first answer is another cell than the one in which the ego starts."""
+    first, steps = MACHINE()
+    return (first + 1) % 4, steps
+
+
+def leaping() -> tuple[int, dict[tuple[int, int], int]]:
+    """Return a machine that begins well, and then leaves out a cell in every move."""
+    first, steps = MACHINE()
+    after = foreign.round_trip()
+    return first, {(own, other): to if own == first else after[to] for (own, other), to in steps.items()}
+
+
+NO_MOVE = [
+    *(
+        (elsewhere, form, r"begins in cell \d, and the ego starts in cell \d")
+        for form in FORMS
+        if "slugs" not in form
+    ),
+    *(
+        (leaping, form, r"sends the ego from cell \d to cell \d, which is no move of the game")
+        for form in FORMS
+    ),
+]
+
+
+@pytest.mark.parametrize(("wrong", "form", "why"), NO_MOVE)
+def test_who_makes_no_move_of_the_game_ends_the_trial_unless_the_rules_may_go_on(
+    wrong: Any, form: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(foreign, "machine", wrong)
+    path = foreign.files(tmp_path)[form]
+    result = run_trial(foreign.instance(), str(path))
+    assert result.ending.end == "controller_fault"
+    assert re.search(why, result.ending.detail)
+    assert result.score.verdict is not None
+    assert not result.score.verdict.clean
+    record = drive(f"{path}+fallback", tmp_path)
+    assert len(record.frames) == 1801
+    assert STRATEGY_LEFT in [event.kind for block in record.blocks for event in block.events]
+
+
+def swapped(text: str) -> str:
+    for one, other in (("ego_", "x_"), ("car1_", "ego_"), ("x_", "car1_")):
+        text = text.replace(one, other)
+    return text
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (
+            foreign.as_hoa().replace("controllable-AP: 2 3", "controllable-AP: 0 1"),
+            "reads what the ego chooses",
+        ),
+        (
+            foreign.as_hoa().replace("controllable-AP: 2 3", "controllable-AP: 2"),
+            "reads what the ego chooses",
+        ),
+        (
+            foreign.as_hoa().replace("controllable-AP: 2 3", "controllable-AP: 0 2 3"),
+            "chooses for the others",
+        ),
+        (swapped(foreign.as_hoa()), "reads what the ego chooses"),
+        (swapped(foreign.as_aag()), "reads what the ego chooses"),
+        (swapped(foreign.as_tulip()), "reads what the ego chooses"),
+    ],
+)
+def test_a_machine_with_another_split_of_the_players_is_refused(
+    made: str, message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / ("swapped.py" if made.startswith("class") else "swapped")
+    path.write_text(made)
+    for spec in (str(path), f"{path}+fallback"):
+        with pytest.raises(InputError, match=f"a strategy that {message}"):
+            registry.load(spec).start(foreign.instance().problem)
+    assert run_trial(foreign.instance(), str(path)).ending.end == "controller_fault"
+
+
+@pytest.mark.parametrize("given", ["0 9", "0\ncontrollable-AP: 1", "x"])
+def test_a_split_of_players_that_is_none_is_refused(given: str, tmp_path: Path) -> None:
+    path = tmp_path / "strategy"
+    path.write_text(foreign.as_hoa().replace("controllable-AP: 2 3", f"controllable-AP: {given}"))
+    with pytest.raises(InputError, match=r"controllable-AP|no state's number"):
+        registry.load(str(path))
+
+
+def test_only_a_strategy_of_another_tool_has_a_fallback(tmp_path: Path) -> None:
+    for spec in ("rules+fallback", "synthesized+fallback", str(tmp_path / "none.hoa+fallback")):
+        with pytest.raises(InputError, match="unknown controller"):
+            registry.load(spec)
 
 
 def test_a_machine_for_another_problem_is_refused(strategies: dict[str, Path], tmp_path: Path) -> None:

@@ -36,6 +36,9 @@ SANDBOXED: Final = "+sandbox"
 """Suffix of the name of a controller that drives in a box (`dubins_traffic.sandbox`); it precedes that of a shield,
 and limits may follow it, as in ``my.py:Mine+sandbox,memory=512M``."""
 SANDBOX: Final = re.compile(re.escape(SANDBOXED) + r"(?P<limits>(?:,[\w=.+-]*)*)$")
+FALLBACK: Final = "+fallback"
+"""Suffix of the file of a strategy of another tool with which the ego goes on by the rules where the strategy begins
+elsewhere, or makes no move of the game."""
 CLASS_FIRST: Final = b"class TulipStrategy"
 """Text by which a strategy that TuLiP has written in Python is known; the file is parsed, not run."""
 _SEAM = Seam(
@@ -61,8 +64,9 @@ def load(spec: str) -> Controller:
     if spec.endswith(".npz"):
         learned = _module("learned")
         return cast(Controller, (learned if learned.is_policy(spec) else _module("synthesized")).player(spec))
-    if is_file(spec) and (not spec.endswith(".py") or begins_with(spec, CLASS_FIRST)):
-        return cast(Controller, _module("synthesized").foreign_player(spec))
+    file = spec if is_file(spec) else spec.removesuffix(FALLBACK)
+    if is_file(file) and (not file.endswith(".py") or begins_with(file, CLASS_FIRST)):
+        return cast(Controller, _module("synthesized").foreign_player(file, fallback=file != spec))
     if not outside.is_place(spec):
         raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(BUILT_IN)))
     return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))

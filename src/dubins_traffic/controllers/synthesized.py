@@ -24,7 +24,7 @@ from dubins_traffic.shield.filter import ShieldFilter
 from dubins_traffic.synthesis.advice import Advice, Adviser, Ranked
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.foreign.adviser import MachineAdviser
-from dubins_traffic.synthesis.foreign.labelled import missing
+from dubins_traffic.synthesis.foreign.labelled import misfit
 from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
@@ -78,6 +78,9 @@ class Synthesized(Rules):
     ----------
     strategy : Strategy or Machine, optional
         The strategy to play, of this package or another tool; by default the game is solved when the trial starts.
+    fallback : bool
+        Whether the ego goes on by the rules where a strategy of another tool begins elsewhere, or makes no move of the
+        game; otherwise that is a fault which ends the trial.
 
     Notes
     -----
@@ -87,9 +90,10 @@ class Synthesized(Rules):
     again. That shield overtakes as `rules` does: often a car that is parked for good has broken the assumption.
     """
 
-    def __init__(self, strategy: Strategy | Machine | None = None) -> None:
+    def __init__(self, strategy: Strategy | Machine | None = None, *, fallback: bool = False) -> None:
         super().__init__()
         self._strategy = strategy
+        self._fallback = fallback
         self._pursuit: _Pursuit | None = None
         self._shield_filter = ShieldFilter(overtakes="law")
 
@@ -100,7 +104,7 @@ class Synthesized(Rules):
         drivers = self._drivers
         if drivers is None or not problem.e_agents:
             return
-        adviser = _adviser(self._strategy, problem)
+        adviser = _adviser(self._strategy, problem, fallback=self._fallback)
         self._shield_filter.start(problem)
         rules = RuleParameters.from_mapping(problem.rules)
         self._period = problem.period
@@ -217,9 +221,9 @@ def player(file: str) -> Synthesized:
     return Synthesized(Strategy.load(file))
 
 
-def foreign_player(file: str) -> Synthesized:
+def foreign_player(file: str, *, fallback: bool = False) -> Synthesized:
     """Return the controller that plays the strategy of another tool in a file; InputError if it can't be read."""
-    return Synthesized(read_machine(file))
+    return Synthesized(read_machine(file), fallback=fallback)
 
 
 def _liked(free: Sequence[int], exits: Sequence[int], distance: Floats) -> list[int]:
@@ -243,18 +247,19 @@ def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
     return found
 
 
-def _adviser(strategy: Strategy | Machine | None, problem: Problem) -> Adviser:
+def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback: bool) -> Adviser:
     """Return the adviser for a trial; InputError if the game is too large, or the strategy of another problem."""
     if strategy is None:
         return Ranked(_solved(problem))
     if isinstance(strategy, Strategy):
         return Ranked(_fitting(strategy, problem))
     board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
-    unknown = missing(board, strategy.names)
-    if unknown is not None:
-        expected = f"the propositions {', '.join((*inputs_of(board), *outputs_of(board)))}"
-        raise InputError("a strategy for another problem", field=unknown, expected=expected)
-    return MachineAdviser(board, strategy)
+    unfit = misfit(board, strategy)
+    if unfit is not None:
+        name, how = unfit
+        expected = f"to read {', '.join(inputs_of(board))}; to answer {', '.join(outputs_of(board))}"
+        raise InputError(how, field=name, expected=expected)
+    return MachineAdviser(board, strategy, fallback=fallback)
 
 
 def _solved(problem: Problem) -> Strategy:

@@ -3,16 +3,17 @@
 In the game both sides move in turn; on the road a turn takes as long as it takes. So the machine is asked anew with
 each change, and goes on by a turn only when the ego has done what it said, or when it said to stay. Where the
 play is none that it can be in, as when an assumed place has been revised, a state is taken in which some play of the
-game could have come there; if there is none, the machine does not win.
+game could have come there; if there is none, the machine does not win. A machine that begins elsewhere than the ego,
+or answers a move of the game by none of its own, is at fault, unless somebody is there to drive in its place.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.synthesis.advice import Advice
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.foreign.labelled import Labelled, Place
@@ -50,18 +51,22 @@ class MachineAdviser:
         The game.
     machine : Machine
         The strategy.
+    fallback : bool
+        Whether the ego goes on without the machine where that makes no move of the game.
     """
 
-    def __init__(self, board: Board, machine: Machine) -> None:
+    def __init__(self, board: Board, machine: Machine, *, fallback: bool = False) -> None:
         self.board = board
         self._machine = machine
+        self._fallback = fallback
         self._game: Labelled | None = None
         self._turn: Turn | None = None
         self._begun = False
+        self._sure = True
         self._known: dict[Place, list[State]] = {}
 
     def wins(self, play: RoadPlay) -> bool:
-        """Say whether the machine has an answer where a play is."""
+        """Say whether the machine has an answer where a play is; the errors are those of `advise`."""
         self._follow(play)
         return self._turn is not None
 
@@ -69,6 +74,11 @@ class MachineAdviser:
         """Return what the machine says, None where the ego is at no lane's end or where it has no answer.
 
         It seeks goals in an order of its own, so `goal` and `following` don't matter.
+
+        Raises
+        ------
+        DubinsTrafficError
+            If the machine begins elsewhere, or has made no move of the game, and there is no fallback.
         """
         self._follow(play)
         turn, nodes = self._turn, len(self.board.arena.nodes)
@@ -94,15 +104,27 @@ class MachineAdviser:
             self._begun = True
             self._begin(place)
         elif self._turn is None or self._turn.place != place:
-            self._turn = next(self._turns_at(place), None)
+            followed = self._followed(place)
+            self._sure = followed is not None
+            guessed = (Turn(place, place, state) for state in self._known.get(place, ()))
+            self._turn = followed or next(guessed, None)
         if self._turn is not None:
             turn = self._waited(self._turn)
-            self._turn = None if self._answer(turn.place, turn.state) is None else turn
+            self._turn = turn
+            if self._answer(turn.place, turn.state) is None:
+                self._turn = None
+                if self._sure:
+                    self._stray(self._wrong_move(turn))
 
     def _begin(self, place: Place) -> None:
         """Let the machine read the first letter, to which it answers with the cell in which the ego starts."""
         first = self._machine.step(self._machine.begin(), self._labelled.letter(place))
-        if first is None or self._labelled.ego_cell(first[1]) != place.cells[EGO]:
+        if first is None:
+            self._stray("has no answer to the first position")
+            return
+        cell = self._labelled.ego_cell(first[1])
+        if cell != place.cells[EGO]:
+            self._stray(f"begins in cell {cell}, and the ego starts in cell {place.cells[EGO]}")
             return
         self._turn = Turn(place, place, first[0])
         self._explore(place, first[0])
@@ -112,18 +134,32 @@ class MachineAdviser:
         assert self._game is not None
         return self._game
 
-    def _turns_at(self, place: Place) -> Iterator[Turn]:
-        """Yield the turns that it may be at a place, the likeliest first."""
+    def _stray(self, what: str) -> None:
+        """Take note that the machine makes no move of the game."""
+        if not self._fallback:
+            told = "with +fallback behind its file, the ego goes on by the rules"
+            raise DubinsTrafficError(f"the strategy {what} ({told})")
+
+    def _wrong_move(self, turn: Turn) -> str:
+        """Say what the machine answers in a turn in which that is no move of the game."""
+        found = self._machine.step(turn.state, self._labelled.letter(turn.place))
+        if found is None:
+            return f"has no answer where the cars are in cells {turn.place.cells}"
+        way = f"from cell {turn.place.cells[EGO]} to cell {self._labelled.ego_cell(found[1])}"
+        return f"sends the ego {way}, which is no move of the game"
+
+    def _followed(self, place: Place) -> Turn | None:
+        """Return the turn at a place to which the play has led by moves of the game, None if there is none."""
         old = self._turn
-        if old is not None:
-            answer = self._answer(old.place, old.state)
-            if answer is not None and answer.place.cells[EGO] == place.cells[EGO]:
-                if answer.place == place or self._labelled.follows(answer.place, place):
-                    yield Turn(answer.place, place, answer.state)
-            elif self._labelled.follows(old.before, place):
-                yield Turn(old.before, place, old.state)
-        for state in self._known.get(place, ()):
-            yield Turn(place, place, state)
+        if old is None:
+            return None
+        answer = self._answer(old.place, old.state)
+        if answer is not None and answer.place.cells[EGO] == place.cells[EGO]:
+            if answer.place == place or self._labelled.follows(answer.place, place):
+                return Turn(answer.place, place, answer.state)
+        elif self._labelled.follows(old.before, place):
+            return Turn(old.before, place, old.state)
+        return None
 
     def _waited(self, turn: Turn) -> Turn:
         """Return the turn after those in which the ego stays and nobody else moves; the same if it stays for ever."""

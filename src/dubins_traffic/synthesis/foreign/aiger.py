@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, cast
 
-from dubins_traffic.synthesis.foreign.machine import Letter, State, damaged
+from dubins_traffic.synthesis.foreign.machine import Letter, Sides, State, damaged
 
 WHAT: Final = "AIGER"
 MOST_VARIABLES: Final = 4_000_000
@@ -40,7 +40,12 @@ class Circuit:
     @property
     def names(self) -> Sequence[str]:
         """All propositions."""
-        return [name for name, _ in (*self.inputs, *self.outputs)]
+        return [*self.sides.read, *self.sides.answered]
+
+    @property
+    def sides(self) -> Sides:
+        """Its inputs and outputs."""
+        return Sides([name for name, _ in self.inputs], [name for name, _ in self.outputs])
 
     def begin(self) -> State:
         """Return the reset values of the latches."""

@@ -1,7 +1,7 @@
 """Mealy machines in the Hanoi Omega-Automata format (HOA v1), as ltlsynt and other tools of SYNTCOMP write them.
 
 Labels stand on edges; an edge holds inputs and outputs together. What is accepted does not matter: every play of a
-machine is won. `controllable-AP` is not needed, as propositions are known by their names.
+machine is won. `controllable-AP` says which propositions it answers; without it, nobody knows before it answers.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from itertools import islice
 from typing import Final
 
-from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, State, damaged
+from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, Sides, State, damaged
 
 WHAT: Final = "HOA v1 with labels on its edges"
 MOST_NAMES: Final = 1024
@@ -45,11 +45,11 @@ def read_hoa(text: str) -> Explicit:
     body, ended, _ = rest.partition("--END--")
     if not found or not ended:
         raise damaged(WHAT, "--BODY-- or --END-- is missing")
-    names, start = _header(_tokens(head))
+    names, start, sides = _header(_tokens(head))
     edges = _Body([token for token in _tokens(body) if not token.startswith(('"', "{"))], names).edges()
     if start not in edges:
         raise damaged(WHAT, "the state in which it starts is missing", value=start)
-    return Explicit(edges, start, names)
+    return Explicit(edges, start, names, sides)
 
 
 def _tokens(text: str) -> list[str]:
@@ -57,8 +57,8 @@ def _tokens(text: str) -> list[str]:
     return [token for token in _TOKEN.findall(text) if not token.startswith("/*")]
 
 
-def _header(tokens: list[str]) -> tuple[list[str], int]:
-    """Return the propositions and the initial state."""
+def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None]:
+    """Return the propositions, the initial state, and which propositions are read and answered."""
     places = [place for place, token in enumerate(tokens) if token.endswith(":")]
     items = [
         (tokens[place], tokens[place + 1 : end])
@@ -75,7 +75,22 @@ def _header(tokens: list[str]) -> tuple[list[str], int]:
         raise damaged(WHAT, "AP: with another number of names", value=count)
     if count > MOST_NAMES:
         raise damaged(WHAT, f"more than {MOST_NAMES} propositions", value=count)
-    return found, _number(start[0], 0)
+    return (
+        found,
+        _number(start[0], 0),
+        _sides(found, [own for key, own in items if key == "controllable-AP:"]),
+    )
+
+
+def _sides(names: list[str], lists: list[list[str]]) -> Sides | None:
+    """Return which propositions are read and answered, by the lists of `controllable-AP`."""
+    if not lists:
+        return None
+    own = {_number(lists[0], place) for place in range(len(lists[0]))}
+    if len(lists) > 1 or any(number >= len(names) for number in own):
+        raise damaged(WHAT, "not one controllable-AP: of its propositions", value=" ".join(lists[-1][:8]))
+    answered = [names[number] for number in sorted(own)]
+    return Sides([name for number, name in enumerate(names) if number not in own], answered)
 
 
 def _number(tokens: list[str], place: int) -> int:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.foreign.machine import Letter
+from dubins_traffic.synthesis.foreign.machine import Letter, Machine, Sides
 from dubins_traffic.synthesis.road_play import MoveList
 from dubins_traffic.synthesis.specification import EGO, car_bits, inputs_of, order_name
 
@@ -118,11 +118,22 @@ class Labelled:
         return near and after.position in self._moves.of_others(before.position)
 
 
-def missing(board: Board, names: Sequence[str]) -> str | None:
-    """Return a proposition that stands in a machine and is none of a game, or a bit of the ego that is not there."""
-    known: Mapping[str, None] = dict.fromkeys((*inputs_of(board), *car_bits(EGO, board.arena.cells)))
-    orders = {order_name(EGO, car) for car in range(1, board.others + 1)}
-    for name in names:
-        if name not in known and name not in orders:
-            return name
-    return next((name for name in car_bits(EGO, board.arena.cells) if name not in names), None)
+def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
+    """Return a proposition in which a machine and a game differ, and how; None if there is none."""
+    bits = car_bits(EGO, board.arena.cells)
+    own = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
+    known = own.union(inputs_of(board))
+    for name in machine.names:
+        if name not in known:
+            return name, "a strategy for another problem"
+    for name in bits:
+        if name not in machine.names:
+            return name, "a strategy for another problem"
+    sides = machine.sides or Sides((), ())
+    for name in sides.read:
+        if name in own:
+            return name, "a strategy that reads what the ego chooses"
+    for name in sides.answered:
+        if name not in own:
+            return name, "a strategy that chooses for the others"
+    return None

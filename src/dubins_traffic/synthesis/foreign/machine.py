@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from dubins_traffic.errors import InputError
 
 State: TypeAlias = Hashable
 Letter: TypeAlias = Mapping[str, bool]
 """Propositions and whether they hold."""
+
+
+class Sides(NamedTuple):
+    """Which propositions a machine reads, and which it answers."""
+
+    read: Collection[str]
+    answered: Collection[str]
+
+
 MOST_BYTES = 64 << 20
 """Most bytes of a file of a strategy."""
 
@@ -21,6 +30,11 @@ class Machine(Protocol):
     @property
     def names(self) -> Sequence[str]:
         """All propositions that it knows, read or answered."""
+        ...
+
+    @property
+    def sides(self) -> Sides | None:
+        """Which of them it reads and which it answers; None where its file does not say."""
         ...
 
     def begin(self) -> State:
@@ -58,11 +72,14 @@ class Explicit:
         The state before the first letter.
     names : sequence of str
         All propositions.
+    sides : Sides or None
+        Which of them it reads and which it answers; None where its file does not say.
     """
 
     edges: Mapping[State, Sequence[Edge]]
     first: State
     names: Sequence[str]
+    sides: Sides | None = None
     _outputs: dict[frozenset[str], list[str]] = field(
         default_factory=dict[frozenset[str], list[str]], init=False, repr=False, compare=False
     )

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import Any, Final
 
-from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, State, damaged
+from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, Sides, State, damaged
 
 WHAT: Final = "slugs' JSON or its explicit text"
 FIRST: Final = ("first",)
@@ -27,7 +27,8 @@ def is_slugs_text(text: str) -> bool:
 def read_slugs_json(document: Any) -> Explicit:
     """Return the machine in a JSON object; InputError if it is none."""
     try:
-        names = [str(name) for name in document.get("variables") or _declared(document)]
+        sides = None if document.get("variables") else _declared(document)
+        names = [str(name) for name in (document["variables"] if sides is None else [*sides[0], *sides[1]])]
         nodes = {
             key: ([bool(bit) for bit in node["state"]], list(node["trans"]))
             for key, node in document["nodes"].items()
@@ -35,12 +36,12 @@ def read_slugs_json(document: Any) -> Explicit:
         initial = [key for key, node in document["nodes"].items() if node.get("initial")]
     except (KeyError, TypeError, AttributeError):
         raise damaged(WHAT, "not an object with variables and nodes") from None
-    return _machine(names, nodes, initial)
+    return _machine(names, nodes, initial, sides)
 
 
-def _declared(document: Any) -> list[str]:
-    """Return the variables of gr1c's form, which are declared one by one."""
-    return [name for side in ("ENV", "SYS") for entry in document[side] for name in entry]
+def _declared(document: Any) -> Sides:
+    """Return the variables of gr1c's form, which are declared one by one for each side."""
+    return Sides(*([str(name) for entry in document[side] for name in entry] for side in ("ENV", "SYS")))
 
 
 def read_slugs_text(text: str) -> Explicit:
@@ -65,7 +66,10 @@ def read_slugs_text(text: str) -> Explicit:
 
 
 def _machine(
-    names: Sequence[str], nodes: dict[str, tuple[list[bool], list[Any]]], initial: Sequence[str]
+    names: Sequence[str],
+    nodes: dict[str, tuple[list[bool], list[Any]]],
+    initial: Sequence[str],
+    sides: Sides | None = None,
 ) -> Explicit:
     """Return the machine of some nodes; without initial ones every node may be the first."""
     if not nodes:
@@ -82,4 +86,4 @@ def _machine(
         if unknown:
             raise damaged(WHAT, "a successor that is no state", value=unknown[0])
         edges[key] = [into[target] for target in targets]
-    return Explicit(edges, FIRST, list(names))
+    return Explicit(edges, FIRST, list(names), sides)

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Final
 
-from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, State, damaged
+from dubins_traffic.synthesis.foreign.machine import Edge, Explicit, Sides, State, damaged
 
 WHAT: Final = "TuLiP's Python file"
 
@@ -25,11 +25,14 @@ def read_tulip(text: str) -> Explicit:
         functions = {item.name: item for item in strategy.body if isinstance(item, ast.FunctionDef)}
         first = _initial(functions["__init__"])
         (choice,) = [item for item in functions["move"].body if isinstance(item, ast.If)]
-        edges = {state: list(_edges(body)) for state, body in _cases(choice)}
+        read: dict[str, None] = {}
+        edges = {state: list(_edges(body, read)) for state, body in _cases(choice)}
     except (SyntaxError, ValueError, KeyError, AssertionError, AttributeError, RecursionError, MemoryError):
         raise damaged(WHAT, "not as tulip.dumpsmach writes it") from None
     names = dict.fromkeys(name for own in edges.values() for edge in own for name in edge.cube)
-    return Explicit(edges, first, list(names))
+    return Explicit(
+        edges, first, list(names), Sides(list(read), [name for name in names if name not in read])
+    )
 
 
 def _parsed(text: str) -> ast.Module:
@@ -58,10 +61,12 @@ def _cases(choice: ast.If) -> Iterator[tuple[State, list[ast.stmt]]]:
         item = item.orelse[0]
 
 
-def _edges(body: list[ast.stmt]) -> Iterator[Edge]:
+def _edges(body: list[ast.stmt], read: dict[str, None]) -> Iterator[Edge]:
+    """Yield the edges of a state, and note which propositions they read."""
     item = body[0]
     while isinstance(item, ast.If):
         cube = {name: bool(value) for name, value in _equations(item.test)}
+        read.update(dict.fromkeys(cube))
         target: State = None
         for line in item.body:
             assert isinstance(line, ast.Assign)
