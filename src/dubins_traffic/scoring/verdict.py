@@ -298,7 +298,7 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3 (docs/rules.md#E1)."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for 1.road, 2, 3 (docs/rules.md#E1)."""
     return rule[:2] if rule.startswith("E") else "E1"
 
 
