@@ -157,10 +157,13 @@ def test_a_trial_ran_whole_if_all_its_ticks_are_there() -> None:
 def test_rounds_count_if_the_trial_is_clean_and_whole() -> None:
     assert [counted_rounds(3, clean=c, whole=w) for c, w in product((True, False), repeat=2)] == [3, 0, 0, 0]
     hit = Collision(1.0, 30, "ego", "agent0", False, True)
-    assert is_clean(None, ())
-    assert not is_clean(None, (hit,))
-    assert is_clean(verdict(), (hit,)), "a verdict knows"
-    assert not is_clean(verdict("violated"), ())
+    whole, quit_ = Ending(End.DURATION, 90), Ending(End.GAVE_UP, 60)
+    assert is_clean(None, (), whole)
+    assert is_clean(None, (), None)
+    assert not is_clean(None, (hit,), whole)
+    assert not is_clean(None, (), quit_)
+    assert is_clean(verdict(), (hit,), quit_), "a verdict knows"
+    assert not is_clean(verdict("violated"), (), whole)
 
 
 def test_the_paper_is_defined_everywhere() -> None:

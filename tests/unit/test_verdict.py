@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.cars.state import Contact, Pose
+from dubins_traffic.cars.state import Contact, Observation, Pose
 from dubins_traffic.cli.main import main
+from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -25,6 +26,7 @@ from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sandbox import owner_of
 from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
@@ -82,6 +84,46 @@ def test_the_environment_moves_first(roads: RoadNetwork) -> None:
     assert duel(roads, 12, 11).verdict == "excused"
     assert duel(roads, -1, 11).verdict == "satisfied"
     assert [duel(roads, ego, 11).clean for ego in (-1, 12, 5)] == [True, False, False]
+
+
+CONTROLLERS_OWN = {
+    "gave_up", "controller_fault", "deadline", "peer_silent", "peer_lost", "peer_flood", "peer_garbage",
+    "out_of_time", "out_of_memory", "output_flood",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("end", End)
+def test_a_trial_that_its_controller_ended_is_never_clean(end: End) -> None:
+    roads = ROADS["grid"]
+    one, two = lanes_in(roads)[:2]
+    cars = left_at(roads, one, 40), left_at(roads, two, 40)
+    found = verdict(case(roads, 2), [list(frame) for frame in zip(*cars, strict=True)], end=end)
+    assert found.violations == ()
+    assert found.clean == (end.value not in CONTROLLERS_OWN)
+    assert (owner_of(end) == "submission") == (not found.clean or end in (End.DURATION, End.COLLISION))
+
+
+class Raises:
+    """Drives for three ticks, then raises."""
+
+    def start(self, problem: object) -> None:
+        pass
+
+    def act(self, observation: Observation) -> tuple[float, float]:
+        if observation.tick == 3:
+            raise RuntimeError("out of ideas")
+        return 0.0, 0.0
+
+
+def test_alone_and_in_a_batch_who_raises_is_not_clean() -> None:
+    configuration = load_config("junction")
+    together = run_batch(configuration, Raises, trials=2, seed=1).outcomes
+    for outcome in together:
+        alone = run_trial(outcome.instance, Raises())
+        assert outcome.ending.end == alone.ending.end == "controller_fault"
+        for found in (outcome.score.verdict, alone.score.verdict):
+            assert found is not None
+            assert (found.clean, found.verdict, found.violations) == (False, "unfinished", ())
 
 
 @both

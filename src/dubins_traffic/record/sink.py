@@ -42,24 +42,23 @@ class End(StrEnum):
     BOX_FAILED = "box_failed"
 
 
-FAULTS = frozenset(
+BY_CONTROLLER: Final = frozenset(
     {
+        End.GAVE_UP,
         End.CONTROLLER_FAULT,
-        End.AGENT_FAULT,
         End.DEADLINE,
         End.PEER_SILENT,
         End.PEER_LOST,
         End.PEER_FLOOD,
         End.PEER_GARBAGE,
-        End.TRANSPORT_LOST,
-        End.WORLD_LOST,
         End.OUT_OF_TIME,
         End.OUT_OF_MEMORY,
         End.OUTPUT_FLOOD,
-        End.BOX_FAILED,
     }
 )
-"""Ends that are a fault of a driver, transport or world."""
+"""Ends that the ego's controller has brought about: such a trial is never clean (docs/rules.md#clean)."""
+FAULTS: Final = BY_CONTROLLER | {End.AGENT_FAULT, End.TRANSPORT_LOST, End.WORLD_LOST, End.BOX_FAILED}
+"""Ends that no trial should have: those of `BY_CONTROLLER`, and faults of an e-agent, a transport, a world or a box."""
 
 
 SHIELD: Final = "shield"
@@ -73,6 +72,14 @@ class Ending:
     end: End
     ticks: int
     detail: str = ""
+
+    @property
+    def by_controller(self) -> bool:
+        """Whether the ego's controller ended the trial."""
+        return self.end in BY_CONTROLLER
+
+    def __str__(self) -> str:
+        return f"{self.end}: {self.detail}".rstrip(": ")
 
 
 class Sink(Protocol):

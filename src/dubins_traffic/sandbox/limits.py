@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.protocols import End
+from dubins_traffic.record.sink import BY_CONTROLLER
 
 Fault = Literal["submission", "platform"]
 
@@ -135,24 +136,7 @@ class BoxEnd:
 
 
 OWNERS: Final[Mapping[End, Fault]] = {
-    End.GAVE_UP: "submission",
-    End.CONTROLLER_FAULT: "submission",
-    End.DEADLINE: "submission",
-    End.PEER_SILENT: "submission",
-    End.PEER_LOST: "submission",
-    End.PEER_FLOOD: "submission",
-    End.PEER_GARBAGE: "submission",
-    End.OUT_OF_TIME: "submission",
-    End.OUT_OF_MEMORY: "submission",
-    End.OUTPUT_FLOOD: "submission",
-    End.COLLISION: "submission",
-    End.DURATION: "submission",
-    End.AGENT_FAULT: "platform",
-    End.BOX_FAILED: "platform",
-    End.INTERRUPTED: "platform",
-    End.RESET: "platform",
-    End.TRANSPORT_LOST: "platform",
-    End.WORLD_LOST: "platform",
+    end: "submission" if end in BY_CONTROLLER | {End.COLLISION, End.DURATION} else "platform" for end in End
 }
 """Who answers for each end of a trial whose ego drives in a box."""
 

@@ -99,6 +99,7 @@ class Judging:
             self._referee.pending[0] if self._last >= 0 else NOTHING,
             self._margins.result() | self._entries(),
             whole=ran_whole(self._instance, self._ending, self._last),
+            by_controller=self._ending is not None and self._ending.by_controller,
         )
 
     def _entries(self) -> dict[str, float | None]:

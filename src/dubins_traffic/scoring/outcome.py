@@ -103,8 +103,9 @@ class BatchScores:
                 margins_by_rule(gap, (margins.road, margins.line, margins.back))
                 | entries_by_rule(entry, instance.problem.period),
                 whole=whole,
+                by_controller=ending.by_controller,
             )
-        clean = is_clean(verdict, collisions)
+        clean = is_clean(verdict, collisions, ending)
         off_road = own.off_road / rate
         return Score(
             trial=instance.trial,

@@ -54,7 +54,8 @@ class Score(Tabulated):
         at least once, and `goals` tells visits and longest gap of each.
     counted_rounds : int
         The rounds by which controllers are ranked: `rounds` of a clean trial that ran its whole planned duration,
-        else 0. Where the problem does not ask for the rules, a trial without a collision of the ego is clean.
+        else 0. Where the problem does not ask for the rules, a trial without a collision of the ego that its controller
+        did not end is clean.
     collisions : tuple of Collision
         Contacts of the ego, in order of time; `collisions_among_others` counts the rest.
     driven : Driven
@@ -215,7 +216,7 @@ class Scorer:
         visits, verdict = self._visiting.result(), self._judging.result()
         collisions, driven = self._collisions.result(), self._driving.result()
         whole = ran_whole(self._instance, self._ending, self._count - 1)
-        clean = is_clean(verdict, collisions)
+        clean = is_clean(verdict, collisions, self._ending)
         return Score(
             trial=self._instance.trial,
             seed=self._instance.seed,
@@ -305,9 +306,11 @@ class ScoreSheet(Pictured, Tabulated):
         }
 
 
-def is_clean(verdict: Verdict | None, collisions: Sequence[Collision]) -> bool:
-    """Tell whether the ego broke no rule; if the trial is not judged, whether it touched no body."""
-    return not collisions if verdict is None else verdict.clean
+def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], ending: Ending | None) -> bool:
+    """Tell whether a trial is clean; if it is not judged, whether the ego touched nothing and did not end it."""
+    if verdict is not None:
+        return verdict.clean
+    return not collisions and not (ending is not None and ending.by_controller)
 
 
 def score(record: Record, metrics: Sequence[MetricSpec] = ()) -> Score:

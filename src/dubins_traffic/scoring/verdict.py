@@ -121,7 +121,7 @@ class Verdict:
     verdict : Ruling
         Satisfied, violated, excused or unfinished.
     clean : bool
-        Whether the ego broke nothing, whatever others did.
+        Whether the ego broke nothing, whatever others did, and its controller did not end the trial.
     excuse : Excuse or None
         The excuse of an excused trial.
     near : bool or None
@@ -198,6 +198,7 @@ def reach_verdict(
     margins: dict[str, float | None],
     *,
     whole: bool,
+    by_controller: bool,
 ) -> Verdict:
     """Return the verdict on a trial.
 
@@ -222,6 +223,8 @@ def reach_verdict(
         The margins of the ego, by rule.
     whole
         Whether the trial ran its whole planned duration.
+    by_controller
+        Whether the ego's controller ended the trial: then it is not clean.
     """
     from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
 
@@ -245,7 +248,7 @@ def reach_verdict(
         near = is_near(breaches, back, seen)
     return Verdict(
         ruling,
-        not own,
+        not own and not by_controller,
         excuse,
         near,
         violations,

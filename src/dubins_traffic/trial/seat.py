@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, cast
 from dubins_traffic.controllers import blame
 from dubins_traffic.errors import ControllerError, PeerError, shown
 from dubins_traffic.protocols import Closes, Controller, End, Ending, Reports
-from dubins_traffic.record.sink import FAULTS
+from dubins_traffic.record.sink import BY_CONTROLLER
 
 if TYPE_CHECKING:
     from dubins_traffic.cars.state import Observation
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 CLOSE_RAISED: Final = "close raised"
 """In the detail of an ending, before what a controller's `close` raised."""
-_PEERS_OWN: Final = FAULTS | {End.GAVE_UP}
+_PEERS_OWN: Final = BY_CONTROLLER | {End.BOX_FAILED}
 """Ends that a PeerError may name in a trial that nobody elsewhere takes part in."""
 
 

@@ -109,6 +109,8 @@ def breach_text(violation: Violation) -> str:
 def verdict_text(verdict: Verdict) -> str:
     """Return in words why a trial has its verdict: what the ego broke first, and what excused it."""
     own = next((one for one in verdict.violations if one.car == EGO_NAME), None)
+    if own is None and not verdict.clean:
+        return "The ego broke nothing, but its controller ended the trial."
     if own is None:
         task = "and did its task" if verdict.verdict is Ruling.SATISFIED else "and did not do all of its task"
         return f"The ego broke nothing {task}."
