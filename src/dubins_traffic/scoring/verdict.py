@@ -157,8 +157,13 @@ class Verdict:
         """Whether the e-agents broke a part of the assumption that the problem makes, before or after the ego."""
         return any(self.formulas.get(part) == BROKEN for part in ASSUMPTIONS)
 
+    @property
+    def own_violations(self) -> tuple[Violation, ...]:
+        """The breaches of the ego, in order of time."""
+        return tuple(violation for violation in self.violations if violation.car == EGO_NAME)
+
     def __repr__(self) -> str:
-        own = sum(violation.car == EGO_NAME for violation in self.violations)
+        own = len(self.own_violations)
         others = len(self.violations) - own
         return f"<Verdict: {self.verdict.value}, breaches: {own} by the ego, {others} by others>"
 
