@@ -91,6 +91,7 @@ def judged(number: int, **changes: Any) -> Judged:
         "end": "duration",
         "reason": None,
         "counted_rounds": 1,
+        "rounds_before_breach": 1.0,
         "verdict": "satisfied",
         "clean": True,
         "collisions": 0,

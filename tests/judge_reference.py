@@ -211,17 +211,17 @@ class Judge:
     def breaches(self) -> Found:
         found: Found = set()
         for n in self.cars:
-            found |= self.lane(n) | self.entries(n)
-            found |= self.road() if n == 0 else self.assumption(n)
+            found |= self.road(n) | self.lane(n) | self.entries(n)
+            found |= self.assumption(n) if n else set()
         return found | self.goals()
 
     def long(self, rule: str, n: int, duration: float, holds: Callable[[int], bool]) -> Found:
         wait = self.ticks(duration)
         return {(rule, n, run.start + wait, run.start) for run in self.runs(holds) if len(run) > wait}
 
-    def road(self) -> Found:
-        on = [facts[0]["on_road"] for facts in self.past]
-        return {("1.road", 0, k, k) for k in range(1, len(on)) if on[k - 1] and not on[k]}
+    def road(self, n: int) -> Found:
+        on = [facts[n]["on_road"] for facts in self.past]
+        return {("1.road", n, k, k) for k in range(1, len(on)) if on[k - 1] and not on[k]}
 
     def lane(self, n: int) -> Found:
         past = self.past

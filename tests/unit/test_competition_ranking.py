@@ -62,6 +62,20 @@ def test_the_share_of_satisfied_trials_parts_equal_means() -> None:
     assert [own.place for own in rank(entries, phase(4, "none"))] == [1, 1, 1, 1]
 
 
+def test_rounds_before_the_first_breach_part_equal_means() -> None:
+    entries = {
+        "satisfied": [judged(k, counted_rounds=0, rounds_before_breach=0.25) for k in range(4)],
+        "farther": [
+            judged(k, counted_rounds=0, rounds_before_breach=0.5 * (k == 0) + 0.25, verdict="violated")
+            for k in range(4)
+        ],
+    }
+    assert [(own.place, own.entry, own.second) for own in rank(entries, phase(4))] == [
+        (1, "farther", 0.375),
+        (2, "satisfied", 0.25),
+    ]
+
+
 def test_the_order_of_entries_and_trials_does_not_matter() -> None:
     entries = {"a": results([1, 2, 3]), "b": results([3, 2, 1]), "c": results([0, 0, 9])}
     turned = {name: entries[name][::-1] for name in "cba"}

@@ -121,6 +121,15 @@ def test_the_controller_with_the_most_counted_rounds_comes_first() -> None:
     assert [trial for trial, _ in rows] == ["0", "1"] * 3
 
 
+def test_rounds_before_the_first_breach_part_controllers_of_equal_counted_rounds() -> None:
+    late = [scored(k, "late", counted_rounds=1 - k, rounds_before_breach=0.5 + k) for k in range(2)]
+    soon = [scored(k, "soon", counted_rounds=k, rounds_before_breach=0.5) for k in range(2)]
+    shown = text(*soon, *late, width=120)
+    rows = [line.split() for line in shown.split("\n") if line.strip()[:1].isdigit()]
+    assert [row[1] for row in rows] == ["late", "late", "soon", "soon"]
+    assert [line.split().count("0.75") for line in shown.split("\n")].count(1) == 1, "the mean of the four"
+
+
 def test_a_sheet_says_once_that_its_verdicts_say_little(capsys: pytest.CaptureFixture[str]) -> None:
     broken, kept = scored(verdict=verdict(fallen=True)), scored(verdict=verdict())
     for json in (True, False):
@@ -223,6 +232,14 @@ def test_a_campaign_ranks_by_counted_rounds_and_puts_who_gave_up_last(tmp_path: 
     assert worst.order(results).tolist() == [0, 1, 2, 3]
     why = worst.why(results.to_pylist()[0])
     assert why == "100% of the goals visited, 0 of 9 rounds count, gave up after 0.1 s"
+
+
+def test_a_campaign_parts_equal_counted_rounds_by_those_before_the_first_breach(tmp_path: Path) -> None:
+    found = [
+        (End.DURATION, scored(counted_rounds=0, rounds_before_breach=own)) for own in (0.5, 0.5, 0.0, 1.5)
+    ]
+    comparison, _ = campaign_of(tmp_path, *found)
+    assert comparison.controllers == ["simple", "lanes"]
 
 
 def test_a_ranking_of_the_worst_knows_no_excuse(tmp_path: Path) -> None:

@@ -76,6 +76,47 @@ def test_rounds_by_visits() -> None:
     assert visits([A, B], goals=[(0, 0), (2, 1), (0, 0)]).rounds == 1
 
 
+@pytest.mark.parametrize("size", [1, 3, 1000])
+def test_rounds_before_a_breach_count_the_share_of_the_round_begun(size: int) -> None:
+    """The visit at frame 0 does not count: who stands in a goal has none, and the first round needs all goals again."""
+    instance = make_instance(goals=[(0, 0), (2, 1)], ticks=6)
+    metric = Visiting()
+    metric.begin(instance)
+    for block in blocks(make_frames(instance, [A, B, A, ROAD, C, B, A]), size):
+        metric.frames(block)
+    assert [metric.rounds_until(last) for last in range(7)] == [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0]
+    assert metric.rounds_until(None) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("end", "contacts", "wanted"),
+    [
+        (End.DURATION, [], 2.0),
+        (End.DURATION, [Contact(2, 2 / 30, 0, 1, 0.0, 0.0, 1.0, 0.0, (1.0, 0.0), (True, False))], 1.0),
+        (End.GAVE_UP, [], 0.0),
+        (End.CONTROLLER_FAULT, [], 0.0),
+        (End.INTERRUPTED, [], 2.0),
+    ],
+)
+def test_no_round_counts_after_a_breach_or_if_the_controller_ended_the_trial(
+    end: End, contacts: list[Contact], wanted: float
+) -> None:
+    instance = make_instance(goals=[(0, 0), (2, 1)], ticks=6)
+    frames = replace(make_frames(instance, [A, B, A, ROAD, C, B, A]), contacts=tuple(contacts))
+    scorer = Scorer()
+    scorer.begin(instance)
+    scorer.frames(frames)
+    scorer.end(Ending(end, 6))
+    assert scorer.result().rounds_before_breach == wanted
+
+
+def test_who_stands_in_a_goal_has_no_round_before_a_breach() -> None:
+    instance = make_instance(goals=[(0, 0)], ticks=9)
+    scorer = Scorer()
+    feed(instance, make_frames(instance, [A] * 10), scorer)
+    assert (scorer.result().rounds, scorer.result().rounds_before_breach) == (1, 0.0)
+
+
 def test_without_goals_there_are_no_rounds_and_nothing_is_missed() -> None:
     assert visits([A] * 5, goals=[]) == Visits((), 1.0, 0)
 
@@ -234,6 +275,7 @@ def test_the_score_as_json() -> None:
         "duration_s": 2.0,
         "rounds": 0,
         "counted_rounds": 0,
+        "rounds_before_breach": 0.0,
         "goals_visited": 0.5,
         "goals": [
             {"goal": [0, 0], "visits": 1, "longest_gap_s": 3.0},

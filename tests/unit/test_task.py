@@ -96,7 +96,8 @@ def test_the_rules_of_the_ego() -> None:
 def test_the_assumption() -> None:
     spec = of(case(GRID, 2, [(0, 0)], crossing_degree=4))
     wanted = """
-        [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] (!left_agent0 || hemmed_agent0))
+        [] (Y on_road_agent0 -> on_road_agent0)
+        && [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] (!left_agent0 || hemmed_agent0))
         && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
         && [] (enter_agent0_1_1 -> Y clear_agent0_1_1)
         && [] !at_fault_agent0
@@ -114,7 +115,7 @@ def test_the_assumption() -> None:
 @pytest.mark.parametrize(
     ("number", "words"),
     [
-        (1, ("left_", "enter_")),
+        (1, ("on_road_", "left_", "enter_")),
         (2, ("at_fault_",)),
         (3, ("first_", "renewed_")),
         (4, ("exit_", "stays_")),

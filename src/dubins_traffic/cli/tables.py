@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
@@ -50,6 +51,17 @@ def _counted(score: Score) -> str:
     return str(rounds) if counted == rounds else f"{counted} of {rounds}"
 
 
+def _mean_before_breach(sheet: ScoreSheet) -> str:
+    return (
+        f"{math.fsum(score.rounds_before_breach for score in sheet.trials) / max(1, len(sheet.trials)):.2f}"
+    )
+
+
+def _breaches(score: Score) -> str:
+    """Return how often the ego broke a rule."""
+    return "-" if score.verdict is None else str(len(score.verdict.own_violations))
+
+
 def _near(score: Score) -> str:
     return "-" if score.verdict is None or score.verdict.near is None else yes(score.verdict.near)
 
@@ -67,6 +79,8 @@ def points(value: float | None) -> str:
 COLUMNS: dict[str, Column] = {
     "clean": Column(lambda score: "-" if score.verdict is None else yes(score.verdict.clean), _is_judged),
     "counted rounds": Column(_counted, total=lambda sheet: str(sheet.counted_rounds_sum)),
+    "before breach": Column(lambda score: f"{score.rounds_before_breach:.2f}", total=_mean_before_breach),
+    "breaches": Column(_breaches, _is_judged, spare=1),
     "verdict": Column(lambda score: score.verdict.verdict.value if score.verdict else "-", _is_judged),
     "near": Column(_near, lambda scores: any(score.verdict and score.verdict.excuse for score in scores)),
     "end": Column(lambda score: (score.end or "cut off").replace("_", " "), spare=2),
@@ -176,15 +190,20 @@ def formula_table(sheet: ScoreSheet) -> Table:
 
 
 def _ranked(scores: Scores) -> dict[str, list[Score]]:
-    """Return the scores of each controller, the one with the most counted rounds a trial first."""
+    """Return the scores of each controller, best first.
+
+    That has the most counted rounds a trial, and among equal ones the most rounds before the first breach.
+    """
     found: dict[str, list[Score]] = {}
     for score in scores:
         found.setdefault(score.controller or "-", []).append(score)
 
-    def mean(name: str) -> float:
-        return sum(score.counted_rounds for score in found[name]) / len(found[name])
+    def merit(name: str) -> tuple[float, float]:
+        own, trials = found[name], len(found[name])
+        counted = sum(score.counted_rounds for score in own) / trials
+        return counted, math.fsum(score.rounds_before_breach for score in own) / trials
 
-    return {name: found[name] for name in sorted(found, key=lambda name: -mean(name))}
+    return {name: found[name] for name in sorted(found, key=merit, reverse=True)}
 
 
 def _needed(scores: Scores) -> dict[str, Column]:

@@ -19,6 +19,7 @@ from dubins_traffic.problem.faults import Strict, fault, parse
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import owner_of
+from dubins_traffic.scoring.columns import SECOND
 
 Owner = Literal["submission", "platform"]
 _OWN_ENDS = (End.DURATION, End.COLLISION)
@@ -105,7 +106,7 @@ class _Judged(Strict):
         return self
 
 
-_NUMBERS: Final = ("counted_rounds", "icra2016", "collisions", "clean")
+_NUMBERS: Final = ("counted_rounds", SECOND, "icra2016", "collisions", "clean")
 """What ranking reads as numbers."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,7 +18,7 @@ from dubins_traffic.competition.judging import OWNERS, Judged
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import End
-from dubins_traffic.scoring.columns import SCORES
+from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
 from dubins_traffic.scoring.verdict import Ruling
 
@@ -40,6 +41,8 @@ class Place:
         How many trials it rests on.
     estimate : Estimate
         Mean of the metric over the trials, with its 95 % interval.
+    second : float
+        Mean of the rounds before the first breach, which parts entries of equal means.
     satisfied, clean : Share
         Of the trials, with Wilson's intervals: satisfied to the end; nothing broken.
     ties : tuple of str
@@ -52,6 +55,7 @@ class Place:
     entry: str
     trials: int
     estimate: Estimate
+    second: float
     satisfied: Share
     clean: Share
     ties: tuple[str, ...]
@@ -65,6 +69,7 @@ class Place:
             "trials": self.trials,
             "mean": self.estimate.mean,
             "interval": _ends(self.estimate.mean_interval),
+            SECOND: self.second,
             "satisfied": self.satisfied.share,
             "satisfied_interval": _ends(self.satisfied.interval),
             "clean": self.clean.share,
@@ -79,6 +84,7 @@ class _Entry:
     name: str
     values: Floats
     mean: float
+    second: float
     satisfied: int
     clean: int
 
@@ -125,6 +131,7 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
                 own.name,
                 count,
                 _estimated(own.values.tobytes()),
+                own.second,
                 share(own.satisfied, count),
                 share(own.clean, count),
                 tuple(sorted(beside)),
@@ -206,11 +213,13 @@ def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
         )
     values = np.array([value(row, phase.ranking.metric) for row in rows], dtype=np.float64)
     mean = float(np.sum(values)) / len(values)
-    return _Entry(name, values, mean, sum(map(is_satisfied, rows)), sum(map(is_clean, rows)))
+    second = math.fsum(value(row, SECOND) for row in rows) / len(rows)
+    return _Entry(name, values, mean, second, sum(map(is_satisfied, rows)), sum(map(is_clean, rows)))
 
 
-def _merit(own: _Entry, phase: Phase) -> tuple[float, int]:
-    return own.mean, own.satisfied if phase.ranking.ties == "satisfied" else 0
+def _merit(own: _Entry, phase: Phase) -> tuple[float, float, int]:
+    second = own.second if phase.ranking.metric == "counted_rounds" else 0.0
+    return own.mean, second, own.satisfied if phase.ranking.ties == "satisfied" else 0
 
 
 def _differences(found: Sequence[_Entry], phase: Phase) -> list[Difference]:

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import is_clean, is_satisfied, missing, value
+from dubins_traffic.scoring.columns import SECOND
 
 State = Literal[
     "received", "checking", "queued", "running", "scoring", "done", "rejected", "failed", "cancelled"
@@ -142,6 +143,7 @@ def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) 
     metric = phase.ranking.metric
     found = {
         metric: sum(value(row, metric) for row in rows) / len(rows),
+        SECOND: sum(value(row, SECOND) for row in rows) / len(rows),
         "satisfied": sum(map(is_satisfied, rows)) / len(rows),
         "clean": sum(map(is_clean, rows)) / len(rows),
     }

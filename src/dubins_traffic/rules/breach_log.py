@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class _Rule(NamedTuple):
-    """The rules by number; `RULES` has their names. Rules 2 and 3 of an e-agent are E1."""
+    """The rules by number; `RULES` has their names. `ROAD`, and rules 2 and 3, of an e-agent are E1."""
 
     COLLISION: int = 0
     ROAD: int = 1
@@ -108,7 +108,7 @@ class JudgedCar:
     due: int = 0
     """Tick in which the car has to be judged again even if its labels stay the same and no car comes near."""
     off_road: int = NEVER
-    """Run of being off the road (ego); `NEVER` before the ego has been on one."""
+    """Run of being off the road; `NEVER` before the car has been on one."""
     left_since: int = -1
     free_since: int = -1
     """Run of being left and not hemmed in."""

@@ -96,7 +96,10 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
 
 @jit_inline
 def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -> None:
-    """Judge rule 1: after its first frame on the road the ego stays there; `on` (bool) tells whether it is."""
+    """Judge rule 1 for the ego, E1 for an e-agent: after its first frame on the road a car stays there.
+
+    `on` (bool) tells whether it is there in this frame.
+    """
     if on:
         car.off_road = -1
     elif car.off_road == -1:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Exceptions:
-    """Counts the breaches of rules 2 and 3 by the e-agents of one trial.
+    """Counts the breaches of E1 (rules 1.road, 2 and 3) by the e-agents of one trial.
 
     Parameters
     ----------

@@ -113,12 +113,11 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
         if car.bits & FLAG.STOPPED != 0:
             stopped = lane_end(tables.roads, own.net, car.lane) == v
         _judge_entry(b, n, tick, v, stopped, tables)
-    if n == EGO:
-        on = bits & FLAG.ON_ROAD != 0
-        if not on and car.off_road == -1 and _by_the_road(b, tables):
-            on, due = True, tick + 1
-        judge_road(car, on, lane, tick, log)
-    else:
+    on = bits & FLAG.ON_ROAD != 0
+    if not on and car.off_road == -1 and _by_the_road(b, n, tables):
+        on, due = True, tick + 1
+    judge_road(car, on, lane, tick, log)
+    if n != EGO:
         due = min(due, judge_agent(b, n, tick, tables))
         if car.at != labels.at[b, n]:
             car.at_since = tick
@@ -133,12 +132,12 @@ def _surely_left(bits: Any, reach: float, was: bool, own: TrialRules) -> bool:
 
 
 @jit_rare
-def _by_the_road(b: int, tables: RefereeTables) -> bool:
-    """Tell whether the ego is off the road by no more than GRAIN."""
+def _by_the_road(b: int, n: int, tables: RefereeTables) -> bool:
+    """Tell whether car n is off the road by no more than GRAIN."""
     roads, net = tables.roads, tables.rules[b].net
     far = roads.half_width[net] + GRAIN
-    x, y = float(tables.state.x[b, EGO]), float(tables.state.y[b, EGO])
-    return distance2(roads, net, int(tables.labels.segment[b, EGO]), x, y) <= far * far
+    x, y = float(tables.state.x[b, n]), float(tables.state.y[b, n])
+    return distance2(roads, net, int(tables.labels.segment[b, n]), x, y) <= far * far
 
 
 @jit

@@ -75,10 +75,9 @@ def task(problem: JudgedProblem, names: Sequence[str]) -> Specification:
         for point, degree in zip(problem.network.intersections, problem.network.degrees, strict=True)
         if degree >= rules.crossing_degree
     ]
-    on_road = prop(f"on_road_{ego}")
     guarantees = [
         always(negation(prop(f"collision_{ego}"))),
-        always(implies(yesterday(on_road), on_road)),
+        _stays_on_road(ego),
         *visits,
         *_rules_2_and_3(ego, crossings, rules),
     ]
@@ -86,6 +85,12 @@ def task(problem: JudgedProblem, names: Sequence[str]) -> Specification:
     if rules.assume_e6:
         assumptions += [always(eventually(prop(_on("free", goal)))) for goal in goals]
     return _specification(assumptions, guarantees, ego)
+
+
+def _stays_on_road(name: str) -> Formula:
+    """Return that a car stays on the road from its first frame there on."""
+    on_road = prop(f"on_road_{name}")
+    return always(implies(yesterday(on_road), on_road))
 
 
 def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters) -> list[Formula]:
@@ -112,7 +117,7 @@ def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> li
     if rules.assume_e1 and rules.exceptions:
         found.append(always(negation(prop(f"excess_{name}"))))
     elif rules.assume_e1:
-        found += _rules_2_and_3(name, crossings, rules)
+        found += [_stays_on_road(name), *_rules_2_and_3(name, crossings, rules)]
     if rules.assume_e2:
         found.append(always(negation(prop(f"at_fault_{name}"))))
     if rules.assume_e3:

@@ -30,8 +30,8 @@ from dubins_traffic.rules.vocabulary import (
 
 Mask = npt.NDArray[np.bool_]
 
-_E1: Final = ("2", "3")
-"""First characters of the names of the rules that make up E1."""
+_E1: Final = ("1.road", "2.", "3.")
+"""How the names of the rules begin that make up E1."""
 
 
 class _Scene(NamedTuple):

@@ -21,14 +21,8 @@ def _of_excuse(value: Callable[[Excuse], Value]) -> Callable[[Score], Value]:
     return _of_verdict(lambda verdict: None if verdict.excuse is None else value(verdict.excuse))
 
 
-def _breaches(*, ego: bool) -> Callable[[Score], Value]:
-    return _of_verdict(lambda verdict: sum((one.car == EGO_NAME) == ego for one in verdict.violations))
-
-
 def _broken(rule: str) -> Callable[[Score], Value]:
-    return _of_verdict(
-        lambda verdict: sum(one.car == EGO_NAME and one.rule == rule for one in verdict.violations)
-    )
+    return _of_verdict(lambda verdict: sum(one.rule == rule for one in verdict.own_violations))
 
 
 def _fallen(part: str) -> Callable[[Score], Value]:
@@ -49,8 +43,14 @@ COLUMNS = (
     ),
     ScoreColumn(Column("excuse", kind="string"), _of_excuse(lambda excuse: excuse.assumption)),
     ScoreColumn(Column("excuse_sensed", kind="bool"), _of_excuse(lambda excuse: excuse.sensed)),
-    ScoreColumn(Column("breaches", "breaches of the ego", "", -1, "int32"), _breaches(ego=True)),
-    ScoreColumn(Column("breaches_of_others", "breaches of others", kind="int32"), _breaches(ego=False)),
+    ScoreColumn(
+        Column("breaches", "breaches of the ego", "", -1, "int32"),
+        _of_verdict(lambda verdict: len(verdict.own_violations)),
+    ),
+    ScoreColumn(
+        Column("breaches_of_others", "breaches of others", kind="int32"),
+        _of_verdict(lambda verdict: len(verdict.violations) - len(verdict.own_violations)),
+    ),
     *(ScoreColumn(Column(f"breaches.{rule}", kind="int32"), _broken(rule)) for rule in EGO_RULES),
     *(ScoreColumn(Column(f"breaches_of_others.{part}", kind="int32"), _fallen(part)) for part in ASSUMPTIONS),
 )

@@ -39,7 +39,8 @@ _FIRST_IN_TABLES = (
 )  # fmt: skip
 """Columns that come first in tables, in an order that is kept since files have it; the others follow by part."""
 _FIRST_IN_REPORTS = (
-    "clean", "counted_rounds", "rounds", "goals_visited", "longest_gap_s", "breaches", "breaches_of_others",
+    "clean", "counted_rounds", "rounds_before_breach", "rounds", "goals_visited", "longest_gap_s", "breaches",
+    "breaches_of_others",
     "assumption_broken", "collisions", "collisions_ego_fault", "collisions_other_fault", "collisions_both_fault",
     "collisions_among_others", "min_clearance_m", "distance_m", "standing_share", "off_road_s", "off_road_share",
     "lane_departures", "interventions", "duration_s",
@@ -49,6 +50,8 @@ _KNOWN = {own.column.name: own for part in _PARTS for own in part}
 
 SCORES: Final[Mapping[str, ScoreColumn]] = {name: _KNOWN[name] for name in (*_FIRST_IN_TABLES, *_KNOWN)}
 """The columns of every score, by name, in the order of tables; a value is None where a score has none."""
+SECOND: Final = "rounds_before_breach"
+"""The column that ranks controllers whose means of the first one, `counted_rounds` mostly, are equal."""
 REPORTED: Final[tuple[Column, ...]] = tuple(
     _KNOWN[name].column for name in dict.fromkeys((*_FIRST_IN_REPORTS, *SCORES)) if _KNOWN[name].column.label
 )

@@ -94,6 +94,7 @@ class Visiting:
         self._visits = np.zeros(count, dtype=np.int64)
         self._last = np.zeros(count, dtype=np.int64)
         self._gap = np.zeros(count, dtype=np.int64)
+        self._order: list[tuple[int, int]] = []
         self._end = planned_ticks(instance)
         self._rate = instance.problem.rate
         self._last_frame = -1
@@ -132,6 +133,7 @@ class Visiting:
         self._visits[goal] += 1
         self._gap[goal] = max(self._gap[goal], tick - self._last[goal])
         self._last[goal] = tick
+        self._order.append((tick, goal))
         return True
 
     @property
@@ -145,6 +147,21 @@ class Visiting:
     def end(self, ending: Ending) -> None:
         """Nothing is left to do."""
 
+    def rounds_until(self, last: int | None) -> float:
+        """Return the rounds of the visits in frames 1 to `last`, with the share of the goals of the round begun.
+
+        None stands for the last frame (docs/rules.md#before-breach).
+        """
+        rounds, done = 0, set[int]()
+        for tick, goal in sorted(self._order):
+            if tick == 0 or (last is not None and tick > last):
+                continue
+            done.add(goal)
+            if len(done) == len(self._visits):
+                rounds += 1
+                done.clear()
+        return rounds_with_share(rounds, len(done), len(self._visits))
+
     def result(self) -> Visits:
         """Return the visits up to the last frame; gaps run to the planned end, whenever the trial ended."""
         gaps = np.maximum(self._gap, self._end - self._last) / self._rate
@@ -153,8 +170,17 @@ class Visiting:
         return Visits(tuple(GoalVisits(*row) for row in rows), visited, self._rounds.count)
 
 
+def rounds_with_share(rounds: int, done: int, goals: int) -> float:
+    """Return rounds, and the share of `goals` goals that is `done` in the round begun; 0 without goals."""
+    return rounds + done / goals if goals else 0.0
+
+
 COLUMNS = (
     ScoreColumn(Column("rounds", "rounds", "", 1, "int32"), lambda score: score.rounds),
+    ScoreColumn(
+        Column("rounds_before_breach", "rounds before the first breach", "", 1),
+        lambda score: score.rounds_before_breach,
+    ),
     ScoreColumn(Column("goals_visited", "goals visited", "share", 1), lambda score: score.goals_visited),
     ScoreColumn(
         Column("longest_gap_s", "longest gap between visits", "s", -1),

@@ -20,7 +20,7 @@ from dubins_traffic.rules.referee import Breach, Pending, accused, order
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
-from dubins_traffic.scoring.goals import GoalVisits, Visits
+from dubins_traffic.scoring.goals import GoalVisits, Visits, rounds_with_share
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import entries_by_rule, margins_by_rule
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
@@ -116,6 +116,9 @@ class BatchScores:
             duration_s=ticks / rate,
             rounds=visits.rounds,
             counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
+            rounds_before_breach=0.0
+            if ending.by_controller
+            else rounds_with_share(own.early_rounds, own.early_goals, len(goals)),
             goals_visited=visits.visited,
             goals=visits.goals,
             collisions=collisions,

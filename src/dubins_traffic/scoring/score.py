@@ -56,6 +56,10 @@ class Score(Tabulated):
         The rounds by which controllers are ranked: `rounds` of a clean trial that ran its whole planned duration,
         else 0. Where the problem does not ask for the rules, a trial without a collision of the ego that its controller
         did not end is clean.
+    rounds_before_breach : float
+        The rounds by which controllers are ranked that have as many counted rounds: those of the visits after frame 0
+        and up to the frame of the ego's first breach (a collision where the problem does not ask for the rules), with
+        the share of the goals of the round begun; 0 if the controller ended the trial (docs/rules.md#before-breach).
     collisions : tuple of Collision
         Contacts of the ego, in order of time; `collisions_among_others` counts the rest.
     driven : Driven
@@ -86,6 +90,7 @@ class Score(Tabulated):
     duration_s: float
     rounds: int
     counted_rounds: int
+    rounds_before_breach: float
     goals_visited: float
     goals: tuple[GoalVisits, ...]
     collisions: tuple[Collision, ...]
@@ -231,6 +236,9 @@ class Scorer:
             duration_s=max(0, self._count - 1) / self._instance.problem.rate,
             rounds=visits.rounds,
             counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
+            rounds_before_breach=0.0
+            if self._ending is not None and self._ending.by_controller
+            else self._visiting.rounds_until(_first_breach(verdict, collisions)),
             goals_visited=visits.visited,
             goals=visits.goals,
             collisions=collisions,
@@ -319,6 +327,13 @@ def outcome(verdict: str | None, end: str | None) -> str:
     if verdict is None or (verdict == Ruling.UNFINISHED and end in BY_CONTROLLER):
         return str(end or "cut off")
     return str(verdict)
+
+
+def _first_breach(verdict: Verdict | None, collisions: Sequence[Collision]) -> int | None:
+    """Return the frame of the ego's first breach, without a verdict of its first collision; None if there is none."""
+    if verdict is None:
+        return collisions[0].tick if collisions else None
+    return min((found.tick for found in verdict.own_violations), default=None)
 
 
 def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], ending: Ending | None) -> bool:

@@ -176,10 +176,24 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
                 goal.visits += 1
                 goal.gap = max(goal.gap, tick - goal.last_visit)
                 goal.last_visit = tick
+                if tick > 0 and own.sealed == 0:
+                    _count_early_visit(g, own, tally)
         goal.inside = inside
     if some:
         _count_rounds(own, tally)
     return spare
+
+
+@jit_rare
+def _count_early_visit(g: int, own: TrialCounts, tally: Tally) -> None:
+    """Count a visit of goal `g` (row) for the rounds before the first breach (docs/rules.md#before-breach)."""
+    own.early_goals += 1 - tally.goal[g].early_done
+    tally.goal[g].early_done = 1
+    if own.early_goals == own.last_goal - own.first_goal:
+        own.early_rounds += 1
+        own.early_goals = 0
+        for k in range(own.first_goal, own.last_goal):
+            tally.goal[k].early_done = 0
 
 
 @jit_inline

@@ -52,8 +52,12 @@ class TrialCounts:
     """Rounds counted at samples, as in 2016."""
     rounds: int
     """Rounds counted by visits."""
+    early_rounds: int
+    """Rounds of the visits after frame 0, up to the frame of the ego's first breach."""
+    early_goals: int
+    """Goals visited in the round that has begun since, likewise."""
     sealed: int
-    """1 once the ego has broken a rule, from when on `Tally.sensed` stays as it is."""
+    """1 once the ego has broken a rule, from when on `Tally.sensed` and the two above stay as they are."""
     again: int
     """The next tick in which the ego may come to a goal, be in one, or leave the road of 2016."""
     last_at: int = -1
@@ -88,6 +92,8 @@ class GoalCounts:
     """Tick of the last one, 0 before the first."""
     gap: int
     """Longest gap between them, ticks."""
+    early_done: int
+    """1 if it is among `TrialCounts.early_goals`."""
     fresh: int = 1
     """1 if coming into its disc is a visit: there was none yet, or the ego has been in another disc since."""
 

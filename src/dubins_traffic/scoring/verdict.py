@@ -157,8 +157,13 @@ class Verdict:
         """Whether the e-agents broke a part of the assumption that the problem makes, before or after the ego."""
         return any(self.formulas.get(part) == BROKEN for part in ASSUMPTIONS)
 
+    @property
+    def own_violations(self) -> tuple[Violation, ...]:
+        """The breaches of the ego, in order of time."""
+        return tuple(violation for violation in self.violations if violation.car == EGO_NAME)
+
     def __repr__(self) -> str:
-        own = sum(violation.car == EGO_NAME for violation in self.violations)
+        own = len(self.own_violations)
         others = len(self.violations) - own
         return f"<Verdict: {self.verdict.value}, breaches: {own} by the ego, {others} by others>"
 
@@ -301,7 +306,7 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for rules 2 and 3 (docs/rules.md#E1)."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for 1.road, 2, 3 (docs/rules.md#E1)."""
     return rule[:2] if rule.startswith("E") else "E1"
 
 

@@ -8,7 +8,7 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import Comparison
 from dubins_traffic.campaign.report.metrics import WALL_METRICS, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share
-from dubins_traffic.scoring.columns import SCORES
+from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.suites.suite import Suite
 
@@ -27,7 +27,13 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     timed = [own for own in WALL_METRICS if own in comparison.metrics]
     judged = any(standing.judged for standing in comparison.standings)
     verdicts = [ruling.value for ruling in Ruling] if judged else []
-    head = ["controller", "trials", f"{metric.heading}, mean", "sum"]
+    head = [
+        "controller",
+        "trials",
+        f"{metric.heading}, mean",
+        "sum",
+        f"{SCORES[SECOND].column.heading}, mean",
+    ]
     head += ["clean", *verdicts] if judged else []
     head += [
         "collisions",
@@ -36,13 +42,18 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
         "came to nothing",
         *(f"{own.heading}, ms" for own in timed),
     ]
-    ranked = sorted(comparison.standings, key=lambda own: -(own.estimates[metric.name].mean or 0.0))
+    ranked = sorted(
+        comparison.standings,
+        key=lambda own: [own.estimates[name].mean or 0.0 for name in (metric.name, SECOND)],
+        reverse=True,
+    )
     body = [
         [
             standing.controller,
             str(standing.trials),
             _estimate(standing.estimates[metric.name]),
             shown(_sum(standing.estimates[metric.name])),
+            _estimate(standing.estimates[SECOND]),
             *(
                 [_share(standing.clean), *(_share(standing.verdicts.get(name)) for name in verdicts)]
                 if judged

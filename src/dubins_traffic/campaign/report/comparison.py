@@ -17,7 +17,7 @@ from dubins_traffic.campaign.report.metrics import FAULTS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
-from dubins_traffic.scoring.columns import REPORTED
+from dubins_traffic.scoring.columns import REPORTED, SECOND
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
@@ -127,7 +127,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         if metric.name in values and _is_told(metric, values[metric.name])
     ]
     names: Any = np.array(results["controller"].to_pylist(), dtype=object)
-    ranked = _ranked(campaign, names, _floats(results["counted_rounds"]))
+    ranked = _ranked(campaign, names, [_floats(results[name]) for name in ("counted_rounds", SECOND)])
     chosen = {name: names == name for name in ranked}
     fallen = _floats(results["assumption_broken"])
     factors = _factors(campaign)
@@ -147,15 +147,14 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
     )
 
 
-def _ranked(campaign: Campaign, names: Any, counted: Floats) -> list[str]:
-    """Return the controllers, those with the most counted rounds a trial first; ties in the order of the file."""
-    rounds = np.nan_to_num(counted)
+def _ranked(campaign: Campaign, names: Any, columns: Sequence[Floats]) -> list[str]:
+    """Return the controllers, those with the largest means of the first column first; ties by the second, the file."""
 
-    def mean(name: str) -> float:
+    def merit(name: str) -> list[float]:
         own = names == name
-        return float(rounds[own].sum()) / max(1, int(own.sum()))
+        return [float(np.nan_to_num(column[own]).sum()) / max(1, int(own.sum())) for column in columns]
 
-    return sorted(campaign.controllers, key=lambda name: -mean(name))
+    return sorted(campaign.controllers, key=merit, reverse=True)
 
 
 def _factors(campaign: Campaign) -> dict[str, list[str]]:
