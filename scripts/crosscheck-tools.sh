@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# stormpy (carries Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona.
+# Spot, stormpy (carries another Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona.
 # With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 # Two are installed at a time, by the pip of .venv: to put one into each environment takes longer than most of the tools.
@@ -34,6 +34,7 @@ environment() { # name, module, packages...
 
 mkdir -p "$folder"
 {
+  environment spot spot 'spottl==2.13.0.1'
   environment stormpy stormpy 'stormpy==2.0.0'
   environment ltlf2dfa ltlf2dfa.parser.ltlf 'ltlf2dfa==1.0.2'
   environment sumo sumo 'eclipse-sumo==1.28.0'

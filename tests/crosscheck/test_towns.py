@@ -9,10 +9,14 @@ import pytest
 from benchmarks import towns
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.protocols import End
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.sumo import SumoNet
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.runs.single import run_trial
 from tests.room import lacking
 from tests.tools import interpreter_with, sumo_program
 
@@ -25,6 +29,15 @@ def folder() -> Path:
     """Return where SUMO's own towns are."""
     environment = Path(interpreter_with("sumo")).parents[1]
     return next(environment.glob("lib/python*/site-packages/sumo/tools"))
+
+
+@pytest.mark.parametrize("controller", ["lanes", "lanes+shield"])
+def test_lanes_drives_where_arms_are_a_hair_off_straight(controller: str) -> None:
+    """Of grid6 the roads go on 1e-9 to 2e-8 rad off straight."""
+    document, _ = SumoNet().reduced((folder() / "game" / "grid6" / "grid6.net.xml").read_text())
+    config = load_config("junction").to_document() | {"rnd": dict(document), "duration": 5.0}
+    ran = run_trial(draw(load_config(config), seed=0, trial=0), controller)
+    assert ran.ending.end is End.DURATION
 
 
 def test_these_are_the_two_largest() -> None:

@@ -65,7 +65,7 @@ def test_spin_writes_memory_and_short_bounds_with_next() -> None:
 
 def test_spot_counts_ticks() -> None:
     task = Specification((), (parse("[] (l -> <>[0,10] !l)"), parse("a U[1,2] b")), (), ("l", "a", "b"))
-    assert spot(task, 1 / 30) == "G (l -> F[0:300] !l) & G[0:29] a & F[30:30] (a U b & F[0:30] b)"
+    assert spot(task, 1 / 30) == "G (l -> F[0:46] F[0:254] !l) & G[0:29] a & F[30:30] (a U b & F[0:30] b)"
 
 
 def test_stl_has_signals_and_seconds() -> None:

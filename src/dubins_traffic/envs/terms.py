@@ -9,11 +9,14 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.rules.breach_log import RULE, RULES
+from dubins_traffic.rules.breach_log import RULES
+from dubins_traffic.scoring.verdict import EGO_RULES
 
-COSTS: Final = (*RULES[: RULE.CLEARANCE + 1], "at_fault")
+COSTS: Final = (*EGO_RULES, "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
+COST_OF: Final = tuple([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in RULES])
+"""The cost, by number, of each rule, by number; -1 of a rule that the ego can't break."""
 
 
 class _Term(NamedTuple):

@@ -23,7 +23,7 @@ ALONG: Final = {
     "2.left": (Manoeuvre.OVERTAKING,),
     "2.return": (Manoeuvre.OVERTAKING,),
 }
-"""What an ego does on a road when it may break a rule."""
+"""What an ego does on a road when it may break a rule; of other rules nothing is expected."""
 
 
 def possible(instances: Iterable[Instance]) -> list[Cell]:
@@ -41,7 +41,7 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
                     found |= {Cell(rule, own, degree) for own in through if degree >= least}
                 else:
                     at_discs = through if rule.startswith("1.") else ()
-                    found |= {Cell(rule, own, degree) for own in (*ALONG[rule], *at_discs)}
+                    found |= {Cell(rule, own, degree) for own in (*ALONG.get(rule, ()), *at_discs)}
     return sorted(found, key=lambda cell: cell.number)
 
 

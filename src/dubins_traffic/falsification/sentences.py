@@ -40,8 +40,10 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
         case rule if rule.startswith("formula "):
             place = f"({breach.where.x:.1f}, {breach.where.y:.1f}) m"
             return f"At {breach.time:.2f} s the formula became false, the ego being at {place}."
-        case _:
+        case "3.stop" | "3.order" | "3.clear":
             return f"{when} entered the crossing at {_crossing(breach)} {_entry(record, breach)}."
+        case rule:
+            return f"{when} broke {rule} near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
 
 
 def _collision(record: Record, score: Score, breach: Violation) -> str:

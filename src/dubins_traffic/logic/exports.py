@@ -106,6 +106,18 @@ def _whole(spec: Specification, style: Style) -> str:
     return written_implication(spec.assumptions, spec.guarantees, style)
 
 
+def _check_longest(spec: Specification, period: float, most: int, why: str) -> None:
+    """Refuse a specification with a bound of more than `most` ticks of `period` seconds."""
+    sides = (spec.assumptions, spec.guarantees)
+    bounds = [part.bounds for side in sides for one in side for part in subformulas(one)]
+    longest = max((high for _, high in filter(None, bounds)), default=0.0)
+    if ticks(longest, period) > most:
+        raise FormulaError(
+            f"a bound of {number(longest)} s is too long {why}",
+            expected=f"a period of at least {longest / most:.4g} s, or a format that counts",
+        )
+
+
 def spin(spec: Specification, period: float) -> str:
     """Return one formula for SPIN.
 
@@ -116,18 +128,7 @@ def spin(spec: Specification, period: float) -> str:
     FormulaError
         If a bound is too long to be written out; says which period would do.
     """
-    bounds = [
-        part.bounds
-        for side in (spec.assumptions, spec.guarantees)
-        for one in side
-        for part in subformulas(one)
-    ]
-    longest = max((high for _, high in filter(None, bounds)), default=0.0)
-    if ticks(longest, period) > MAX_NEXT:
-        raise FormulaError(
-            f"a bound of {number(longest)} s is too long to be written out with next",
-            expected=f"a period of at least {longest / MAX_NEXT:.4g} s, or a format that counts",
-        )
+    _check_longest(spec, period, MAX_NEXT, "to be written out with next")
     plain = _changed(
         _without_past(spec), lambda formula: written_out(until_and_release_only(in_ticks(formula, period)))
     )
@@ -138,12 +139,36 @@ def _colon(bounds: Bounds) -> str:
     return f"[{number(bounds[0])}:{number(bounds[1])}]"
 
 
+_SPOT_COUNTS: Final = 254.0
+"""The largest bound that Spot reads."""
+_SPOT_PARTS: Final = 50
+"""Of how many parts a long bound may be, within the levels that a formula may have."""
 _SPOT: Final = Style({Op.AND: "&", Op.OR: "|", Op.TRUE: "1", Op.FALSE: "0"}, bounds=_colon)
 
 
 def spot(spec: Specification, period: float) -> str:
-    """Return one formula as Spot reads it; bounds in ticks: ``F[0:300] p``."""
-    return _whole(_changed(_without_past(spec), lambda formula: in_ticks(formula, period)), _SPOT)
+    """Return one formula as Spot reads it; bounds in ticks, long ones in parts: ``F[0:46] F[0:254] p``.
+
+    Raises
+    ------
+    FormulaError
+        If a bound is too long for that; says which period would do.
+    """
+    _check_longest(spec, period, _SPOT_PARTS * int(_SPOT_COUNTS), "for Spot")
+    plain = _changed(_without_past(spec), lambda formula: in_ticks(formula, period))
+    return _whole(_changed(plain, lambda formula: mapped(formula, _in_parts)), _SPOT)
+
+
+def _in_parts(part: Formula) -> Formula:
+    """Return F or G with bounds as F of F, or G of G, with bounds that Spot reads: these add up."""
+    if part.bounds is None:
+        return part
+    low, high = part.bounds
+    (inner,) = part.args
+    while high > _SPOT_COUNTS:
+        inner = make(part.op, (inner,), bounds=(min(low, _SPOT_COUNTS), _SPOT_COUNTS))
+        low, high = max(low - _SPOT_COUNTS, 0.0), high - _SPOT_COUNTS
+    return make(part.op, (inner,), bounds=(low, high))
 
 
 def _positive(name: str) -> str:

@@ -47,8 +47,8 @@ RULES: Final[tuple[str, ...]] = (
 )  # fmt: skip
 """Names of the rules, by number."""
 
-MOST: Final = 10
-"""Most breaches that one car can begin in one frame."""
+MOST: Final = len(RULES)
+"""Most breaches that one car can begin in one frame: one of each rule."""
 
 NEVER: Final = -2
 """In `JudgedCar.off_road`: the car has never been on the road."""

@@ -25,6 +25,12 @@ PIVOT_COST = 0.5
 """A turn in place counts as that many metres (at 0.7 m/s and pi rad/s it takes as long)."""
 SHUFFLE_COST = 8.0
 """The same for a car with a turning radius, which has to shuttle."""
+STRAIGHT = 1e-6
+"""A turn by less, radians, has no arc.
+
+Between the lanes lies a millionth of w then. The limits of an arc's radius divide by 1 - cos(angle / 2), which is 0 or
+rounding alone below 3e-8, and has three digits here.
+"""
 VISIT = 0.95
 """How near a path has to come to an intersection that it visits, in units of the radius of its disc."""
 IMPOSSIBLE = 1e4
@@ -110,7 +116,7 @@ def _curves(site: Site) -> list[Turn]:
     if abs(site.angle) > pi - 0.05:
         if least <= (2.0 - MARGIN) * w:
             curves.append(_u_curve(site, max(least, w)))
-    elif abs(site.angle) < 1e-9:
+    elif abs(site.angle) < STRAIGHT:
         curves.append(Turn(0.0, 0.0, (), 0.0))
     else:
         low, high = _radii(site)
@@ -173,7 +179,7 @@ def _u_curve(site: Site, radius: float) -> Turn:
 def _corners(site: Site) -> list[Turn]:
     """Turns made of straight lines with turns in place between them."""
     w = site.car.w
-    straight = abs(site.angle) < 1e-9 and not (site.visit and w > VISIT * site.radius)
+    straight = abs(site.angle) < STRAIGHT and not (site.visit and w > VISIT * site.radius)
     if straight or not can_pivot(site.car):
         return []
     cost = PIVOT_COST if site.car.bounds.turning_radius == 0.0 else SHUFFLE_COST

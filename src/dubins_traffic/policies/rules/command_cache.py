@@ -29,7 +29,7 @@ from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.seeing import meets_nobody, way_to_go
 from dubins_traffic.policies.rules.steering import ALIGNED, ASTRAY, SLANT, follow_line, slowed, steer
 from dubins_traffic.policies.rules.tables import COMPANY, KIND, VIOLATION, Driver, Drivers, Traffic, Vehicle
-from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, in_arc, on_lane
+from dubins_traffic.policies.rules.turn_arcs import NO_DIRECTION, PART, ReferencePath, in_arc, on_lane
 from dubins_traffic.policies.safety import VERGE
 from dubins_traffic.roads.lookup import CERTAIN
 from dubins_traffic.roads.table import RoadTable
@@ -37,8 +37,6 @@ from dubins_traffic.rules.propositions import FLAG
 
 IF_NOT_BEHIND_EGO = 2.0
 """Value of `KeptCommands.holds`: the cached command is valid if the ego is not ahead in the car's lane."""
-TINY = 1e-300
-"""Least distance from the centre of an arc that is reckoned with, metres: no car is so near."""
 
 
 @jit_inline
@@ -87,7 +85,7 @@ def _check_valid_stretches(block: KeptCommands, last: int, limit: float, period:
         dy = y[k] - cy[k]
         along = dx * tx[k] + dy * ty[k]
         past = dx * ux[k] + dy * uy[k]
-        far = max(sqrt(dx * dx + dy * dy), TINY)
+        far = max(sqrt(dx * dx + dy * dy), NO_DIRECTION)
         bend, side = bends[k], sides[k]
         in_arc_left = side * (radius[k] - far)
         in_lane_left = tx[k] * (y[k] - way_y[k]) - ty[k] * (x[k] - way_x[k]) + middle[k]

@@ -17,6 +17,8 @@ STRAIGHT = 0.01
 """Sine of the angle between two lanes below which the way is straight."""
 BEGIN = 0.8
 """Arcs begin this far from the intersection along the lanes, in units of the radius R of its disc."""
+NO_DIRECTION = 1e-150
+"""A vector shorter than this, metres, has no direction: its square has lost digits, or is 0."""
 TIGHTEST = 0.05
 """Least radius of an arc, metres."""
 
@@ -130,7 +132,7 @@ def on_way(way: ReferencePath, x: float, y: float) -> tuple[int, float, float, f
 @jit_inline
 def in_arc(way: ReferencePath, dx: float, dy: float) -> tuple[int, float, float, float, float]:
     """Return what `on_way` does, of a point that is known to be in the arc, `dx` (m) and `dy` (m) from its centre."""
-    far = sqrt(dx * dx + dy * dy)
+    far = max(sqrt(dx * dx + dy * dy), NO_DIRECTION)
     ex = dx / far
     ey = dy / far
     side = way.side
