@@ -13,6 +13,7 @@ import pytest
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import BENT
+from tests.roadnets import winding
 from tests.tools import interpreter_with, sumo_program
 
 HERE = Path(__file__).parent
@@ -20,7 +21,10 @@ NETWORKS = {
     "grid": RoadNetwork.grid(3, 4, 3.25, (1.5, -2.0, 0.7)),
     "drawn": generate(9, 12, 3),
     "bent": RoadNetwork.from_document(BENT),
+    "swerving": generate(16, 22, 7, bent=0.7),
+    "winding": winding(3, most=5),
 }
+"""Roads of the last two have up to six corners, which lie otherwise seen from the other end."""
 
 
 @pytest.fixture(params=NETWORKS)

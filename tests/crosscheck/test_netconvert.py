@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from random import Random
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,6 +20,9 @@ SHORTEST_CHORD = "0.02"
 """Metres; netconvert makes polylines of arcs."""
 MICROMETRE = 1.1e-6
 """The unit of netconvert's coordinates."""
+CARS, EVERY_S = 150, 8
+CAR = '<vType id="car" length="0.3" minGap="0.2" maxSpeed="1" accel="1" decel="2" sigma="0"/>'
+"""A car of the size of ours; another sets out every few seconds."""
 
 
 @pytest.fixture(params=NETWORKS)
@@ -85,6 +89,48 @@ def test_sumo_drives_on_it(network: RoadNetwork, tmp_path: Path) -> None:
     lengths = network.lengths
     assert found == pytest.approx(
         {k: float(lengths[a >> 1] + lengths[b >> 1]) for k, (a, b) in enumerate(pairs)}, abs=1e-3
+    )
+
+
+def test_cars_of_sumo_drive_through_it(network: RoadNetwork, tmp_path: Path) -> None:
+    """duarouter finds the ways of cars from anywhere to anywhere; sumo lets all of them in, and none is moved on."""
+    network.write(tmp_path / "town.net.xml")
+    dice = Random(7)
+    names = [name for s in range(len(network.segments)) for name in (f"s{s}", f"-s{s}")]
+    trips = "".join(
+        f'<trip id="{k}" type="car" depart="{EVERY_S * k}" departPos="0" from="{a}" to="{b}"/>'
+        for k, (a, b) in enumerate(dice.sample(names, 2) for _ in range(CARS))
+    )
+    (tmp_path / "trips.xml").write_text(f"<routes>{CAR}{trips}</routes>")
+    run(
+        tmp_path,
+        "duarouter",
+        "-n",
+        "town.net.xml",
+        "-r",
+        "trips.xml",
+        "-o",
+        "routes.rou.xml",
+        "--no-step-log",
+    )
+    run(
+        tmp_path, "sumo", "-n", "town.net.xml", "-r", "routes.rou.xml", "--tripinfo-output", "done.xml",
+        "--statistic-output", "statistics.xml", "--no-step-log", "--precision", "6",
+    )  # fmt: skip
+    told = ElementTree.parse(tmp_path / "statistics.xml").getroot()
+    counts = {each.tag: each.attrib for each in told}
+    assert counts["vehicles"] == {"loaded": f"{CARS}", "inserted": f"{CARS}", "running": "0", "waiting": "0"}
+    assert counts["teleports"]["total"] == counts["safety"]["collisions"] == "0"
+    lengths = dict(zip(names, np.repeat(network.lengths, 2).tolist(), strict=True))
+    routes = ElementTree.parse(tmp_path / "routes.rou.xml").getroot()
+    wanted = {
+        car.get("id"): sum(lengths[edge] for edge in way.get("edges", "").split())
+        for car in routes.iter("vehicle")
+        for way in car.iter("route")
+    }
+    done = ElementTree.parse(tmp_path / "done.xml").getroot().iter("tripinfo")
+    assert {trip.get("id"): float(trip.get("routeLength", "nan")) for trip in done} == pytest.approx(
+        wanted, abs=1e-3
     )
 
 

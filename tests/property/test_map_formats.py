@@ -1,8 +1,13 @@
-"""What is written in the format of another program is read again to a nanometre, also where it bends or is turned."""
+"""What is written in the format of another program is read again to a nanometre, also where it bends or is turned.
+
+A program that passes over our instructions finds the same network there within the tolerance of an import.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pytest
@@ -14,10 +19,16 @@ from dubins_traffic.roads.formats.registry import WritesMaps
 from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.maps.losses import Losses
+from dubins_traffic.roads.maps.polylines import to_segments
+from dubins_traffic.roads.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import FOREIGN
+from tests.roadnets import winding
 
 NANOMETRE = 1e-9
+SEEDS = st.integers(0, 2**32 - 1)
+INSTRUCTION = re.compile(r"<\?dubins-traffic [^>]*\?>\n")
+TOLERANCE = ImportSettings().tolerance
 
 
 @st.composite
@@ -34,7 +45,7 @@ def networks(draw: st.DrawFn) -> RoadNetwork:
 
 @pytest.mark.parametrize("name", [*FOREIGN, "rnd-json", "rnd-text"])
 @settings(max_examples=40, deadline=None, derandomize=True)
-@given(network=networks())
+@given(network=networks() | SEEDS.map(winding))
 def test_what_is_written_is_read_again_to_a_nanometre(name: str, network: RoadNetwork) -> None:
     form = registry.load(name)
     assert isinstance(form, WritesMaps)
@@ -52,3 +63,52 @@ def test_what_is_written_is_read_again_to_a_nanometre(name: str, network: RoadNe
         losses = again.known[registry.LOSSES]
         assert isinstance(losses, Losses)
         assert losses.is_whole
+
+
+def nearest(network: RoadNetwork, wanted: RoadNetwork) -> list[int]:
+    """Return the number of the intersection of `network` that lies where each of `wanted` lies."""
+    away = np.hypot(*(network.points[:, None] - wanted.points[None]).T)
+    assert away.min(axis=1).max() < NANOMETRE * 1e3
+    return away.argmin(axis=1).tolist()
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(network=SEEDS.map(winding))
+def test_without_our_instructions_it_is_the_same_within_the_tolerance(
+    name: str, network: RoadNetwork
+) -> None:
+    form = registry.load(name)
+    assert isinstance(form, WritesMaps)
+    text, count = INSTRUCTION.subn("", form.write(network.to_document()))
+    assert count == 1 + sum(1 for own in network.corners if own)
+    again = RoadNetwork.from_text(text, "town", form)
+    losses = again.known[registry.LOSSES]
+    assert isinstance(losses, Losses)
+    assert losses.is_whole, losses.lines()
+    there = nearest(again, network)
+    lanes = {again.lane_ends(lane): lane for lane in range(again.lanes)}
+    assert len(lanes) == again.lanes == network.lanes
+    for lane in range(network.lanes):
+        first, last = network.lane_ends(lane)
+        other = lanes[there[first], there[last]]
+        one, two = network.lane_curve(lane, 0.0), again.lane_curve(other, 0.0)
+        assert max(to_segments(one, two).max(), to_segments(two, one).max()) < 1.1 * TOLERANCE
+        assert abs(network.lengths[lane >> 1] - again.lengths[other >> 1]) < 5.0 * TOLERANCE
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(network=networks() | SEEDS.map(winding))
+def test_files_tell_the_lengths_of_roads_whichever_way_one_drives(network: RoadNetwork) -> None:
+    forms = {name: registry.load(name) for name in ("sumo", "opendrive")}
+    roots = {
+        name: fromstring(form.write(network.to_document()))
+        for name, form in forms.items()
+        if isinstance(form, WritesMaps)
+    }
+    edges = {each.get("id"): each.find("lane") for each in roots["sumo"].iter("edge")}
+    roads = {each.get("id"): each for each in roots["opendrive"].iter("road")}
+    for s, length in enumerate(network.lengths.tolist()):
+        for element in (edges[f"s{s}"], edges[f"-s{s}"], roads[f"{s}"]):
+            assert element is not None
+            assert float(element.get("length", "nan")) == pytest.approx(length, abs=NANOMETRE)

@@ -187,7 +187,10 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
     ("impossible network", base(rnd=..., network={"random": {"intersections": 9, "segments": 13}}),
      "network.random.segments", "13", "between 8 and 12"),
     ("huge grid", base(rnd=..., network={"grid": {"rows": 10**4, "columns": 10**4}}), "network.grid", "{", "100000"),
-    ("no such network", base(rnd=..., network={}), "network", "{}", "either random or grid"),
+    ("no such network", base(rnd=..., network={}), "network", "{}", "one of random, grid and file"),
+    ("a path as network", base(rnd=..., network="a.xodr"), "network", "a.xodr", '{"file": "a.xodr"}, or the path'),
+    ("network is no file", base(rnd=..., network={"file": "no.net.xml"}), "network.file", "no.net.xml", "beside"),
+    ("rnd is a number", base(rnd=3), "rnd", "3", "the path of one or of a map of another program"),
 ]  # fmt: skip
 
 INSTANCES: list[tuple[str, Document, str, str | None, str]] = [

@@ -16,6 +16,7 @@ from jsonschema.exceptions import ValidationError
 from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.sampling import prepared
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
 from dubins_traffic.problem.draw import draw
@@ -146,10 +147,11 @@ def test_a_relative_network_is_found_beside_the_configuration_then_here(
     monkeypatch.chdir(here)
     file = there / "config.json"
     for name, length in (("square.json", 5.0), ("other.rnd", 9.0), (str(here / "square.json"), 7.0)):
-        file.write_text(json.dumps(bad.base(rnd=name)))
-        network = load_config(file).network
-        assert network is not None
-        assert network.length == length
+        for named in ({"rnd": name}, {"rnd": ..., "network": {"file": name}}):
+            file.write_text(json.dumps(bad.base(**named)))
+            network = load_config(file).network
+            assert network is not None
+            assert network.length == length
     overriding = load_config(file, rnd="square.json").network
     assert overriding is not None
     assert overriding.length == 7.0
@@ -248,11 +250,21 @@ def test_trial_data_is_json_with_the_keys_of_2016(tmp_path: Path) -> None:
     assert TrialData.read(tmp_path / "data.json") == data
 
 
-def test_trial_data_says_the_network_that_was_named_by_path(tmp_path: Path) -> None:
-    (tmp_path / "square.json").write_text(json.dumps(SQUARE))
-    config = Configuration.from_document(bad.base(rnd="square.json"), folder=tmp_path)
+@pytest.mark.parametrize(
+    "named", [{"rnd": "square.net.xml"}, {"rnd": ..., "network": {"file": "square.net.xml"}}]
+)
+def test_a_network_that_was_named_by_path_is_written_in(named: dict[str, Any], tmp_path: Path) -> None:
+    """In trial data, what a campaign or a competition keeps, and a search."""
+    RoadNetwork.from_document(SQUARE).write(tmp_path / "square.net.xml")
+    config = Configuration.from_document(bad.base(**named), folder=tmp_path)
     data = TrialData.build(config, [], datetime(2016, 5, 16))
-    assert RoadNetwork.from_document(data.trialconf["rnd"]) == config.network
+    assert data.trialconf == config.inlined()
+    for document in (data.trialconf, prepared(config, None, {}).document):
+        assert RoadNetwork.from_document(document["rnd"]) == config.network
+        assert "network" not in document
+        assert Configuration.from_document(document).network == config.network
+    assert config.to_document() == bad.base(**named)
+    Draft202012Validator(shipped_schema("configuration")).validate(config.to_document())
 
 
 @pytest.mark.parametrize("name", ["network", "configuration", "instance", "trial-data"])
@@ -282,7 +294,7 @@ RELATIONS = {
     "agent called ego", "name twice", "counts add up", "one start for many", "cycle that jumps",
     "least above largest speed", "rate too low", "laser all round and on", "bow tie", "rules on short roads",
     "rules without sight", "rules with small discs", "starts that overlap", "start in an obstacle", "too many cars",
-    "impossible network", "huge grid",  "rnd is no file", "huge length", "start far away",
+    "impossible network", "huge grid",  "rnd is no file", "network is no file", "huge length", "start far away",
     "crossing roads", "start of nobody", "heading too long", "bad instance", "NaN", "infinite rate",
     "misspelt key", "misspelt key of an agent", "parameter of an agent beside its type",
 }  # fmt: skip

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.formats import registry, xml_text
 from dubins_traffic.roads.network import RoadNetwork
@@ -174,6 +177,43 @@ def test_a_lanelet_that_leads_to_itself_is_refused(link: str, words: str) -> Non
     text = f"<commonRoad><lanelet id='1'>{bounds}{link}</lanelet></commonRoad>"
     with pytest.raises(InputError, match=words):
         RoadNetwork.from_text(text, "ring.xml", registry.load("commonroad"))
+
+
+WHOLE = f"<?xml version='1.0'?>\n{OSM_HEAD}\n{NODES}\n{WAY}\n</osm>"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (f"{OSM_HEAD}{NODES}</osm>", "no roads: got '2 nodes and 0 ways'; expected at least one way"),
+        (f"{OSM_HEAD}</osm>", "no roads: got '0 nodes and 0 ways'"),
+        (WHOLE[:-3], "not XML"),
+        (WHOLE[: WHOLE.index("<way")], "not XML"),
+        (WHOLE[:30], "not XML"),
+        (WHOLE[:22], "XML that ends before its root; expected a whole map"),
+        (WHOLE[:1], "XML that ends before its root"),
+        (f"\ufeff\n {WHOLE[:22]}", "XML that ends before its root"),
+        ("<!-- a: b --><html><body/></html>", "XML that is no map: its root is <html>"),
+    ],
+)
+def test_xml_that_is_no_whole_map_is_not_taken_for_plain_text(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "town.osm"
+    file.write_text(text)
+    configuration = tmp_path / "config.json"
+    configuration.write_text(json.dumps({"version": 1, "problem_domain": "dubins_traffic", "rnd": str(file)}))
+    for command in (
+        ["network", "--from"],
+        ["convert", "-o", str(tmp_path / "a.json")],
+        ["plot"],
+        ["instance"],
+    ):
+        assert main([*command, str(configuration if command == ["instance"] else file)]) == 2
+        told = capsys.readouterr().err
+        assert words in told
+        assert str(file) in told
+        assert "RND" not in told
 
 
 def test_what_is_too_large_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

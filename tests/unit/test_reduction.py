@@ -16,6 +16,7 @@ from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.osm import OpenStreetMap
 from dubins_traffic.roads.formats.sumo import SumoNet
+from dubins_traffic.roads.maps import reduction
 from dubins_traffic.roads.maps.geometry import Placed, clothoid
 from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.maps.reasons import Reason
@@ -248,6 +249,56 @@ def test_network_from_a_map_tells_what_was_lost(town: Path, capsys: pytest.Captu
     assert clearance_faults(own, 1.6 / 0.3, 0.177, 1.6) == []
     assert main([*again, "--w", "0.3"]) == 0
     assert json.loads((out / "own-losses.json").read_text())["w"] == 0.3
+
+
+def test_a_motorway_has_no_share_of_roads_with_one_lane_in_each_direction(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is told is the share of all its roads; it was 100 % of nothing."""
+    edges = ["a b 2", "b c 2", "b d 2 shape='80,0 150,3 154,60 158,62'"]
+    nodes = {"a": (0.0, 0.0), "b": (80.0, 0.0), "c": (80.0, 90.0), "d": (158.0, 62.0)}
+    file = tmp_path / "motorway.net.xml"
+    file.write_text(sumo(edges, nodes))
+    written = tmp_path / "losses.json"
+    command = ["network", "--from", str(file), "-o", str(tmp_path / "a.json"), "--losses", str(written)]
+    assert main(command) == 0
+    found = json.loads(written.read_text())
+    assert found["one_plus_one"] == {"length": 0.0, "kept_share": None}
+    kept = sum(road["kept"] for road in found["roads"])
+    assert 170.0 < kept < found["length"] - 1.0
+    share = f"{100.0 * kept / found['length']:.1f} % kept within 0.1 m"
+    whole = f"of {found['length']:.0f} m, none of them with one lane in each direction, {share}"
+    assert whole in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["network", "convert"])
+def test_what_can_not_be_held_says_why_and_writes_what_was_lost(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "short.net.xml"
+    file.write_text(sumo([*both("a b 1"), "b c 1"], {"a": (0, 0), "b": (2, 0), "c": (2, 300)}))
+    made, table, picture = (tmp_path / name for name in ("made.json", "losses.json", "losses.svg"))
+    told = ["-o", str(made), "--losses", str(table), "--losses", str(picture)]
+    start = [command, "--from", str(file)] if command == "network" else [command, str(file)]
+    assert main([*start, *told]) == 2
+    error = capsys.readouterr().err
+    assert "nothing of the map can be held: one-way (1 road, 300 m); too short (1 road, 2 m)" in error
+    assert "dropped      1       2  too short" in error
+    assert [(row["fate"], row["reason"]) for row in json.loads(table.read_text())["table"]] == [
+        ("dropped", "one-way"), ("dropped", "too short"),
+    ]  # fmt: skip
+    assert "dropped: too short (1, 2 m)" in picture.read_text()
+    assert not made.exists()
+    table.unlink()
+    assert main([*start, *told[:4], "--losses", str(tmp_path / "losses.gif")]) == 2
+    assert not table.exists()
+
+
+def test_a_map_that_takes_too_many_attempts_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = {**CROSS, "q": (33.0, 33.0)}
+    monkeypatch.setattr(reduction, "MOST_WORK", 1)
+    with pytest.raises(InputError, match="too many attempts, with 1 of 5 roads dropped so far"):
+        reduced([*ROADS, *both("o q 1")], nodes)
 
 
 def test_network_from_a_map_refuses_what_makes_no_sense(

@@ -265,7 +265,7 @@ def _settled(
     rest = {name: value for name, value in chosen.items() if name not in factors}
     with_ = ", ".join(f"{name} = {value}" for name, value in scalars.items())
     try:
-        document = vary(inlined(configuration), named, rest)
+        document = vary(configuration.inlined(), named, rest)
         settled = Configuration.from_document(document)
         simulators.load(settled.settings.simulator).close()
     except InputError as error:
@@ -275,21 +275,13 @@ def _settled(
     return settled
 
 
-def inlined(configuration: Configuration) -> dict[str, Any]:
-    """Return the document of a configuration with the road network written in that it names by path."""
-    document = configuration.to_document()
-    if configuration.network is not None and not isinstance(document.get("rnd"), dict):
-        document["rnd"] = configuration.network.to_document()
-    return document
-
-
 def _complete(model: CampaignModel, configurations: list[Configuration]) -> dict[str, Any]:
     document = model.model_dump(exclude={"configurations"})
     if not model.metrics:
         del document["metrics"]
     document["factors"] = levels(model.factors)
     document["configurations"] = [
-        {"name": entry.name, "document": inlined(configuration)}
+        {"name": entry.name, "document": configuration.inlined()}
         for entry, configuration in zip(model.configurations, configurations, strict=True)
     ]
     return document

@@ -83,7 +83,8 @@ def convert(
         _to_records(file, output)
         return
     form = None if map_format is None else formats.load(map_format)
-    found = load(file, map_format=form)
+    with maps.telling(losses):
+        found = load(file, map_format=form)
     maps.require_outputs(found if isinstance(found, RoadNetwork) else None, losses)
     suffix = Path(output).suffix.lower()
     if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,18 +61,32 @@ def require_no_scale(source: str | None, scale: float | None, w: float | None) -
             )
 
 
+@contextmanager
+def telling(outputs: list[str] | None) -> Generator[None]:
+    """Tell what was lost, and write it to files, also where nothing of a map can be held, which is then refused."""
+    from dubins_traffic.roads.maps.losses import NothingHeldError
+
+    try:
+        yield
+    except NothingHeldError as error:
+        _require(outputs or [])
+        _tell(error.losses, outputs or [])
+        raise
+
+
 def require_outputs(network: RoadNetwork | None, outputs: list[str] | None) -> None:
     """Refuse files to which what was lost can't be written, before anything is: as `report` would."""
-    if not outputs:
-        return
-
-    from dubins_traffic.files import require_place
-    from dubins_traffic.viewer.plot import require_picture
-
-    if _losses(network) is None:
+    if outputs and _losses(network) is None:
         raise InputError(
             "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
         )
+    _require(outputs or [])
+
+
+def _require(outputs: list[str]) -> None:
+    from dubins_traffic.files import require_place
+    from dubins_traffic.viewer.plot import require_picture
+
     for output in outputs:
         if not _is_json(output):
             require_picture(Path(output))
@@ -82,14 +98,17 @@ def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> Non
 
     Nothing is told of networks that come from no map of another program, and where there is none (None).
     """
+    losses = _losses(network)
+    if losses is not None:
+        _tell(losses, outputs or [])
+
+
+def _tell(losses: Losses, outputs: list[str]) -> None:
     from dubins_traffic.files import write_text
 
-    losses = _losses(network)
-    if losses is None:
-        return
     for line in losses.lines():
         print(line, file=sys.stderr)
-    for output in outputs or []:
+    for output in outputs:
         if _is_json(output):
             write_text(output, json.dumps(losses.document(), indent=1) + "\n")
         else:

@@ -102,7 +102,8 @@ def network(
             raise InputError(
                 "two networks at once", file="--from", value=source, expected="nothing else beside it"
             )
-        made = maps.imported(source, scale, w, tolerance)
+        with maps.telling(losses):
+            made = maps.imported(source, scale, w, tolerance)
     elif intersections is None and segments is None:
         rows, columns = grid or (3, 4)
         made = RoadNetwork.grid(rows, columns)

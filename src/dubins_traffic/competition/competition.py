@@ -11,7 +11,7 @@ from datetime import UTC, date, datetime, time
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from dubins_traffic.campaign.campaign import check_names, configuration_of, inlined
+from dubins_traffic.campaign.campaign import check_names, configuration_of
 from dubins_traffic.competition.sealing import secret_seeds
 from dubins_traffic.competition.settings import (
     MOST_TRIALS,
@@ -107,7 +107,7 @@ class Phase:
         return digest(
             {
                 "configurations": [
-                    {"name": own.name, "document": inlined(own.configuration)} for own in self.configurations
+                    {"name": own.name, "document": own.configuration.inlined()} for own in self.configurations
                 ],
                 "trials": self.model.trials,
                 "limits": self.limits.model_dump(),
@@ -295,7 +295,7 @@ def _dated(value: object) -> Any:
 
 
 def _complete(document: dict[str, Any], configurations: tuple[Named, ...]) -> dict[str, Any]:
-    entries = [{"name": own.name, "document": inlined(own.configuration)} for own in configurations]
+    entries = [{"name": own.name, "document": own.configuration.inlined()} for own in configurations]
     return {**document, "configurations": entries}
 
 

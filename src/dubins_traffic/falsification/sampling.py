@@ -62,9 +62,7 @@ def prepared(
     formulas : mapping
         What is judged beside the task, by name.
     """
-    document: dict[str, Any] = {**configuration.to_document(), "version": 1, "end_on_collision": False}
-    if configuration.network is not None:
-        document["rnd"] = configuration.network.to_document()
+    document: dict[str, Any] = {**configuration.inlined(), "version": 1, "end_on_collision": False}
     if not configuration.settings.rules:
         document["rules"] = True
     if duration is not None:

@@ -104,7 +104,7 @@ class Configuration:
             folder = None
         settings = settings_of(own, file)
         try:
-            network = _network(settings.rnd, folder)
+            network = _network(settings, folder)
             agents = plan_agents(settings.e_agents)
             if network is not None:
                 for k, goal in enumerate(settings.goals or ()):
@@ -120,6 +120,14 @@ class Configuration:
     def to_document(self) -> dict[str, Any]:
         """Return the document, equal to the one that was read."""
         return deepcopy(dict(self.document))
+
+    def inlined(self) -> dict[str, Any]:
+        """Return the document with the road network written in that it names by path."""
+        document = self.to_document()
+        if self.network is not None and not isinstance(document.get("rnd"), dict):
+            document.pop("network", None)
+            document["rnd"] = self.network.to_document()
+        return document
 
     @property
     def version(self) -> int:
@@ -235,7 +243,10 @@ def settings_of(document: Mapping[str, Any], file: str | None = None) -> Setting
     return parse(Settings, document, file=file)
 
 
-def _network(rnd: Any, folder: Path | None) -> RoadNetwork | None:
+def _network(settings: Settings, folder: Path | None) -> RoadNetwork | None:
+    """Return the network that is the same in all trials, None where each draws its own."""
+    file = None if settings.network is None else settings.network.file
+    field, rnd = ("rnd", settings.rnd) if file is None else ("network.file", file)
     if rnd is None:
         return None
     if not isinstance(rnd, str):
@@ -247,7 +258,7 @@ def _network(rnd: Any, folder: Path | None) -> RoadNetwork | None:
     path = beside if is_file(beside) else Path(rnd)
     if rnd != "-" and not exists(path):
         expected = "a file beside the configuration or in the current directory"
-        raise InputError("no such file", field="rnd", value=rnd, expected=expected)
+        raise InputError("no such file", field=field, value=rnd, expected=expected)
     return RoadNetwork.read(rnd if rnd == "-" else str(path))
 
 

@@ -293,7 +293,10 @@ LaserSwitch = Annotated[LaserModel | None, BeforeValidator(_switch), Field(json_
 def _check_rnd(value: Any) -> Any:
     if isinstance(value, str | dict) and value:
         return value  # pyright: ignore[reportUnknownVariableType]
-    raise fault("not a road network", "a road network description (an object) or the path of one")
+    raise fault(
+        "not a road network",
+        "a road network description (an object), or the path of one or of a map of another program",
+    )
 
 
 RoadReference = Annotated[Any, AfterValidator(_check_rnd), WithJsonSchema({"type": ["string", "object"]})]

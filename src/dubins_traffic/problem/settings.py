@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Annotated, Any, Literal
 
@@ -28,6 +29,7 @@ from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import MOST_INTERSECTIONS
 from dubins_traffic.rules.parameters import RuleParameters
 
+ROADS = "a road network description, or the path of one or of a map of another program"
 NAME = r"^[A-Za-z][A-Za-z0-9_/]*$"
 
 
@@ -142,17 +144,27 @@ class GridNetwork(Strict):
 
 
 class NetworkModel(Strict):
-    """The road network of each trial, if it is not fixed: random or a grid."""
+    """The road network: another one in each trial, random or a grid, or that of a file."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     random: RandomNetwork | None = Field(default=None, description="a random planar network")
     grid: GridNetwork | None = Field(default=None, description="a grid with segments removed")
+    file: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="the path of a road network description or of a map of another program"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_path(cls, value: object) -> object:
+        if isinstance(value, str):
+            raise fault("a path alone", f'{{"file": {json.dumps(value)}}}, or the path as rnd')
+        return value
 
     @model_validator(mode="after")
     def _one(self) -> NetworkModel:
-        if (self.random is None) == (self.grid is None):
-            raise fault("not one network", "either random or grid")
+        if (self.random, self.grid, self.file).count(None) != 2:
+            raise fault("not one network", "one of random, grid and file")
         return self
 
 
@@ -170,7 +182,7 @@ class Settings0(Open):
 
     version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
     problem_domain: Literal["dubins_traffic"] = Field(description='"dubins_traffic"')
-    rnd: RoadReference = Field(description="a road network description, or the path of one")
+    rnd: RoadReference = Field(description=ROADS)
     e_agents: list[AgentEntry0] = Field(
         default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
     )
@@ -250,9 +262,9 @@ class Settings(World):
 
     version: Annotated[int, Field(ge=0, le=1)] = Field(description="1")
     problem_domain: Literal["dubins_traffic"] = Field(description='"dubins_traffic"')
-    rnd: RoadReference = Field(default=None, description="a road network description, or the path of one")
+    rnd: RoadReference = Field(default=None, description=ROADS)
     network: NetworkModel | None = Field(
-        default=None, description="the network of each trial, instead of rnd"
+        default=None, description="the network of each trial, or the file of one, instead of rnd"
     )
     number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(
         default=1, description="number of trials"

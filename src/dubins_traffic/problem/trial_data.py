@@ -65,12 +65,9 @@ class TrialData:
         date : datetime
             When the trials began; naive is taken as UTC.
         """
-        trialconf = configuration.to_document()
-        if configuration.network is not None and not isinstance(trialconf.get("rnd"), dict):
-            trialconf["rnd"] = configuration.network.to_document()
         moment = date.astimezone(UTC) if date.tzinfo else date
         documents = tuple(instance_to_document(instance, version=0) for instance in instances)
-        return TrialData(moment.strftime(DATE_FORMAT), trialconf, documents)
+        return TrialData(moment.strftime(DATE_FORMAT), configuration.inlined(), documents)
 
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> TrialData:

@@ -11,7 +11,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.foreign import WrittenFormat
 from dubins_traffic.roads.formats.hints import with_hints
 from dubins_traffic.roads.formats.lanelet2_text import write_lanelet2
-from dubins_traffic.roads.formats.osm_text import Osm, read_osm, tags
+from dubins_traffic.roads.formats.osm_text import Osm, has_lanelets, read_osm, tags
 from dubins_traffic.roads.formats.xml_text import root_name
 from dubins_traffic.roads.maps.lanelets import Lanelet, lanelet_map
 from dubins_traffic.roads.maps.model import RoadMap
@@ -29,7 +29,7 @@ class Lanelet2(WrittenFormat):
 
     def sniff(self, text: str) -> bool:
         """Tell whether the root element is `osm` and something is a lanelet."""
-        return root_name(text) == "osm" and ('v="lanelet"' in text or "v='lanelet'" in text)
+        return root_name(text) == "osm" and has_lanelets(text)
 
     def read_map(self, text: str, file: str | None = None) -> RoadMap:
         """Return the map in a text."""

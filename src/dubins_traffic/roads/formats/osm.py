@@ -9,8 +9,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from dubins_traffic.display import count
+from dubins_traffic.errors import InputError
 from dubins_traffic.roads.formats.foreign import ForeignFormat
-from dubins_traffic.roads.formats.osm_text import Osm, read_osm, tags
+from dubins_traffic.roads.formats.osm_text import Osm, has_lanelets, read_osm, tags
 from dubins_traffic.roads.formats.xml_text import root_name
 from dubins_traffic.roads.maps.model import Junction, Road, RoadMap
 
@@ -33,9 +35,8 @@ class OpenStreetMap(ForeignFormat):
     description = "OpenStreetMap, read only"
 
     def sniff(self, text: str) -> bool:
-        """Tell whether the root element is `osm` and something is a highway, and nothing a lanelet."""
-        lanelets = 'v="lanelet"' in text or "v='lanelet'" in text
-        return root_name(text) == "osm" and not lanelets and ('"highway"' in text or "'highway'" in text)
+        """Tell whether the root element is `osm` and nothing is a lanelet."""
+        return root_name(text) == "osm" and not has_lanelets(text)
 
     def read_map(self, text: str, file: str | None = None) -> RoadMap:
         """Return the map in a text."""
@@ -45,6 +46,10 @@ class OpenStreetMap(ForeignFormat):
         uses = Counter(node for nodes in refs.values() for node in nodes)
         ends = {node for nodes in refs.values() for node in (nodes[0], nodes[-1])}
         cuts = ends | {node for node, count in uses.items() if count > 1}
+        if not ways:
+            found = f"{count(len(osm.nodes), 'node')} and {count(len(osm.ways), 'way')}"
+            expected = "at least one way with the tag highway of a road for cars"
+            raise InputError("no roads", file=file, value=found, expected=expected)
         roads = [road for name, each in ways.items() for road in _roads(osm, name, each, refs[name], cuts)]
         stops = _stops(osm, cuts)
         junctions = {node: Junction(*osm.nodes[node], node in stops) for node in sorted(cuts)}

@@ -53,6 +53,11 @@ def read_osm(text: str, file: str | None = None) -> Osm:
     return Osm(reader, _places(reader, nodes), ways, relations, stops)
 
 
+def has_lanelets(text: str) -> bool:
+    """Tell whether something in an OSM text is a lanelet."""
+    return 'v="lanelet"' in text or "v='lanelet'" in text
+
+
 def tags(element: Element) -> dict[str, str]:
     """Return the tags of an element."""
     return {each.get("k", ""): each.get("v", "") for each in element.findall("tag")}

@@ -19,6 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.files import GZIP
 from dubins_traffic.outside import Seam
 from dubins_traffic.roads.formats.rnd_text import may_be
+from dubins_traffic.roads.formats.xml_text import is_xml, root_name
 
 BUILT_IN = {
     "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
@@ -147,8 +148,10 @@ def of_text(text: str) -> MapFormat:
 
 
 def is_map(text: str) -> bool:
-    """Tell whether a text holds a road network and is no JSON, which other documents are, too."""
-    return text.lstrip()[:1] not in ("", "{", "[") and (sniffed(text) is not None or may_be(text))
+    """Tell whether a text is to hold a road network: it is one, or XML, and no JSON, which other documents are, too."""
+    return text.lstrip()[:1] not in ("", "{", "[") and (
+        is_xml(text) or sniffed(text) is not None or may_be(text)
+    )
 
 
 def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps | None:
@@ -179,6 +182,11 @@ def document(form: MapFormat, text: str, file: str | None) -> tuple[Mapping[str,
     """
     if not text.strip():
         raise InputError("empty", file=file, expected="a road network (RND, JSON or text)")
+    if form is _built_in()["rnd-text"] and is_xml(text):
+        root = root_name(text)
+        problem = f"XML that is no map: its root is <{root}>" if root else "XML that ends before its root"
+        known = [own.name for own in registered() if isinstance(own, ReducesMaps)]
+        raise InputError(problem, file=file, expected=f"a whole map: {' or '.join(known)}")
     try:
         return form.reduced(text, file) if isinstance(form, ReducesMaps) else (form.read(text, file), None)
     except DubinsTrafficError:

@@ -68,7 +68,8 @@ def _edge(root: Element, lane: Lane, road: Road, line: Floats) -> None:
     edge = SubElement(root, "edge", {"id": lane.edge, "from": lane.first, "to": lane.last, "priority": "1"})
     if len(line) > 2:
         edge.set("shape", shape_text(line))
-    length = true_length(line[[0, -1]], road.corners or ())
+    # Corners stand in the order of the road, whichever way the edge runs.
+    length = true_length(road.line[[0, -1]], road.corners or ())
     row = SubElement(edge, "lane", id=f"{lane.edge}_0", index="0", speed=number_text(SPEED))
     row.set("length", number_text(length))
     row.set("width", number_text(road.lane_width))

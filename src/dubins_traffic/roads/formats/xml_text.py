@@ -21,6 +21,11 @@ _BEFORE_ROOT = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->", re.DOTALL)
 _NAME = re.compile(r"<([A-Za-z_][\w.-]*)")
 
 
+def is_xml(text: str) -> bool:
+    """Tell whether a text begins as XML does, whole or cut off."""
+    return text.lstrip("\ufeff \t\r\n").startswith("<")
+
+
 def root_name(text: str) -> str:
     """Return the name of the root element, from the beginning of a text; empty if it does not begin as XML does."""
     at = 1 if text.startswith("\ufeff") else 0

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic.display import count
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Road
 from dubins_traffic.roads.maps.polylines import dense, to_segments
@@ -88,10 +90,18 @@ class Losses:
         return sum(fate.length for fate in self.fates if fate.plain)
 
     @property
+    def length(self) -> float:
+        """Metres of all roads."""
+        return sum(fate.length for fate in self.fates)
+
+    @property
     def kept_share(self) -> float:
-        """Share of that length which the network keeps within the tolerance; 1 where there is none."""
-        kept = sum(fate.kept for fate in self.fates if fate.plain)
-        return kept / self.plain_length if self.plain_length else 1.0
+        """Share of the length that the network keeps within the tolerance: of roads with one lane in each direction.
+
+        Where a map has none of those, the share of all roads.
+        """
+        counted = [fate for fate in self.fates if fate.plain or not self.plain_length]
+        return sum(fate.kept for fate in counted) / max(sum(fate.length for fate in counted), 1e-300)
 
     @property
     def is_whole(self) -> bool:
@@ -115,7 +125,11 @@ class Losses:
             "tolerance": self.tolerance,
             "segments": self.segments,
             "w": self.w,
-            "one_plus_one": {"length": round(self.plain_length, 3), "kept_share": round(self.kept_share, 6)},
+            "one_plus_one": {
+                "length": round(self.plain_length, 3),
+                "kept_share": round(self.kept_share, 6) if self.plain_length else None,
+            },
+            "length": round(self.length, 3),
             "table": [
                 {"fate": fate, "reason": reason, "roads": number, "length": round(metres, 3)}
                 for fate, reason, number, metres in self.rows()
@@ -134,10 +148,11 @@ class Losses:
 
     def lines(self) -> list[str]:
         """Return the report as lines of text."""
+        plain = f"{self.plain_length:.0f} m with one lane in each direction"
+        none = f"{self.length:.0f} m, none of them with one lane in each direction,"
         head = (
             f"{self.segments} segments of {len(self.fates)} roads, 1 m of the map is {self.scale:.6g} m; of "
-            f"{self.plain_length:.0f} m with one lane in each direction {100.0 * self.kept_share:.1f} % kept "
-            f"within {self.tolerance:g} m"
+            f"{plain if self.plain_length else none} {100.0 * self.kept_share:.1f} % kept within {self.tolerance:g} m"
         ) + ("" if self.w == W else f"; lanes of 2w, w = {self.w:.6g} m")
         rows = [("", "roads", "metres", "why"), *((a, str(n), f"{m:.0f}", b) for a, b, n, m in self.rows())]
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
@@ -149,6 +164,17 @@ class Losses:
 
 
 FATES = ("kept", "altered", "dropped")
+
+
+class NothingHeldError(InputError):
+    """Nothing of a map can be held; `losses` are those of all its roads."""
+
+    def __init__(self, losses: Losses, file: str | None) -> None:
+        self.losses = losses
+        why = "; ".join(f"{own} ({count(n, 'road')}, {metres:.0f} m)" for _, own, n, metres in losses.rows())
+        super().__init__(
+            f"nothing of the map can be held: {why}", file=file, expected="roads that a network can hold"
+        )
 
 
 def losses(

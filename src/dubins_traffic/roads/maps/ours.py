@@ -11,7 +11,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Corner, Frame, Junction, Road, RoadMap
-from dubins_traffic.roads.maps.polylines import rounded, to_segments
+from dubins_traffic.roads.maps.polylines import cleaned, rounded, to_segments
 
 CROSSING_DEGREE = 3
 """From how many roads on a junction is a crossing, where rule 3 holds."""
@@ -43,7 +43,8 @@ def road_map(document: Mapping[str, Any]) -> RoadMap:
         corners = tuple(
             (float(x), float(y), radius) for (x, y), radius in zip(places[2:], radii, strict=True)
         )
-        line = rounded(places[0], corners, places[1], SAGITTA)
+        # Where two arcs fill the side between them, the first ends at the point at which the second begins.
+        line = cleaned(rounded(places[0], corners, places[1], SAGITTA))
         roads.append(Road(f"s{s}", ends[0], ends[1], line, 1, 1, LANE_WIDTH, corners))
     placed = _to_world(np.array(list(names)), frame)
     junctions = {

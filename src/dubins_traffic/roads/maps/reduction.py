@@ -10,7 +10,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.choosing import Chooser
 from dubins_traffic.roads.maps.drafting import Draft, Drafter
 from dubins_traffic.roads.maps.fitting import line_of
-from dubins_traffic.roads.maps.losses import Losses, Outcome, losses
+from dubins_traffic.roads.maps.losses import Losses, NothingHeldError, Outcome, losses
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.ours import network_document
 from dubins_traffic.roads.maps.reasons import Reason
@@ -79,11 +79,14 @@ def reduction(
     while work > 0 and (numbers := chooser.chosen()):
         draft = drafter.draft(numbers)
         if not draft.gone:
-            return _made(road_map, draft, dropped, settings, scale, width)
+            return Reduction(_document(draft, scale), _lost(road_map, draft, dropped, settings, scale, width))
         dropped |= draft.gone
         chooser.drop(draft.gone)
         work -= len(numbers)
-    raise InputError("nothing of the map can be held", file=file, expected="roads that a network can hold")
+    if work <= 0:
+        problem = f"too many attempts, with {len(dropped)} of {len(road_map.roads)} roads dropped so far"
+        raise InputError(problem, file=file, expected="a smaller part of the map")
+    raise NothingHeldError(_lost(road_map, Draft([], {}), dropped, settings, scale, width), file)
 
 
 def _check_length(roads: Sequence[Road], file: str | None) -> None:
@@ -108,14 +111,14 @@ def usual_width(roads: Sequence[Road]) -> float:
     return max(lengths, key=lambda width: lengths[width]) if lengths else roads[0].lane_width
 
 
-def _made(
+def _lost(
     road_map: RoadMap,
     draft: Draft,
     dropped: Mapping[int, Reason],
     settings: ImportSettings,
     scale: float,
     width: float,
-) -> Reduction:
+) -> Losses:
     limits = settings.limits(scale)
     lines: dict[int, list[Floats]] = {}
     for strand, fitted in zip(draft.strands, draft.fits, strict=True):
@@ -126,8 +129,7 @@ def _made(
         Outcome(road, tuple(lines.get(number, ())), _reasons(road, number, dropped, width, number in lines))
         for number, road in enumerate(road_map.roads)
     ]
-    lost = losses(outcomes, settings.tolerance, scale, len(draft.strands), settings.w)
-    return Reduction(_document(draft, scale), lost)
+    return losses(outcomes, settings.tolerance, scale, len(draft.strands), settings.w)
 
 
 def _reasons(
