@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.service import housekeeping, queue, submissions
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Chunk, Submission, Worker
-from dubins_traffic.service.web import viewer
+from dubins_traffic.service.web import bodies, viewer
 from dubins_traffic.service.web.viewer import OfficeHere
 
 Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
@@ -119,7 +119,7 @@ class Doors(Controller):
 
         office.database.patiently(renew)
 
-    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK)
+    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={bodies.FILES: True})
     async def replay(
         self,
         office: OfficeHere,
@@ -135,7 +135,12 @@ class Doors(Controller):
             raise ClientException("a replay is packed by gzip")
         return {"digest": await asyncio.to_thread(office.storage.put, data, "replays")}
 
-    @post("/chunks/{number:int}/done", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
+    @post(
+        "/chunks/{number:int}/done",
+        sync_to_thread=True,
+        status_code=HTTP_204_NO_CONTENT,
+        opt={bodies.FILES: True},
+    )
     def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
         """End a lease with its results; they and what follows from them are kept together, or not at all."""
         office.database.patiently(lambda session: _done(office, session, number, data))
