@@ -68,7 +68,7 @@ class Api(Controller):
             row = receiving.found_phase(session, slug, name)
             if not viewing.sees_table(row, viewer.account, at):
                 return []
-            latest = standings.latest_standing(session, row)
+            latest = standings.latest_standing(session, row, office.hiding(row))
             if viewer.organiser or row.is_closed(at):
                 return [] if latest is None else list(latest.places)
             return standings.shown_table(office.phase(row), latest)

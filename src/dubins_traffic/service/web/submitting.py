@@ -73,6 +73,6 @@ def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
         found = receiving.found_submission(session, number, viewer.account)
         places = viewing.places_of(session)
         told = viewing.told_submission(office, session, found, viewer.account, places, logs=False)
-        differing = viewing.differing(session, found) if "trials" in told else []
+        differing = viewing.differing(office, session, found) if "trials" in told else []
         closed = found.phase.is_closed(office.clock())
     return {"submission": told, "differing": differing, "closed": closed}
